@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import warpchain
-from tests.support.made_films import motion
+from tests.support.made_films import films_of, made_bank, motion
 from warpchain import InputError, films
 
 
@@ -63,3 +63,10 @@ def test_a_film_that_begins_at_the_release_is_refused() -> None:
     late = dataclasses.replace(film, time=film.time[film.time > 0], center=film.center[film.time > 0])
     with pytest.raises(InputError, match=r"film: it shows 0\.00"):
         films.friction_line(late)
+
+
+def test_films_and_banks_are_shown_in_one_line() -> None:
+    """They say what they are, without their arrays."""
+    bank = made_bank(160, seed=1)
+    for shown in (repr(bank), repr(films_of(bank, 5, 1, films.Camera(), 0)[0])):
+        assert shown.startswith(("<Bank of ", "<Film of ")) and len(shown) < 150 and "\n" not in shown

@@ -1,5 +1,7 @@
 """Many given chains side by side: they move as each alone, and may be given other velocities between runs."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -69,7 +71,9 @@ def test_a_heap_comes_to_rest() -> None:
     [
         ({"velocity": np.zeros((2, LINKS, 2))}, "velocity"),
         ({"position": np.full((2, LINKS, 3), np.nan)}, "position"),
-        ({"parameters": [SOFT]}, "position"),
+        ({"parameters": [SOFT]}, "parameters: 1 of 2 chains"),
+        ({"parameters": "soft"}, "parameters"),
+        ({"floor": [[-1, 0], [1, 0]]}, "floor"),
         ({"soften_drive": True}, "soften_drive"),
     ],
 )
@@ -79,3 +83,26 @@ def test_wrong_input_is_one_line(changes: dict, names: str) -> None:
     given = {"parameters": [SOFT, SOFT], "position": position, "velocity": velocity} | changes
     with pytest.raises(warpchain.InputError, match=names):
         warpchain.Chains(**given)
+
+
+@pytest.mark.parametrize(
+    ("call", "problem"),
+    [
+        (lambda chains: chains.run(1e-4), "until: .* at least 0.0002"),
+        (lambda chains: chains.run(float("nan")), "until"),
+        (lambda chains: chains.run("soon"), "until"),
+        (lambda chains: chains.run(1.0, [2]), "chains: .* 0 to 1"),
+        (lambda chains: chains.motions([-1]), "chains: .* 0 to 1"),
+        (lambda chains: chains.set_velocity([7], np.zeros((1, LINKS, 3))), "chains: .* 0 to 1"),
+        (lambda chains: chains.set_velocity([0], np.zeros((2, LINKS, 3))), r"velocity: .* \(1, 12, 3\)"),
+        (lambda chains: chains.set_velocity([0], "fast"), "velocity"),
+    ],
+)
+def test_what_chains_cannot_do_is_refused(call: Callable[[warpchain.Chains], object], problem: str) -> None:
+    """A time that has passed, a chain that is not there or velocities of another shape are refused; nothing moves."""
+    chains = warpchain.Chains([SOFT, SOFT], *loops(2))
+    chains.run(2e-4)
+    before = chains.motions()
+    with pytest.raises(warpchain.InputError, match=problem):
+        call(chains)
+    assert chains.time == 2e-4 and np.array_equal(before, chains.motions())

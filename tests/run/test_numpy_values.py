@@ -79,7 +79,9 @@ def test_a_walk_and_a_trajectory_of_numpy_numbers():
     assert type(walks[1].seed) is int
     assert walks[0].setup == walks[1].setup
     assert np.array_equal(walks[0].frame_joints, walks[1].frame_joints)
-    chain = circular_loop(8, warpchain.preset("soft"), 1.0)
+    position, velocity = circular_loop(8, warpchain.preset("soft"), 1.0)
+    position[:, 1] += 0.1
+    chain = position, velocity
     runs = [
         warpchain.simulate("soft", *chain, real(0.01), times=times, floor=truth(True), gravity=truth(False))
         for real, truth, times in ((float, bool, [0.0, 0.01]), (np.float64, np.bool_, (np.float64(0.0), 0.01)))

@@ -16,6 +16,7 @@ from warpchain.inputs.parameters import preset
 SOFT = preset("soft")
 SETUP = setup_walk("soft", {}, None)
 POSITION, VELOCITY = circular_loop(8, SOFT, 1.0)
+POSITION[:, 1] += 0.1
 
 
 class ComputedError(Exception):
@@ -64,7 +65,7 @@ def test_good_input_is_computed():
         POSITION,
         POSITION.tolist(),
         POSITION.astype(np.float32),
-        [[0, 0, angle] for angle in (0, 3, 0, 3)],
+        [[0, 0.1, angle] for angle in (0, 3, 0, 3)],
     ):
         velocity = np.zeros_like(position, dtype=float)
         for duration in (0, 0.0, 1, 1.5, np.float32(1), np.int64(1)):
@@ -128,9 +129,10 @@ def test_simulate_refuses_states(name, given, message):
 
 @pytest.mark.parametrize("links", [0, 2, 3, 5, 7])
 def test_simulate_refuses_chains_that_cannot_be(links):
-    """A chain has an even number of at least 4 links."""
+    """A chain has at least 4 links, and an even number if they are of two kinds."""
     told = refused(warpchain.simulate, "soft", np.zeros((links, 3)), np.zeros((links, 3)), 1.0)
-    assert told == f"position: {links} links; a closed chain has an even number of at least 4"
+    problem = f"{links} links; a closed chain has at least 4" if links < 4 else f"{links} is odd; inner and outer"
+    assert told.startswith(f"position: {problem}")
 
 
 def test_simulate_refuses_states_of_different_length():
@@ -180,7 +182,7 @@ def test_simulate_refuses_times(times, message):
 
 
 @pytest.mark.parametrize("name", ["floor", "gravity"])
-@pytest.mark.parametrize("value", ["no", None, 0.0, []])
+@pytest.mark.parametrize("value", ["no", 0.0, []])
 def test_simulate_refuses_switches_that_are_no_truth_values(name, value):
     """Like `self_contact`, `floor` and `gravity` are true or false: `floor="no"` does not mean a floor."""
     assert refused(warpchain.simulate, "soft", POSITION, VELOCITY, 1.0, **{name: value}).startswith(f"{name}: ")

@@ -87,7 +87,7 @@ def test_a_walk_goes_on_when_the_sprocket_has_vanished(settings: dict[str, Any])
     lowered = warpchain.walk(**settings, release=[[0.05, 0.0, -0.012, 0.0], [0.07, 0.0, -0.012, 0.0]])
     assert lowered.status.label == "at_rest" and lowered.dx < warpchain.walk(**settings).dx
     assert lowered.energy_error < 1e-2 and lowered.bounces > 0
-    with pytest.raises(InputError, match=r"t: 0.05 s is not in the walk; give a time from 0.07"):
+    with pytest.raises(InputError, match=r"t: 0.05 s: the sprocket is there until 0.07 s"):
         lowered.state(0.05)
     state = lowered.state(0.1)
     assert_rest_of(warpchain.walk(start=state), lowered, state.time)
@@ -104,6 +104,7 @@ def test_a_walk_goes_on_when_the_sprocket_has_vanished(settings: dict[str, Any])
         ([[0.1, 1e9, 0, 0]], {}, "is not within"),
         ([], {}, "0 rows; give 1 to 16"),
         ("lift", {}, "release"),
+        ([[0.2, 0.0, -0.5, 8.0]], {}, r"scene\.release: y = -0\.5 m takes the sprocket through the floor"),
     ],
 )
 def test_motions_that_are_none_are_refused(release: Any, more: dict[str, Any], problem: str) -> None:

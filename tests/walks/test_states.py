@@ -224,7 +224,8 @@ RING = outline(12, PAPER.link_length)
     [
         (RING * 1000, "joints: the loop is not closed, or lengths are not in m"),
         (RING[:10], "joints: the loop is not closed"),
-        (RING[:11], "joints: 11 links"),
+        (outline(11, PAPER.link_length), "joints: 11 is odd"),
+        (RING[:3], "joints: 3 links"),
         (RING[:, :1], r"joints: its shape is \(12, 1\)"),
         (RING * np.nan, "joints: they or their rates hold a number that is not finite"),
         ("ring", "joints: not an array"),
@@ -253,7 +254,8 @@ def test_an_open_chain_is_refused_by_simulate() -> None:
     [
         ({"frequency": 3.0}, "frequency: given together with a state"),
         ({"links": 12, "clearance": 0.1}, "links, clearance: given together with a state"),
-        ({"preset": "soft"}, "preset: given together with a state"),
+        ({"preset": "soft"}, "preset: given together with a state, which has its parameters"),
+        ({"release": [[0.1, 0, 0, 5]]}, "release: given together with a state"),
         ({"seed": 1}, "seed: given together with a state"),
         ({"walk_limit": 0.1}, "walk_limit: 0.1 s is before the state"),
         ({"floor_friction": -1.0}, "floor_friction"),
@@ -271,3 +273,66 @@ def test_a_time_outside_of_the_walk_has_no_state(fall: WalkResult, time: Any) ->
     """Before the release and after the end there is none."""
     with pytest.raises(InputError, match=r"^t: .*; give"):
         fall.state(time)
+
+
+@pytest.mark.parametrize("settings", [ELLIPSE, SPUN], ids=["explicit", "hybrid"])
+def test_a_state_goes_on_with_the_chain_of_its_setup(settings: Mapping[str, Any]) -> None:
+    """A charm in the setup of a state, and one given beside the state, hang on the same chain."""
+    state = warpchain.walk(**settings).state(0.2)
+    charmed = state.setup.scene.model_copy(update={"charm_mass": 0.02})
+    put, given = (
+        warpchain.walk(start=start, walk_until=0.3, **beside)
+        for start, beside in (
+            (replace(state, setup=replace(state.setup, scene=charmed)), {}),
+            (state, {"charm_mass": 0.02}),
+        )
+    )
+    assert numbers(put) == numbers(given) and put.setup.scene.charm_mass == 0.02
+    gravity = state.parameters.gravity
+    added = 0.02 * gravity * state.position[state.setup.scene.charm_link, 1]
+    assert put.gravitational_energy[0] == pytest.approx(energy(state)[1] + added, rel=1e-9)
+
+
+def test_a_state_keeps_its_floor_in_simulate() -> None:
+    """Unless another is given, the floor is that of the state's scene: a chain lies on its slope, not on y = 0."""
+    state = warpchain.walk(**ELLIPSE, slope=10.0).state(0.3)
+    on_slope, in_the_air = (warpchain.simulate(state, duration=0.4, method="dp5", floor=f) for f in (None, False))
+    assert on_slope.impulses["floor"] > 0 == in_the_air.impulses["floor"]
+    x, y = on_slope.position[-1, :, :2].T
+    assert (y + x * math.tan(math.radians(10))).min() > 0 > y.min()
+    with pytest.raises(InputError, match=r"position: link \d+ starts .* inside the floor"):
+        warpchain.simulate(replace(state, position=state.position - [0, 0.3, 0]), duration=0.1, floor=True)
+
+
+def test_a_state_that_a_sprocket_pressed_into_the_floor_goes_on() -> None:
+    """Unchanged states go on to the bit, whatever came before."""
+    whole = warpchain.walk(links=30, frequency=8.0, start="spinning", preset="soft", release=[[0.2, 0, -0.02, 0]])
+    state = whole.state(0.2)
+    assert (state.joints[:, 1] < 0).any()
+    assert_rest_of(warpchain.walk(start=state), whole, state.time)
+    with pytest.raises(InputError, match=r"t: .* the sprocket is there until 0\.2 s, and a state has none; give"):
+        whole.state(0.1)
+
+
+def test_equal_links_may_be_odd_in_number() -> None:
+    """A ring of 31 links that are all alike is a state, which falls like any other."""
+    soft = warpchain.preset("soft")
+    alike = soft.with_values({"outer_mass": soft.inner_mass, "outer_inertia": soft.inner_inertia})
+    state = State.of_joints(outline(31, soft.link_length), parameters=alike)
+    fallen = warpchain.simulate(state, duration=1e-3, method="dp5")
+    drop = (fallen.position[-1] - fallen.position[0])[:, 1].mean()
+    assert drop == pytest.approx(-soft.gravity * 1e-6 / 2, rel=1e-3)
+
+
+def test_a_walk_from_a_state_has_no_loop_on_a_sprocket(fall: WalkResult) -> None:
+    """The refusal does not ask for a record of what such a walk does not have."""
+    walk = warpchain.walk(start=fall.state(0.2), walk_until=0.21)
+    with pytest.raises(ValueError, match="it began without a sprocket"):
+        walk.mean_loop()
+
+
+def test_a_trajectory_is_shown_in_one_line(fall: WalkResult) -> None:
+    """It says what it is, without its arrays."""
+    assert repr(warpchain.simulate(fall.state(0.1), duration=0.0, times=[0])) == (
+        "<Trajectory of 36 links, 1 instants: finished>"
+    )

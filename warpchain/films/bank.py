@@ -45,7 +45,7 @@ IDENTIFIED: Final = 0.8
 """… if its error is smaller than so many of them."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Bank:
     """Chains whose parameters are known, and their walks: chain c, experiment e, repetition r.
 
@@ -66,6 +66,10 @@ class Bank:
     center: Array
     outline: Array
     speed: Array
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"<Bank of {len(self.values)} chains, {len(self.experiments)} experiments each: {', '.join(self.names)}>"
 
     @classmethod
     def of(cls, result: SweepResult | BlockResult) -> Self:

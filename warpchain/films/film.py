@@ -51,7 +51,7 @@ class Camera:
         return random.normal(size=8) * sigma
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Film:
     """What was measured of a walk: x forwards from the axis of the sprocket, y up from the floor.
 
@@ -70,6 +70,10 @@ class Film:
     frequency: float
     outline: Array | None = None
     speed: float | None = None
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"<Film of {self.links} links at {self.frequency:g} Hz, {len(self.time)} frames>"
 
     @classmethod
     def of(cls, walk: WalkResult) -> Self:

@@ -139,7 +139,8 @@ class Scene(Section):
     release: Annotated[Motion | None, BeforeValidator(checked_motion)] = Field(
         default=None,
         description="motion of the sprocket after the release: rows [time in s, x and y in m from its place, "
-        "frequency in Hz]; it vanishes after the last, or at once (null)",
+        "frequency in Hz]; it vanishes after the last, or at once (null); "
+        "what sinks too deep presses the chain into the floor",
     )
     floor: Annotated[Literal["flat"] | Points, BeforeValidator(checked_profile)] = Field(
         default="flat",
@@ -301,17 +302,17 @@ def link_values(scene: Scene, parameters: Parameters) -> LinkValues:
     return values
 
 
-def check_parity(scene: Scene, parameters: Parameters) -> None:
+def check_parity(scene: Scene, parameters: Parameters, path: str = "scene.links") -> None:
     """Check that the links of a chain can alternate between two kinds, if they do.
 
     Raises:
-        InputError: their number is odd.
+        InputError: their number is odd; the message begins with `path`.
     """
     is_one_kind = (parameters.inner_mass, parameters.inner_inertia) == (parameters.outer_mass, parameters.outer_inertia)
     if scene.links % 2 and not is_one_kind and (scene.link_masses is None or scene.link_inertias is None):
         raise InputError(
-            f"scene.links: {scene.links} is odd; inner and outer links alternate: give an even number, "
-            "link_masses and link_inertias, or equal inner and outer links"
+            f"{path}: {scene.links} is odd; inner and outer links alternate: give an even number, "
+            "equal inner and outer links, or a scene with link_masses and link_inertias"
         )
 
 
@@ -400,6 +401,12 @@ def check_scene(scene: Scene, parameters: Parameters) -> None:
             f"in turns a minute, give {scene.frequency / 60:g}"
         )
     contact_radius(scene, parameters)
+    highest = scene.clearance + scene.links * parameters.link_length / 2  # of the sprocket's lowest point
+    if scene.release and floor_points(scene) is None and (lowest := min(row[2] for row in scene.release)) < -highest:
+        raise InputError(
+            f"scene.release: y = {lowest:g} m takes the sprocket through the floor, at most {highest:g} m "
+            "below it; give a higher place"
+        )
     if joint_radius(scene, parameters) < LEAST_SPROCKET * parameters.link_length:
         raise InputError(
             f"parameters.sprocket_radius: {parameters.sprocket_radius} m is nothing beside links of "

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters, preset
-from warpchain.inputs.scene import MOST_LINKS, Scene, check_scene
+from warpchain.inputs.scene import MOST_LINKS, Scene, check_parity, check_scene
 from warpchain.inputs.sections import SECTION_OF
 from warpchain.inputs.start_shapes import links_between
 from warpchain.inputs.validation import InputError, validated
@@ -145,7 +145,7 @@ class State:
         """The state of links whose centres, angles and rates are known, see the attributes.
 
         Args:
-            position: (n, 3); n even, at least 4.
+            position: (n, 3); n at least 4, and even unless inner and outer links are equal.
             velocity: (n, 3).
             parameters: of the chain, or the name of a preset.
 
@@ -167,7 +167,7 @@ class State:
 
         Args:
             joints: x, y of each joint in order around the loop [m], (n, 2); joint i ends link i, and links 0, 2, … are
-                inner ones. y = 0 is the floor. n is even, at least 4.
+                inner ones. y = 0 is the floor. n is at least 4, and even unless inner and outer links are equal.
             velocity: their rates [m/s], (n, 2); None: at rest.
             parameters: of the chain, or the name of a preset.
 
@@ -245,13 +245,15 @@ def real_array(name: str, given: object, remedy: str) -> Array:
 
 def _setup(links: int, parameters: Parameters | str, field_name: str) -> Setup:
     """The setup of a chain that no sprocket has moved."""
-    if links < 4 or links % 2:
-        raise InputError(f"{field_name}: {links} links; a closed chain has an even number of at least 4")
+    if links < 4:
+        raise InputError(f"{field_name}: {links} links; a closed chain has at least 4")
     if links > MOST_LINKS:
         raise InputError(f"{field_name}: {links} links; give at most {MOST_LINKS}")
     name = DEFAULT_PRESET if isinstance(parameters, Parameters) else parameters
     chain = parameters if isinstance(parameters, Parameters) else preset(parameters)
-    return Setup(name, chain, Scene(links=links, frequency=0.0, start="ellipse"), Options())
+    scene = Scene(links=links, frequency=0.0, start="ellipse")
+    check_parity(scene, chain, field_name)
+    return Setup(name, chain, scene, Options())
 
 
 def _fitted(joints: Array, rates: Array, length: float) -> tuple[Array, Array]:

@@ -187,6 +187,10 @@ def average_loop(setup: Setup, before: BeforeRelease | None, center: Array | Non
         ValueError: the walk has kept nothing of that time, or too little.
     """
     if before is None or center is None:
+        if not setup.has_drive:
+            raise ValueError(
+                "walk: it began without a sprocket, so it has no loop on one; take a walk from its drive on"
+            )
         raise ValueError("walk: nothing was kept of the time before its release; run it again with record_before")
     smoothing = setup.parameters.friction_smoothing
     if setup.options.soften_drive:

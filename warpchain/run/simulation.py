@@ -37,7 +37,7 @@ def simulate(
     duration: float | None = None,
     *,
     times: Sequence[float] | Array | None = None,
-    floor: bool | Sequence[Sequence[float]] | Array = True,
+    floor: bool | Sequence[Sequence[float]] | Array | None = None,
     gravity: bool = True,
     self_contact: bool = True,
     method: str = "rkf78",
@@ -49,13 +49,14 @@ def simulate(
 
     Args:
         parameters: Of the chain, or the name of a preset; or a :class:`State`, which has positions and velocities, too.
-        position: (n, 3): x, y [m] and θ [rad] of each link's centre; n even, at least 4. Link i's right end meets
+        position: (n, 3): x, y [m] and θ [rad] of each link's centre; n as of :class:`State`. Link i's right end meets
             link i + 1's left end, the last link's the first one's. Links 0, 2, … are inner ones.
         velocity: (n, 3): their rates [m/s, m/s, rad/s].
         duration: Simulated time [s], from time 0, which is that of the state.
         times: Instants of the trajectory [s], rising, in [0, duration]; steps land on them exactly. Default: 101
             instants evenly spread.
-        floor: Whether there is a floor at y = 0, or one like ``floor`` of a scene: points ``[[x, y], …]`` [m].
+        floor: True (at y = 0), False (none) or points ``[[x, y], …]`` [m] like ``floor`` of a scene; None: that of the
+            state's scene, for arrays at y = 0.
         gravity: Whether gravity acts.
         self_contact: Whether links touch one another.
         method: A key of ``warpchain.inputs.methods.METHODS``, such as ``"dp5"``.
@@ -80,8 +81,10 @@ def simulate(
             raise InputError(f"options.{name}: only a walk has phases in which joints soften; leave it out")
     if not isinstance(gravity, bool):
         raise InputError(f"gravity: {shown(gravity)} is not a truth value; give True or False")
-    points = None if isinstance(floor, bool) else floor_points(validated(Scene, {"floor": floor}, ""))
     state = _checked_state(parameters, position, velocity)
+    points = None
+    if not isinstance(floor, bool):
+        points = floor_points(state.setup.scene if floor is None else validated(Scene, {"floor": floor}, ""))
     chain = state.parameters if gravity else state.parameters.with_values({"gravity": 0.0})
     check_links_on_gpu(state.links, options.device, "position")
     instants = _checked_times(end, times)
@@ -90,7 +93,7 @@ def simulate(
             f"times: {len(instants)} instants of {state.links} links are too many; "
             f"give at most {MOST_PLACES // state.links}"
         )
-    if points is not None:
+    if floor is not False and not (floor is None and state.is_placed_as_in(state.setup)):
         check_above(points, state.position, chain.link_length, "position")
     with gpu_turn([options.device]):
         body = "none" if floor is False else body_of(points)
@@ -152,6 +155,16 @@ class Chains:
         options = validated(Options, {"soften_drive": False, **settings, "method": method, "device": device}, "options")
         if options.soften_drive:
             raise InputError("options.soften_drive: there is no sprocket; leave it out")
+        if not isinstance(floor := plain(floor, "floor"), bool):
+            raise InputError(
+                f"floor: {shown(floor)} is not a truth value; give True or False (simulate takes profiles)"
+            )
+        if not all(isinstance(each, Parameters) for each in parameters):
+            raise InputError(f"parameters: {shown(parameters)} are not a row of Parameters; give those of each chain")
+        if np.ndim(position) == 3 and len(parameters) != len(position):
+            raise InputError(
+                f"parameters: {len(parameters)} of {len(position)} chains in position; give those of each chain"
+            )
         shape = (len(parameters), *np.shape(position)[1:2], 3)
         for name, given in (("position", position), ("velocity", velocity)):
             if np.shape(given) != shape or len(shape) != 3 or not np.all(np.isfinite(given)):
@@ -176,12 +189,15 @@ class Chains:
 
     def motions(self, chains: Sequence[int] | NDArray[np.integer[Any]] | None = None) -> tuple[Array, Array]:
         """Place and angle of the links of all chains, or of some numbers, (W, n, 3); and their rates."""
-        return self._batch.motions(range(len(self.status)) if chains is None else list(chains), self._links)
+        return self._batch.motions(self._numbers(chains), self._links)
 
     def set_velocity(self, chains: Sequence[int] | NDArray[np.integer[Any]], velocity: Array) -> None:
-        """Give some chains, by their numbers, other velocities, (chains, n, 3)."""
-        if len(chains):
-            self._batch.set_velocities(list(chains), velocity)
+        """Give some chains, by their numbers, other velocities, (chains, n, 3); an `InputError` if they do not fit."""
+        numbers, rates = self._numbers(chains), real_array("velocity", velocity, "shape (chains, n, 3)")
+        if rates.shape != (shape := (len(numbers), self._links, 3)) or not np.all(np.isfinite(rates)):
+            raise InputError(f"velocity: its shape is {rates.shape}; give finite numbers of shape {shape}")
+        if numbers:
+            self._batch.set_velocities(numbers, rates)
 
     def run(
         self,
@@ -193,17 +209,37 @@ class Chains:
         """Carry on all chains that can go on, or those of some numbers.
 
         Args:
-            until: Time [s].
+            until: Time [s], not before that of any of them.
             chains: Numbers of the chains; None: all.
             to_rest: Whether a chain that comes to rest on the floor stays there, AT_REST; others end with TIME_LIMIT.
+
+        Raises:
+            InputError: A number or the time is refused.
         """
-        status, wanted = self.status, range(len(self.status)) if chains is None else chains
-        going = [int(world) for world in wanted if status[world] == Status.FINISHED]
+        status = self.status
+        going = [world for world in self._numbers(chains) if status[world] == Status.FINISHED]
+        now = max((self._batch.time(world) for world in going), default=0.0)
+        until = plain(until, "until")
+        if isinstance(until, bool) or not isinstance(until, int | float) or not now <= until < LONGEST:
+            raise InputError(
+                f"until: {shown(until)} is no time from now on; give a number of seconds, at least {now:g}"
+            )
         if going:
             with gpu_turn([self._batch.options.device]):
                 self._batch.resume(going, until, Status.TIME_LIMIT if to_rest else Status.FINISHED)
                 self._batch.run(going, self._features)
         self.time = until
+
+    def _numbers(self, chains: Sequence[int] | NDArray[np.integer[Any]] | None) -> list[int]:
+        """Numbers of chains, by default all, or an `InputError`."""
+        count = len(self.status)
+        numbers = np.arange(count) if chains is None else np.asarray(chains)
+        if numbers.size == 0:
+            return []
+        if numbers.ndim != 1 or numbers.dtype.kind not in "iu" or numbers.min() < 0 or numbers.max() >= count:
+            raise InputError(f"chains: {shown(chains)} are not numbers of chains; give some of 0 to {count - 1}")
+        found: list[int] = numbers.tolist()
+        return found
 
 
 def _follow(

@@ -43,6 +43,8 @@ def state_at(setup: Setup, t: object, end: float) -> State:
         first = setup.start.time
     if np.isnan(end):
         raise InputError("t: the walk ended before its release, and has no such time; see its status")
+    if setup.start is None and 0 <= time < first:
+        raise InputError(f"t: {time:g} s: the sprocket is there until {first:g} s, and a state has none; give more")
     if not first <= time <= end:
         raise InputError(f"t: {time:g} s is not in the walk; give a time from {first:g} to {end:.6g}")
     with gpu_turn([setup.options.device]):

@@ -10,7 +10,7 @@ from warpchain.status import Status
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Trajectory:
     """Motion of a chain of n links at t chosen instants, as `warpchain.simulate` returns it.
 
@@ -37,3 +37,7 @@ class Trajectory:
     losses: dict[str, float]
     greatest_opening: float
     greatest_penetration: dict[str, float]
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"<Trajectory of {self.position.shape[1]} links, {len(self.time)} instants: {self.status.label}>"

@@ -256,7 +256,8 @@ class WalkResult:
         goes on with it, `dataclasses.replace` perturbs it.
 
         Args:
-            t: time since the release [s], at most `walk_time`.
+            t: time since the release [s], at most `walk_time`; not before the sprocket of a `release` vanishes, of
+                which a state knows nothing.
 
         Raises:
             InputError: `t` is no such time, the chain was never released, or the device of the walk is not here.
