@@ -173,7 +173,7 @@ def test_a_sweep_is_no_saved_walk(tmp_path: Path, single: Path) -> None:
     with pytest.warns(InputWarning, match="20 of .* walks are missing"):
         merge(single, tmp_path / "merged.h5")
     for path in (single, tmp_path / "merged.h5"):
-        with pytest.raises(InputError, match="give a saved walk; .walk --like SWEEP --index I. saves one"):
+        with pytest.raises(InputError, match=r"give a saved walk; `walk --like SWEEP --index I` saves one"):
             load_walk(path)
 
 

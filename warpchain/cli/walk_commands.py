@@ -54,7 +54,7 @@ _Text = str | None
 
 
 def walk(
-    links: Annotated[_Text, option("N", "Number of links of the loop, an even number. Default: 60.")] = None,
+    links: Annotated[_Text, option("N", "Number of links of the loop, even unless all are alike. Default: 60.")] = None,
     frequency: Annotated[_Text, option("HZ", "Turns of the sprocket per second, in Hz. Default: 15.")] = None,
     start: Annotated[_Text, option("NAME", _STARTS)] = None,
     preset: Annotated[_Text, option("NAME", _PRESETS)] = None,
