@@ -233,12 +233,9 @@ def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
             f"{NUMERICS_VERSION}; use the version that began it, give another folder, or start anew with fresh"
         )
     if found.part != manifest.part:
-        own = "{}/{}".format(*found.part)
+        own, wanted = ("{}/{}".format(*part) if part[1] > 1 else "1/1 (all)" for part in (found.part, manifest.part))
         remedy = f"give --part {own}" if found.part[1] > 1 else "leave --part out"
-        raise InputError(
-            f"{folder}: holds part {own} of its sweep, not {manifest.part[0]}/{manifest.part[1]}; {remedy}, or "
-            "another folder"
-        )
+        raise InputError(f"{folder}: holds part {own} of its sweep, not {wanted}; {remedy}, or another folder")
     digest = found.sweep.digest()  # by this version, which may know of more fields than that which began the folder
     if digest == manifest.digest:
         return found
