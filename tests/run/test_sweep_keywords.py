@@ -176,7 +176,7 @@ def test_all_errors_are_told_at_once(tmp_path):
         ({"preset": "soft", "links": 60, "source": {"version": 1}}, "preset, links: given together with a source"),
         ({"samples": 1, "floor": [[-1, 0], [1, 0]]}, "floor: a list of its own"),
         ({"samples": 1, "link_masses": np.full(60, 3e-3)}, "link_masses: a list of its own"),
-        ({"samples": 1, "start": object()}, "start: sweeps go on from no state"),
+        ({"samples": 1, "start": ...}, "start: sweeps go on from no state"),
         ({"samples": 1, "part": "3/2"}, "part: '3/2' is no part; give k/N"),
         ({"samples": 1, "grid": {"device": ["cpu", "cuda"]}, "device": "cpu"}, "sweep.grid: method is "),
     ],
