@@ -24,7 +24,7 @@ def test_a_release_is_that_of_its_walk() -> None:
 def test_a_drag_acts_when_it_should(monkeypatch: pytest.MonkeyPatch) -> None:
     """In flight and in impacts add up to always, but for chaos; none at all is dragged for no time."""
     monkeypatch.setattr(drag, "LATEST", 0.2)
-    monkeypatch.setattr(drag, "END", 0.2)
+    monkeypatch.setattr(drag, "END", 0.21)
     whole, flight, impacts = (drag.Variant(50.0, *when) for when in ((True, True), (True, False), (False, True)))
     monkeypatch.setattr(drag, "VARIANTS", (drag.Variant(0.0), whole, flight, impacts))
     state = [each[None] for each in drag.released(60, 15.0, 7)]
