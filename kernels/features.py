@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 COMPILER_FLAGS = (
-    "-march=native -ffp-contract=fast -mllvm=-inline-threshold=9000 -mllvm=-inline-cold-callsite-threshold=3000"
+    "-march=native -ffp-contract=fast -mllvm=-inline-threshold=40000 -mllvm=-inline-cold-callsite-threshold=3000"
 )
 """Clang flags of the step kernels. Fused multiply-adds make a stage 1.7 times faster."""
 
@@ -15,7 +15,7 @@ class Features:
     Attributes:
         method: Name of a method, see :mod:`methods.method`.
         columns: Width of a chain's scratch, see :func:`layout.padded_width`.
-        fixed_body: A key of :data:`contacts.fixed_body.BODIES`, or ``"none"``.
+        fixed_body: A key of :data:`contacts.fixed_body.BODIES`.
         self_contact: Contacts between a chain's own links.
         tilts: Whether the plane of the chain may move, see :mod:`physics.plane`; with an explicit method only.
         moving_sprocket: Whether the sprocket is there as well, above a floor, and moves.

@@ -150,6 +150,7 @@ class Body:
 
 
 BODIES = {
+    "none": Body(surface=None),
     "floor": Body(floor_surface),
     "sprocket": Body(sprocket_surface, motion=turning_sprocket, lesser_gap=lesser_sprocket_gap),
     "moving sprocket": Body(moving_sprocket_surface, motion=moved_sprocket),

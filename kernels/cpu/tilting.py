@@ -1,8 +1,14 @@
-"""A chain whose plane may tilt, on a CPU: sums over its links, what its plane changes in a first stage, its floor."""
+"""A chain whose plane may tilt, on a CPU: sums over its links, what its plane changes in a first stage, its floor.
+
+:func:`tilting_plane` makes hooks of the loop of them.
+"""
+
+import functools
 
 import warp as wp
 
 from warpchain.kernels import layout
+from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.contacts.tilting_floor import (
     copy_inverse,
     greatest_across_speed,
@@ -13,6 +19,8 @@ from warpchain.kernels.contacts.tilting_floor import (
     steepness,
 )
 from warpchain.kernels.cpu.contacts.proximity import FURTHEST
+from warpchain.kernels.cpu.joints import Joints
+from warpchain.kernels.cpu.upright import Plane
 from warpchain.kernels.layout import (
     COSINE,
     INERTIA,
@@ -37,8 +45,16 @@ from warpchain.kernels.layout import (
 )
 from warpchain.kernels.physics.elementary import TWO, ZERO, from_order_key, order_bits, order_key
 from warpchain.kernels.physics.geometry import LANES, whole_lanes
-from warpchain.kernels.physics.plane import invert_plane_mass, motion_terms, on_plane, place_terms, plane_load
-from warpchain.kernels.types import Chain
+from warpchain.kernels.physics.plane import (
+    begin_plane_step,
+    end_plane_step,
+    invert_plane_mass,
+    motion_terms,
+    on_plane,
+    place_terms,
+    plane_load,
+)
+from warpchain.kernels.types import Chain, Ground, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -235,3 +251,47 @@ def resolve_tilting_floor(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.
     K[LOST_FIXED, 0] = K[LOST_FIXED, 0] + push_plane_by(P, push, moment_x, moment_y)
     write_sums_of_motion(K, P, chain)
     return impulses
+
+
+@functools.cache
+def tilting_plane(joints: Joints) -> Plane:
+    """A plane that may tilt, above a flat floor."""
+    first_stage = joints.first_stage
+
+    @wp.func
+    def at_start(P: wp.array(dtype=wp.float64), chain: Chain) -> Chain:
+        return on_plane(chain, P, 0)
+
+    @wp.func
+    def begin_step(
+        K: wp.array2d(dtype=wp.float64),
+        P: wp.array(dtype=wp.float64),
+        chain: Chain,
+        state: State,
+        world: int,
+        h: wp.float64,
+    ) -> Chain:
+        before = on_plane(chain, P, wp.static(layout.PLANE_MID))
+        begin_plane_step(P, chain.gravity, h)
+        felt = on_plane(chain, P, wp.static(layout.PLANE_MID))
+        if state.has_first_stage[world] != 0:
+            shift_first_stage(K, before, felt)
+        first_stage(K, felt, state, world)
+        return felt
+
+    @wp.func
+    def end_step(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), chain: Chain, h: wp.float64):
+        write_plane_sums(K, P, chain)
+        end_plane_step(P, chain.gravity, h)
+
+    @wp.func
+    def gap(K: wp.array2d(dtype=wp.float64), chain: Chain, _ground: Ground, _face: Face):
+        return tilting_gap(K, chain)
+
+    @wp.func
+    def meet(
+        K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), chain: Chain, _ground: Ground, _face: Face
+    ):
+        return resolve_tilting_floor(K, P, chain)
+
+    return Plane(write_plane_sums, at_start, begin_step, end_step, gap, meet)

@@ -4,7 +4,7 @@ import warp as wp
 
 from warpchain.kernels import layout
 from warpchain.kernels.codes import NOT_FINITE, RUNNING
-from warpchain.kernels.events.summary import Summary
+from warpchain.kernels.events.summary import Summary, summarise
 from warpchain.kernels.layout import COSINE, COULOMB, LEFT_X, LEFT_Y, OMEGA, RIGHT_X, RIGHT_Y, SINE, TIME, VISCOUS, U, V
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.physics.joint import friction_torque, joint_force
@@ -44,6 +44,16 @@ def write_sample(state: State, record: Record, world: int, time: wp.float64, sum
 
 
 @wp.func
+def observe(
+    K: wp.array2d(dtype=wp.float64), chain: Chain, state: State, record: Record, world: int, time: wp.float64
+) -> Summary:
+    """Writes a sample of a chain whose ends are placed."""
+    summary = summarise(K, chain)
+    write_sample(state, record, world, time, summary)
+    return summary
+
+
+@wp.func
 def write_load(loads: wp.array2d(dtype=wp.float64), row: int, K: wp.array2d(dtype=wp.float64), chain: Chain, i: int):
     """Writes force F = k C + b Ċ [N] and friction moment [N m] of joint i, both as they act on the link before it."""
     n = chain.link_count
@@ -60,7 +70,9 @@ def write_load(loads: wp.array2d(dtype=wp.float64), row: int, K: wp.array2d(dtyp
 
 
 @wp.func
-def write_frame(record: Record, K: wp.array2d(dtype=wp.float64), chain: Chain, world: int, time: wp.float64):
+def write_frame(
+    K: wp.array2d(dtype=wp.float64), chain: Chain, _state: State, record: Record, world: int, time: wp.float64
+):
     """Appends all joint positions if frames are kept, and the loads of the joints if these are kept."""
     if record.frames.shape[1] == 0:
         return

@@ -6,12 +6,11 @@ import warp as wp
 
 from warpchain.kernels.codes import RUNNING
 from warpchain.kernels.events.ending import watch_ending
-from warpchain.kernels.events.record import write_frame, write_sample
+from warpchain.kernels.events.record import observe, write_frame
 from warpchain.kernels.events.release import drag_rate, load_at, watch_steadiness
 from warpchain.kernels.events.rest import watch_rest
 from warpchain.kernels.events.softening import watch_collapse, watch_drive, watch_stiffening
-from warpchain.kernels.events.summary import summarise
-from warpchain.kernels.events.tilting import in_room, watch_fall, write_frame_plane, write_tilting_sample
+from warpchain.kernels.events.tilting import no_fall, observe_in_room, watch_fall, write_frame_in_room
 from warpchain.kernels.layout import TIME
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.physics.scaled_loads import drag_shape
@@ -29,6 +28,10 @@ def next_mark(state: State, control: Control, world: int):
     return due
 
 
+VIEWS = {False: (observe, write_frame, no_fall), True: (observe_in_room, write_frame_in_room, watch_fall)}
+"""How a sample and a frame are written, and the watch of a fall, by whether the plane of the chain may tilt."""
+
+
 @functools.cache
 def sampling(fixed_body: str, tilts: bool = False):
     """Warp function ``sample`` of a chain whose ends are placed: time series, frame, watches; returns the status.
@@ -44,6 +47,7 @@ def sampling(fixed_body: str, tilts: bool = False):
     """
     has_floor = fixed_body not in ("none", "sprocket")
     is_driven = fixed_body == "sprocket"
+    write, append_frame, watch_plane = VIEWS[tilts]
 
     @wp.func
     def sample(
@@ -61,9 +65,7 @@ def sampling(fixed_body: str, tilts: bool = False):
     ):
         frame_mark = state.next_frame[world]
         if frame_mark >= wp.int64(0) and time >= wp.float64(frame_mark) * control.frame_interval:
-            write_frame(record, K, chain, world, time)
-            if wp.static(tilts):
-                write_frame_plane(state.plane[world], record, world)
+            append_frame(K, chain, state, record, world, time)
             frames_passed = wp.int64(wp.floor(time / control.frame_interval))
             state.next_frame[world] = wp.max(frame_mark, frames_passed) + wp.int64(1)
         mark = state.next_sample[world]
@@ -71,18 +73,9 @@ def sampling(fixed_body: str, tilts: bool = False):
             return RUNNING
         last_time = state.last_sample[world, TIME]
         is_first = last_time < ZERO
-        summary = summarise(K, chain)
-        if wp.static(tilts):
-            P = state.plane[world]
-            flat = summary
-            summary = in_room(K, P, chain, flat)
-            write_tilting_sample(P, state, record, world, time, flat, summary)
-        else:
-            write_sample(state, record, world, time, summary)
+        summary = write(K, chain, state, record, world, time)
         if frame_mark < wp.int64(0) and mark % control.frame_every == wp.int64(0):
-            write_frame(record, K, chain, world, time)
-            if wp.static(tilts):
-                write_frame_plane(P, record, world)
+            append_frame(K, chain, state, record, world, time)
         passed = wp.int64(wp.floor(time / control.sample_interval))
         state.next_sample[world] = wp.max(mark, passed) + wp.int64(1)
         if wp.static(not is_driven):
@@ -90,8 +83,7 @@ def sampling(fixed_body: str, tilts: bool = False):
         if wp.static(has_floor):
             watch_stiffening(state, drive, control, world, time)
             watch_collapse(chain, state, control, world, time, summary.area, is_first)
-        if wp.static(tilts):
-            watch_fall(P, state, world, time)
+        watch_plane(state, world, time)
         if wp.static(has_floor):
             return watch_rest(state, drive, control, world, time, summary, last_floor_impulse)
         if wp.static(is_driven):

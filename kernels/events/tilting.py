@@ -2,8 +2,8 @@
 
 import warp as wp
 
-from warpchain.kernels.events.record import write_sample
-from warpchain.kernels.events.summary import Summary
+from warpchain.kernels.events.record import write_frame, write_sample
+from warpchain.kernels.events.summary import Summary, summarise
 from warpchain.kernels.layout import (
     AHEAD,
     CENTER_W,
@@ -99,16 +99,13 @@ def write_plane_columns(row: wp.array(dtype=wp.float64), P: wp.array(dtype=wp.fl
 
 
 @wp.func
-def write_tilting_sample(
-    P: wp.array(dtype=wp.float64),
-    state: State,
-    record: Record,
-    world: int,
-    time: wp.float64,
-    flat: Summary,
-    seen: Summary,
-):
-    """Writes a sample: the sums in the room (``seen``), and the plane."""
+def observe_in_room(
+    K: wp.array2d(dtype=wp.float64), chain: Chain, state: State, record: Record, world: int, time: wp.float64
+) -> Summary:
+    """Writes a sample of a chain whose ends are placed: its sums in the room, and the plane."""
+    P = state.plane[world]
+    flat = summarise(K, chain)
+    seen = in_room(K, P, chain, flat)
     if state.last_sample[world, TIME] < ZERO:
         write_plane_columns(state.first_sample[world], P, flat)
     write_plane_columns(state.last_sample[world], P, flat)
@@ -116,25 +113,35 @@ def write_tilting_sample(
         samples = record.samples[world]
         write_plane_columns(samples[record.sample_count[world]], P, flat)
     write_sample(state, record, world, time, seen)
+    return seen
 
 
 @wp.func
-def write_frame_plane(P: wp.array(dtype=wp.float64), record: Record, world: int):
-    """Writes the plane behind the joint positions of the frame that was appended last, if frames are kept."""
+def write_frame_in_room(
+    K: wp.array2d(dtype=wp.float64), chain: Chain, state: State, record: Record, world: int, time: wp.float64
+):
+    """Appends joint positions and behind them the plane, if frames are kept."""
+    row = record.frame_count[world]
+    write_frame(K, chain, state, record, world, time)
     if record.frames.shape[1] == 0:
         return
-    row = record.frame_count[world] - 1
     first = record.frames.shape[2] - PLANE_VALUES
     k = int(0)
     while k < PLANE_VALUES:
-        record.frames[world, row, first + k] = P[k]
+        record.frames[world, row, first + k] = state.plane[world, k]
         k += 1
 
 
 @wp.func
-def watch_fall(P: wp.array(dtype=wp.float64), state: State, world: int, time: wp.float64):
+def watch_fall(state: State, world: int, time: wp.float64):
     """Notes when the plane first tilts by 45°, and how far it tilts."""
-    lean = wp.abs(P[UP + 2])
+    lean = wp.abs(state.plane[world, UP + 2])
     state.watch[world, GREATEST_LEAN] = wp.max(state.watch[world, GREATEST_LEAN], lean)
     if state.watch[world, FELL_AT] < ZERO and lean > FALLEN:
         state.watch[world, FELL_AT] = time
+
+
+@wp.func
+def no_fall(_state: State, _world: int, _time: wp.float64):
+    """The watch of a plane that stays upright."""
+    return

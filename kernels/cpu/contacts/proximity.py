@@ -95,6 +95,18 @@ def placed_link(K: wp.array2d(dtype=wp.float64), i: int) -> Touching:
     return link
 
 
+@wp.func
+def endless_gap(_K: wp.array2d(dtype=wp.float64), _chain: Chain, _ground: Ground, _face: Face):
+    """The gap [m] to no body."""
+    return wp.float64(wp.inf)
+
+
+@wp.func
+def no_impulses(_K: wp.array2d(dtype=wp.float64), _chain: Chain, _ground: Ground, _face: Face):
+    """The number of impulses of no body."""
+    return wp.int64(0)
+
+
 @functools.cache
 def fixed_contacts(fixed_body: str):
     """Warp functions of all links and a body: (least gap, resolve).
@@ -103,6 +115,8 @@ def fixed_contacts(fixed_body: str):
     ``resolve(K, chain, ground, face)``: applies the impulses, after the gaps, and returns their number. Few links touch
     at a time: only vectors with a link that overlaps the body go through the impulse law.
     """
+    if fixed_body == "none":
+        return endless_gap, no_impulses
     gap_of, meet = link_and_body(fixed_body)
     in_cells = BODIES[fixed_body].in_cells
 

@@ -17,7 +17,7 @@ from warpchain.kernels.cpu.tilting import greatest_tilting_speed
 from warpchain.kernels.features import Features
 from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, OMEGA, RIGHT_X, RIGHT_Y, SINE, U, V
 from warpchain.kernels.physics.elementary import HALF, ONE, TWO, ZERO, order_bits
-from warpchain.kernels.types import Chain, Control
+from warpchain.kernels.types import Chain, Control, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -95,7 +95,7 @@ def fastest_meeting(columns: int):
 def step_bound(features: Features, has_flight: bool):
     """Warp function: longest step [s] from a placed state that cannot miss a contact; ∞ if there are none.
 
-    ``bound(K, L, chain, face, control, is_rigid, gap, slack, longest)``; ``longest`` [s] bounds steps near a contact.
+    ``bound(K, L, chain, face, control, state, world, longest)``; ``longest`` [s] bounds steps near a contact.
     """
     has_fixed = features.fixed_body != "none"
     has_self = features.self_contact
@@ -113,15 +113,16 @@ def step_bound(features: Features, has_flight: bool):
         chain: Chain,
         face: Face,
         control: Control,
-        is_rigid: bool,
-        gap: wp.float64,
-        slack: wp.float64,
+        state: State,
+        world: int,
         longest: wp.float64,
     ):
         if wp.static(not (has_fixed or has_self)):
             return wp.float64(wp.inf)
+        gap = state.gap[world]
+        slack = state.slack[world]
         if wp.static(has_flight):
-            if is_rigid:
+            if state.is_rigid[world] != 0:
                 approach = ZERO
                 if wp.static(has_fixed_approach):
                     approach = approaching(K, chain, face)

@@ -1,0 +1,134 @@
+"""The contact pass after an accepted step: first with floor or sprocket, then of the chain with itself."""
+
+import functools
+
+import warp as wp
+
+from warpchain.kernels import layout
+from warpchain.kernels.codes import LIST_OVERFLOW
+from warpchain.kernels.contacts.fixed_body import BODIES
+from warpchain.kernels.contacts.list_layout import list_layout
+from warpchain.kernels.contacts.terrain import Face
+from warpchain.kernels.cpu.contacts.neighbour_list import list_slack, neighbour_list
+from warpchain.kernels.cpu.contacts.proximity import fixed_contacts
+from warpchain.kernels.cpu.contacts.self_contacts import self_contacts
+from warpchain.kernels.cpu.joints import Joints
+from warpchain.kernels.cpu.upright import Plane
+from warpchain.kernels.events.tallies import add_count, book_loss, count_bounce, of_fixed_body, raise_extreme
+from warpchain.kernels.features import Features
+from warpchain.kernels.physics.elementary import ZERO
+from warpchain.kernels.types import Chain, Control, Drive, Ground, State
+
+wp.set_module_options({"enable_backward": False})
+
+
+@functools.cache
+def body_pass(features: Features, plane: Plane):
+    """Warp function of the contacts with the floor or sprocket, and with a sprocket that moves above a floor.
+
+    ``meet_bodies(K, P, chain, felt, ground, still, drive, state, world)`` → number of impulses. ``felt``: the chain on
+    the plane that it felt in the step; ``still``: the face but for its motion.
+    """
+    gap_of, meet = plane.gap, plane.meet
+    face_at = BODIES[features.fixed_body].motion
+    _, depth, count = of_fixed_body(features.fixed_body)
+    has_floor = features.has_floor
+    moves = features.moving_sprocket
+    if moves:
+        sprocket_gap, resolve_sprocket = fixed_contacts("moving sprocket")
+        sprocket_at = BODIES["moving sprocket"].motion
+
+    @wp.func
+    def meet_bodies(
+        K: wp.array2d(dtype=wp.float64),
+        P: wp.array(dtype=wp.float64),
+        chain: Chain,
+        felt: Chain,
+        ground: Ground,
+        still: Face,
+        drive: Drive,
+        state: State,
+        world: int,
+    ):
+        time = state.time[world]
+        impulses = wp.int64(0)
+        gap = gap_of(K, felt, ground, still)
+        if gap < ZERO:
+            raise_extreme(state, world, depth, -gap)
+            impulses = meet(K, P, chain, ground, face_at(still, drive, world, time))
+            add_count(state, world, count, impulses)
+            if wp.static(has_floor):
+                if impulses > wp.int64(0):
+                    count_bounce(state, world, time, state.watch[world, layout.LAST_FLOOR_IMPULSE])
+                    state.watch[world, layout.LAST_FLOOR_IMPULSE] = time
+        if wp.static(moves):
+            moved = sprocket_at(Face(), drive, world, time)
+            overlap = -sprocket_gap(K, chain, ground, moved)
+            if overlap > ZERO:
+                raise_extreme(state, world, layout.SPROCKET_DEPTH, overlap)
+                on_sprocket = resolve_sprocket(K, chain, ground, moved)
+                add_count(state, world, layout.SPROCKET_IMPULSES, on_sprocket)
+                impulses += on_sprocket
+            gap = wp.min(gap, ZERO)  # the sprocket may come nearer by itself: steps stay short
+        state.gap[world] = gap
+        return impulses
+
+    return meet_bodies
+
+
+@functools.cache
+def link_pass(features: Features, joints: Joints):
+    """Warp functions of the contacts of a chain with itself; ``opening``: greatest |C| [m] of the placed links.
+
+    ``make_list(K, L, chain, state, world, skin, opening)`` makes the neighbour list, or ends the run if it overflows.
+    ``meet_links(K, L, chain, state, control, world, opening)`` → number of impulses.
+    """
+    has_self = features.self_contact
+    build_list = neighbour_list(features.columns)
+    resolve = self_contacts(features.columns)
+    count = list_layout(features.columns).count
+    margins = joints.margins
+
+    @wp.func
+    def make_list(
+        K: wp.array2d(dtype=wp.float64),
+        L: wp.array(dtype=wp.int32),
+        chain: Chain,
+        state: State,
+        world: int,
+        skin: wp.float64,
+        opening: wp.float64,
+    ):
+        if wp.static(has_self):
+            if not build_list(K, L, chain, skin, opening):
+                state.status[world] = LIST_OVERFLOW
+            state.slack[world] = list_slack(K, chain, skin, opening)
+
+    @wp.func
+    def meet_links(
+        K: wp.array2d(dtype=wp.float64),
+        L: wp.array(dtype=wp.int32),
+        chain: Chain,
+        state: State,
+        control: Control,
+        world: int,
+        opening: wp.float64,
+    ):
+        impulses = wp.int64(0)
+        if wp.static(has_self):
+            skin, least_slack = margins(state, control, world)
+            if state.slack[world] > ZERO:
+                state.slack[world] = list_slack(K, chain, skin, opening)
+            if not state.slack[world] > least_slack:
+                add_count(state, world, layout.LIST_BUILDS, wp.int64(1))
+                make_list(K, L, chain, state, world, skin, opening)
+            if L[wp.static(count)] > 0:
+                hits, strands, lost, depth = resolve(K, L, chain, opening)
+                add_count(state, world, layout.SELF_IMPULSES, hits)
+                add_count(state, world, layout.STRAND_IMPULSES, strands)
+                raise_extreme(state, world, layout.SELF_DEPTH, depth)
+                book_loss(state, world, layout.LOSS_SELF, lost)
+                impulses = hits
+        return impulses
+
+    return make_list, meet_links

@@ -1,0 +1,94 @@
+"""What the joints of a chain do in a step of the CPU loop: springs, or springs that become rigid in flight."""
+
+import functools
+from dataclasses import dataclass
+from typing import Any
+
+import warp as wp
+
+from warpchain.kernels.cpu.explicit import explicit_method
+from warpchain.kernels.methods.controller import step_controller
+from warpchain.kernels.methods.method import find_method
+from warpchain.kernels.physics.elementary import ZERO
+from warpchain.kernels.types import Chain, Control, State
+
+wp.set_module_options({"enable_backward": False})
+
+
+@dataclass(frozen=True)
+class Joints:
+    """Warp functions of the joints, in the order in which a step calls them.
+
+    Attributes:
+        settle: ``(K, chain, state, world)`` before a step.
+        first_stage: ``(K, chain, state, world)`` evaluates the first stage of a step on springs, if it is not known.
+        attempt: ``(K, chain, state, control, world, h, tolerance)`` → error ratio as ordered bits.
+        shrinkage: ``(state, world, error)`` → factor of the step after rejection, see :mod:`methods.controller`.
+        accept: ``(K, chain, state, control, world, h, error)`` accepts the state that the last attempt found → factor
+            of the step, whether the joints may stay as they are.
+        margins: ``(state, control, world)`` → skin of the neighbour list [m], least slack with which it is kept [m].
+        react: ``(K, chain, state, world)`` after a step with impulses, or in which the joints may not stay.
+    """
+
+    settle: Any
+    first_stage: Any
+    attempt: Any
+    shrinkage: Any
+    accept: Any
+    margins: Any
+    react: Any
+
+
+@functools.cache
+def springs(name: str, tilts: bool) -> Joints:
+    """A method's steps on springs, for chains whose plane tilts or does not."""
+    method = find_method(name)
+    evaluate, attempt_step, commit = explicit_method(method.tableau, tilts)
+    growth, shrink = step_controller(method.order, method.error_order)
+    reuses_last = method.reuses_last
+
+    @wp.func
+    def nothing(_K: wp.array2d(dtype=wp.float64), _chain: Chain, _state: State, _world: int):
+        return
+
+    @wp.func
+    def first_stage(K: wp.array2d(dtype=wp.float64), chain: Chain, state: State, world: int):
+        if state.has_first_stage[world] == 0:
+            evaluate(K, chain)
+            state.has_first_stage[world] = 1
+
+    @wp.func
+    def attempt(
+        K: wp.array2d(dtype=wp.float64),
+        chain: Chain,
+        _state: State,
+        _control: Control,
+        _world: int,
+        h: wp.float64,
+        tolerance: wp.float64,
+    ):
+        return attempt_step(K, chain, h, tolerance)
+
+    @wp.func
+    def shrinkage(_state: State, _world: int, error: wp.float64):
+        return shrink(error)
+
+    @wp.func
+    def accept(
+        K: wp.array2d(dtype=wp.float64),
+        chain: Chain,
+        state: State,
+        control: Control,
+        world: int,
+        h: wp.float64,
+        error: wp.float64,
+    ):
+        commit(K, chain, h)
+        state.has_first_stage[world] = wp.static(int(reuses_last))
+        return growth(error, state.last_error[world], control.proportional), bool(True)
+
+    @wp.func
+    def margins(_state: State, control: Control, _world: int):
+        return control.skin, ZERO
+
+    return Joints(nothing, first_stage, attempt, shrinkage, accept, margins, nothing)
