@@ -3,8 +3,8 @@
 import warp as wp
 
 from warpchain.kernels import layout
-from warpchain.kernels.gpu.stage import Link, Place, read_link
-from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, MASS, RIGHT_X, RIGHT_Y, SINE, THETA, X
+from warpchain.kernels.gpu.stage import Attempt, Link, Place, constants, read_link
+from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, MASS, OMEGA, RIGHT_X, RIGHT_Y, SINE, THETA, U, V, X, Y
 from warpchain.kernels.physics.elementary import ZERO, cos_sin
 from warpchain.kernels.physics.geometry import end_positions
 from warpchain.kernels.types import Chain, State
@@ -46,6 +46,24 @@ def store_link(K: wp.array2d(dtype=wp.float64), state: State, world: int, lane: 
     """Stores the state of a thread's link."""
     for k in range(6):
         state.links[world, X + k, lane] = K[X + k, lane]
+
+
+@wp.func
+def write_attempt(K: wp.array2d(dtype=wp.float64), place: Place, result: Attempt, h: wp.float64):
+    """Writes a link's new state and the losses of its joint on the board."""
+    lane = place.lane
+    if lane < place.links:
+        K[layout.BOARD_LOST_FRICTION, lane] = K[layout.BOARD_LOST_FRICTION, lane] + h * result.friction
+        dissipation = constants(K).joint_damping * result.damping
+        K[layout.BOARD_LOST_DAMPING, lane] = K[layout.BOARD_LOST_DAMPING, lane] + h * dissipation
+        K[X, lane] = result.x
+        K[Y, lane] = result.y
+        K[THETA, lane] = result.theta
+        K[U, lane] = result.u
+        K[V, lane] = result.v
+        K[OMEGA, lane] = result.omega
+        K[COSINE, lane] = result.cosine
+        K[SINE, lane] = result.sine
 
 
 @wp.func

@@ -13,50 +13,34 @@ import functools
 import warp as wp
 
 from warpchain.kernels import layout
-from warpchain.kernels.codes import LIST_OVERFLOW, NOT_FINITE, RUNNING, STEP_LIMIT, STEP_TOO_SMALL
+from warpchain.kernels.codes import NOT_FINITE, RUNNING, STEP_LIMIT, STEP_TOO_SMALL
 from warpchain.kernels.contacts.list_layout import list_layout
-from warpchain.kernels.events.present_chain import has_changed, present_chain
-from warpchain.kernels.events.record import lacks_last_sample, record_is_full, write_sample
-from warpchain.kernels.events.summary import summarise
-from warpchain.kernels.events.tallies import add_count, attempts_made, count_bounce, of_fixed_body, raise_extreme
-from warpchain.kernels.events.tilting import in_room, write_tilting_sample
+from warpchain.kernels.events.record import record_is_full
+from warpchain.kernels.events.tallies import attempts_made
 from warpchain.kernels.features import COMPILER_FLAGS, Features
-from warpchain.kernels.gpu.board import (
-    link_is_finite,
-    load_extremes,
-    load_link,
-    place_of,
-    publish,
-    raise_value,
-    store_extremes,
-    store_link,
-    store_losses,
-)
-from warpchain.kernels.gpu.contacts.neighbour_list import block_list
-from warpchain.kernels.gpu.contacts.proximity import block_proximity, moving_sprocket_contact, upper_bound
-from warpchain.kernels.gpu.contacts.self_contacts import block_self_contacts, touch_layout
+from warpchain.kernels.gpu.board import link_is_finite, place_of, raise_value, write_attempt
+from warpchain.kernels.gpu.contacts.contact_pass import block_contact_pass
+from warpchain.kernels.gpu.contacts.proximity import block_proximity
+from warpchain.kernels.gpu.contacts.self_contacts import touch_layout
 from warpchain.kernels.gpu.explicit import explicit_attempt
 from warpchain.kernels.gpu.functions import board_size, shares_board
-from warpchain.kernels.gpu.sample import block_sample, write_marks, write_step_bounds
+from warpchain.kernels.gpu.run import block_run, block_sample
 from warpchain.kernels.gpu.stage import (
+    Attempt,
     Place,
     block_stage,
-    constants,
     error_of,
     read_link,
     vec3d,
     vec5d,
-    write_constants,
     write_first_stage,
 )
-from warpchain.kernels.gpu.threads import barrier, barrier_if_any, block_maxima, clock, tile_address, vec4i
-from warpchain.kernels.gpu.tilting import block_tilting, copy_plane, write_felt_plane
+from warpchain.kernels.gpu.threads import barrier, block_maxima, tile_address, vec4i
+from warpchain.kernels.gpu.tilting import block_tilting
+from warpchain.kernels.gpu.upright import block_upright
 from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step, step_controller
 from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
 from warpchain.kernels.methods.method import find_method
-from warpchain.kernels.physics.elementary import ZERO
-from warpchain.kernels.physics.plane import end_plane_step
-from warpchain.kernels.physics.scaled_loads import write_link
 from warpchain.kernels.types import Control, Drive, Ground, Model, Record, State, read_ground
 
 wp.set_module_options({"enable_backward": False})
@@ -81,14 +65,9 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         registers = min(registers or available, available)
     method = find_method(features.method)
     columns = features.columns
-    lists = list_layout(columns)
-    has_floor = features.has_floor
-    has_fixed = features.fixed_body != "none"
-    has_self = features.self_contact
     tilts = features.tilts
-    has_contacts = has_fixed or has_self
-    meet_sprocket = moving_sprocket_contact()
-    fixed_loss, fixed_depth, fixed_count = of_fixed_body(features.fixed_body)
+    lists_size = list_layout(columns).size
+    has_contacts = features.fixed_body != "none" or features.self_contact
     reuses_last = method.reuses_last
     needs_first_power = TABLEAUS[method.tableau].velocity_weights[0] != 0.0
     is_shared = shares_board(block_dim)
@@ -105,16 +84,15 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     exchange_ends, stage = block_stage(block_dim, tilts)
     greatest, _write, _read = block_maxima(block_dim)
     maxima_address = tile_address(vec4i, block_dim)
-    write_proximity, read_proximity, time_to_contact, meet_fixed_body = block_proximity(features, block_dim)
+    proximity_functions = block_proximity(features, block_dim)
+    write_proximity, read_proximity = proximity_functions[:2]
     attempt = explicit_attempt(method.tableau, block_dim, write_proximity, read_proximity, tilts)
-    begin_step, sum_up, meet_tilting_floor = block_tilting(block_dim)
+    plane = block_tilting(block_dim) if tilts else block_upright(features.fixed_body)
+    begin_step, end_step, after_first_stage = plane.begin_step, plane.end_step, plane.after_first_stage
     growth, shrinkage = step_controller(method.order, method.error_order, wp.float32)
-    build_list = block_list(columns, block_dim)
-    clear_contacts, find_contacts, resolve_contacts = block_self_contacts(columns, block_dim, touch)
-    chain_values = layout.BOARD_VALUES
-    is_driven = features.is_driven
-    present = present_chain(is_driven)
-    take_sample = block_sample(features, touch)
+    begin_contacts, meet = block_contact_pass(features, block_dim, touch, plane)
+    load_run, store_run = block_run(features, touch, kept_width, plane)
+    take_sample = block_sample(features, touch, plane)
 
     @wp.func
     def evaluate_first_stage(
@@ -132,6 +110,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             K[layout.INVERSE_INERTIA, column],
         )
         write_first_stage(K, place.lane, first, wp.static(needs_first_power))
+        after_first_stage()
 
     @wp.func
     def measure_proximity(
@@ -147,6 +126,39 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         write_proximity(K, maxima, place, ground, link, next_end)
         barrier()
         return next_end, read_proximity(maxima)
+
+    @wp.func
+    def greatest_error(
+        errors: wp.tile[wp.int32, block_dim], K: wp.array2d(dtype=wp.float64), place: Place, result: Attempt
+    ):
+        """Greatest error ratio of all links."""
+        own = int(0)
+        if place.lane < place.links:
+            own = error_of(result, K[wp.static(layout.BOARD_VALUES), layout.VALUE_TOLERANCE])
+        return wp.cast(greatest(errors, place.lane, own), wp.float32)
+
+    @wp.func
+    def reject(
+        errors: wp.tile[wp.int32, block_dim],
+        K: wp.array2d(dtype=wp.float64),
+        control: Control,
+        place: Place,
+        h: wp.float64,
+        error: wp.float32,
+    ):
+        """A shorter step [s] after a rejection, and the status."""
+        status = int(RUNNING)
+        step = h * LEAST_SHRINKAGE
+        if wp.isfinite(error):
+            step = h * wp.float64(shrinkage(error))
+        else:
+            broken = wp.where(place.lane >= place.links or link_is_finite(K, place.lane), 0, 1)
+            barrier()  # all have read the errors
+            if greatest(errors, place.lane, broken) > 0:
+                status = int(NOT_FINITE)
+        if status == RUNNING and step < control.smallest_step:
+            status = int(STEP_TOO_SMALL)
+        return step, status
 
     @wp.kernel(
         name="advance",
@@ -176,11 +188,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         touches = wp.tile_empty(shape=(wp.static(touch_size),), dtype=wp.int32, storage="shared")
         if state.status[world] != RUNNING:
             return
-        kept = wp.array(
-            ptr=scratch[world].ptr, shape=(wp.static(layout.BOARD_VALUES), wp.static(kept_width)), dtype=wp.float64
-        )
         list_row = lists_of_worlds[world]
-        L = wp.array(ptr=list_row.ptr, shape=(wp.static(lists.size),), dtype=wp.int32)
+        L = wp.array(ptr=list_row.ptr, shape=(wp.static(lists_size),), dtype=wp.int32)
         board_start = board_address(board)
         touch_start = touch_address(touches)
         if wp.static(not is_shared):
@@ -189,69 +198,21 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         K = wp.array(ptr=board_start, shape=(wp.static(layout.BOARD_ROWS), wp.static(width)), dtype=wp.float64)
         T = wp.array(ptr=touch_start, shape=(wp.static(touch.size),), dtype=wp.int32)
         # contacts use the memory in which stages exchange ends and forces
-        ends_start = ends_address(ends)
-        forces_start = forces_address(forces)
-        E = wp.array(ptr=ends_start, shape=(5, wp.static(block_dim)), dtype=wp.float64)
-        F = wp.array(ptr=forces_start, shape=(3, wp.static(block_dim)), dtype=wp.float64)
-        maxima_start = maxima_address(maxima)
+        E = wp.array(ptr=ends_address(ends), shape=(5, wp.static(block_dim)), dtype=wp.float64)
+        F = wp.array(ptr=forces_address(forces), shape=(3, wp.static(block_dim)), dtype=wp.float64)
         # so do the sums for a plane that tilts
-        M = wp.array(ptr=ends_start, shape=(wp.static(5 * block_dim),), dtype=wp.float64)
+        M = wp.array(ptr=ends_address(ends), shape=(wp.static(5 * block_dim),), dtype=wp.float64)
         P = state.plane[world]
         if wp.static(tilts and is_shared):
             P = wp.array(ptr=board_start + wp.static(plane_offset), shape=(layout.PLANE_ROWS,), dtype=wp.float64)
+        maxima_start = maxima_address(maxima)
 
-        chain = model.chains[world]
-        n = chain.link_count
-        place = place_of(chain, lane)
+        place = place_of(model.chains[world], lane)
         ground = read_ground(model, world)
-        load_link(K, state, world, lane, n)
-        is_fresh = state.is_fresh[world] != 0
-        if lane < n:
-            write_link(K, model, world, lane, state.load_factor[world])
-            row = int(layout.BOARD_LOST_SELF)
-            while row < wp.static(layout.BOARD_VALUES):
-                K[row, lane] = wp.where(is_fresh, ZERO, kept[row, lane])
-                row += 1
-        if lane == 0:
-            write_constants(K, present(model, state, control, world))
-            if wp.static(tilts):
-                copy_plane(P, state.plane[world])
-                write_felt_plane(K, P)
-            write_step_bounds(K, drive, state, control, world, wp.static(is_driven))
-            load_extremes(K, state, world, fixed_depth)
-            write_marks(K, state, control, world)
-            T[wp.static(touch.fixed_hits)] = 0
-            T[wp.static(touch.self_hits)] = 0
-            T[wp.static(touch.strand_hits)] = 0
-            T[wp.static(touch.deepest)] = 0
-            T[wp.static(touch.is_late)] = 0
-            T[wp.static(touch.votes)] = 0
-            K[chain_values, layout.VALUE_DEADLINE] = clock() + control.launch_time
-        barrier()  # the chain's constants are on the board
-        publish(K, place)
-        barrier()
+        load_run(K, T, P, model, drive, state, scratch, control, place, world)
         next_end, proximity = measure_proximity(ends, K, maxima_start, place, ground)
-        opening = proximity.opening
-        status = int(RUNNING)
-        pairs = int(0)
-        slack = wp.float32(0.5) * wp.float32(control.skin) - opening
-        if is_fresh:
-            if wp.static(has_self):
-                pairs = build_list(K, L, chain, lane, control.skin, upper_bound(opening))
-                if pairs > wp.static(lists.capacity):
-                    status = int(LIST_OVERFLOW)
-            if wp.static(tilts):
-                if lane == 0:
-                    P[layout.SUM_MASS] = chain.mass
-                barrier()  # all have read the ends
-                sum_up(K, P, M, place)
-        reach = time_to_contact(control, pairs, proximity.gap, slack, proximity.speed)
-        if not is_fresh:
-            # Kept from the last launch, since recomputing could round differently.
-            reach = wp.float32(state.time_to_contact[world])
-            if wp.static(has_self):
-                pairs = L[wp.static(lists.count)]
-        if is_fresh or state.has_first_stage[world] == 0:
+        pairs, reach, status = begin_contacts(K, L, P, M, state, control, place, world, proximity)
+        if state.is_fresh[world] != 0 or state.has_first_stage[world] == 0:
             evaluate_first_stage(forces, K, place, next_end)
         time = state.time[world]
         step = state.step[world]
@@ -264,73 +225,36 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         accepted = int(0)
         barrier()
         while status == RUNNING and attempts < attempts_left:
-            if time >= K[chain_values, layout.VALUE_NEXT_SAMPLE]:
-                softness = state.softness[world]
-                load_factor = state.load_factor[world]
-                publish(K, place)
-                barrier()
-                if lane == 0:
-                    if wp.static(tilts):
-                        copy_plane(state.plane[world], P)
-                    take_sample(K, T, model, drive, state, record, control, world, time)
-                barrier()
-                status = T[wp.static(touch.mailbox)]
-                pauses = record_is_full(record, world) or T[wp.static(touch.is_late)] != 0
-                barrier()
-                if has_changed(state, world, softness, load_factor):
-                    if wp.static(is_driven) and lane < n:
-                        write_link(K, model, world, lane, state.load_factor[world])
+            if time >= K[wp.static(layout.BOARD_VALUES), layout.VALUE_NEXT_SAMPLE]:
+                changed, pauses, sampled = take_sample(
+                    K, T, P, model, drive, state, record, control, place, world, time
+                )
+                status = sampled
+                if changed:
                     next_end = exchange_ends(ends, place, read_link(K, lane))
                     evaluate_first_stage(forces, K, place, next_end)
                 if pauses or status != RUNNING:
                     break
-            stop_time = K[chain_values, layout.VALUE_STOP_TIME]
+            stop_time = K[wp.static(layout.BOARD_VALUES), layout.VALUE_STOP_TIME]
             if time >= stop_time:
                 status = state.stop_status[world]
                 break
 
             h = step
             if wp.static(has_contacts):
-                h = wp.min(h, wp.max(K[chain_values, layout.VALUE_CONTACT_STEP], wp.float64(reach)))
+                h = wp.min(h, wp.max(K[wp.static(layout.BOARD_VALUES), layout.VALUE_CONTACT_STEP], wp.float64(reach)))
             reaches_stop = time + h >= stop_time
             if reaches_stop:
                 h = stop_time - time
-
-            if wp.static(tilts):
-                begin_step(K, P, place, h)
-            tolerance = K[chain_values, layout.VALUE_TOLERANCE]
+            begin_step(K, P, place, h)
             result = attempt(ends, forces, maxima_start, K, place, ground, h)
-            own_error = int(0)
-            if lane < n:
-                own_error = error_of(result, tolerance)
-            error = wp.cast(greatest(errors, lane, own_error), wp.float32)
+            error = greatest_error(errors, K, place, result)
             attempts += 1
-            if not (error <= wp.float32(1.0)):
-                if wp.isfinite(error):
-                    step = h * wp.float64(shrinkage(error))
-                else:
-                    step = h * LEAST_SHRINKAGE
-                    broken = wp.where(lane >= n or link_is_finite(K, lane), 0, 1)
-                    barrier()  # all have read the errors
-                    if greatest(errors, lane, broken) > 0:
-                        status = int(NOT_FINITE)
-                if status == RUNNING and step < control.smallest_step:
-                    status = int(STEP_TOO_SMALL)
-            else:
+            if error <= wp.float32(1.0):
                 accepted += 1
-                if lane < n:
-                    K[layout.BOARD_LOST_FRICTION, lane] = K[layout.BOARD_LOST_FRICTION, lane] + h * result.friction
-                    dissipation = constants(K).joint_damping * result.damping
-                    K[layout.BOARD_LOST_DAMPING, lane] = K[layout.BOARD_LOST_DAMPING, lane] + h * dissipation
-                    K[layout.X, lane] = result.x
-                    K[layout.Y, lane] = result.y
-                    K[layout.THETA, lane] = result.theta
-                    K[layout.U, lane] = result.u
-                    K[layout.V, lane] = result.v
-                    K[layout.OMEGA, lane] = result.omega
-                    K[layout.COSINE, lane] = result.cosine
-                    K[layout.SINE, lane] = result.sine
-                    if wp.static(reuses_last):
+                write_attempt(K, place, result, h)
+                if wp.static(reuses_last):
+                    if lane < place.links:
                         write_first_stage(K, lane, result.last, wp.static(needs_first_power))
                 time = wp.where(reaches_stop, stop_time, time + h)
                 step = next_step(step, h, wp.float64(growth(error, last_error, control.proportional)))
@@ -338,107 +262,27 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 proximity = result.proximity
                 if wp.static(not reuses_last):
                     next_end, proximity = measure_proximity(ends, K, maxima_start, place, ground)
-                opening = proximity.opening
-                gap = proximity.gap
                 if lane == 0:
-                    raise_value(K, layout.VALUE_OPENING, opening)
-                if wp.static(tilts):
-                    sum_up(K, P, M, place)
-                    if lane == 0:
-                        end_plane_step(P, constants(K).gravity, h)
-                is_hit = bool(False)
-                is_near = bool(False)
-                is_stale = bool(False)
-                hits = int(0)
-                if wp.static(has_fixed):
-                    if gap < wp.float32(0.0):
-                        is_near = bool(True)
-                        if wp.static(tilts):
-                            hits = meet_tilting_floor(K, P, M, constants(K), place)
-                        elif lane < n:
-                            hits = meet_fixed_body(K, place, ground, constants(K), drive, world, time)
-                        if hits > 0:
-                            wp.atomic_add(T, wp.static(touch.fixed_hits), hits)
-                if wp.static(features.moving_sprocket):
-                    is_near = bool(True)
-                    if lane < n:
-                        hits += meet_sprocket(K, place, ground, constants(K), drive, state, world, time)
-                if wp.static(has_self):
-                    slack = wp.float32(0.5) * wp.float32(control.skin) - opening - proximity.displacement
-                    is_stale = not slack > wp.float32(0.0)
-                    if is_stale or pairs > 0:
-                        is_near = bool(True)
-                        publish(K, place)
-                        clear_contacts(T, lane, n)
-                if is_near:
-                    is_hit = barrier_if_any(T, wp.static(touch.votes), hits > 0)
-                if wp.static(has_fixed):
-                    if gap < wp.float32(0.0) and lane == 0:
-                        raise_value(K, layout.VALUE_FIXED_DEPTH, -gap)
-                        if wp.static(has_floor):
-                            if is_hit:
-                                count_bounce(state, world, time, K[chain_values, layout.VALUE_LAST_IMPULSE])
-                                K[chain_values, layout.VALUE_LAST_IMPULSE] = time
-                if wp.static(has_self):
-                    if is_stale:
-                        if lane == 0:
-                            add_count(state, world, layout.LIST_BUILDS, wp.int64(1))
-                        pairs = build_list(K, L, constants(K), lane, control.skin, upper_bound(opening))
-                        if pairs > wp.static(lists.capacity):
-                            status = int(LIST_OVERFLOW)
-                            pairs = int(wp.static(lists.capacity))
-                        slack = wp.float32(0.5) * wp.float32(control.skin) - opening
-                    if pairs > 0:
-                        touched = constants(K)
-                        touching = find_contacts(K, L, T, touched, lane, pairs, upper_bound(opening))
-                        if touching > 0:
-                            hits = resolve_contacts(K, L, T, E, F, touched, lane, touching)
-                            if hits > 0:
-                                wp.atomic_add(T, wp.static(touch.self_hits), hits)
-                            if not is_hit:
-                                is_hit = barrier_if_any(T, wp.static(touch.votes), hits > 0)
-                reach = time_to_contact(control, pairs, gap, slack, proximity.speed)
+                    raise_value(K, layout.VALUE_OPENING, proximity.opening)
+                end_step(K, P, M, place, h)
+                is_hit, listed, bound, met = meet(
+                    K, L, T, E, F, P, M, drive, state, control, place, ground, world, time, proximity, pairs
+                )
+                pairs = listed
+                reach = bound
+                status = met
                 if is_hit or wp.static(not reuses_last):
                     if is_hit:
                         next_end = exchange_ends(ends, place, read_link(K, lane))
                     evaluate_first_stage(forces, K, place, next_end)
-                    if wp.static(tilts):
-                        barrier()  # all have read the plane that they feel
+            else:
+                shorter, state_after = reject(errors, K, control, place, h, error)
+                step = shorter
+                status = state_after
         if status == RUNNING and attempts_made(state, world) + wp.int64(attempts) >= control.step_limit:
             status = int(STEP_LIMIT)
-        is_last = lacks_last_sample(state, world, time, status)
-        publish(K, place)
-        barrier()
-        if lane < n:
-            store_link(K, state, world, lane)
-            left = wp.array(
-                ptr=scratch[world].ptr, shape=(wp.static(layout.BOARD_VALUES), wp.static(kept_width)), dtype=wp.float64
-            )
-            row = int(layout.BOARD_LOST_SELF)
-            while row < wp.static(layout.BOARD_VALUES):
-                left[row, lane] = K[row, lane]
-                row += 1
+        store_run(K, T, P, model, state, record, scratch, control, place, world, time, status, accepted, attempts)
         if lane == 0:
-            if is_last:
-                last = present(model, state, control, world)
-                flat = summarise(K, last)
-                if wp.static(tilts):
-                    write_tilting_sample(P, state, record, world, time, flat, in_room(K, P, last, flat))
-                else:
-                    write_sample(state, record, world, time, flat)
-            if wp.static(tilts):
-                copy_plane(state.plane[world], P)
-            store_losses(K, state, world, n, wp.static(fixed_loss))
-            add_count(state, world, layout.ACCEPTED, wp.int64(accepted))
-            add_count(state, world, layout.REJECTED, wp.int64(attempts - accepted))
-            add_count(state, world, fixed_count, wp.int64(T[wp.static(touch.fixed_hits)]))
-            add_count(state, world, layout.SELF_IMPULSES, wp.int64(T[wp.static(touch.self_hits)]))
-            add_count(state, world, layout.STRAND_IMPULSES, wp.int64(T[wp.static(touch.strand_hits)]))
-            store_extremes(K, state, world, fixed_depth)
-            deepest = wp.cast(T[wp.static(touch.deepest)], wp.float32)
-            raise_extreme(state, world, layout.SELF_DEPTH, wp.float64(deepest))
-            state.is_fresh[world] = 0
-            state.has_first_stage[world] = 1
             state.time_to_contact[world] = wp.float64(reach)
             state.time[world] = time
             state.step[world] = step

@@ -20,6 +20,7 @@ from warpchain.kernels.contacts.tilting_floor import (
 from warpchain.kernels.gpu.board import ends_of
 from warpchain.kernels.gpu.stage import Place, constants, felt_plane, read_link
 from warpchain.kernels.gpu.threads import barrier, warp_width
+from warpchain.kernels.gpu.upright import BlockPlane
 from warpchain.kernels.layout import (
     BOARD_FIRST,
     BOARD_VALUES,
@@ -48,13 +49,14 @@ from warpchain.kernels.layout import (
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.physics.plane import (
     begin_plane_step,
+    end_plane_step,
     invert_plane_mass,
     motion_terms,
     on_plane,
     place_terms,
     plane_load,
 )
-from warpchain.kernels.types import Chain
+from warpchain.kernels.types import Chain, Drive, Ground, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -218,20 +220,25 @@ def add_motion_one_by_one(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.
 
 
 @functools.cache
-def block_tilting(block_dim: int):
-    """Warp functions of a plane for blocks of this size: (begin a step, sum up, meet the floor).
-
-    Returns:
-        ``begin(K, P, place, h)`` moves the plane to the middle of a step, and the first stage with it;
-        ``sum_up(K, P, M, place)`` writes the sums over the links and the inverse of the mass matrix into P;
-        ``meet(K, P, M, chain, place)`` applies the impulses between rollers and floor → number of those of this thread.
-        P: the plane, in memory that all threads share, which the first one changes. M: the same for sums, which nobody
-        else uses meanwhile. Each passes barriers, and there must be one before M is used otherwise.
-    """
+def block_tilting(block_dim: int) -> BlockPlane:
+    """A plane that may tilt, above a flat floor, for blocks of this size."""
     count_slot, sum_slot = 0, 1
 
     @wp.func
-    def begin(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), place: Place, h: wp.float64):
+    def load(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), state: State, world: int):
+        copy_plane(P, state.plane[world])
+        write_felt_plane(K, P)
+
+    @wp.func
+    def store(P: wp.array(dtype=wp.float64), state: State, world: int):
+        copy_plane(state.plane[world], P)
+
+    @wp.func
+    def after_first_stage():
+        barrier()  # all have read the plane that they feel
+
+    @wp.func
+    def begin_step(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), place: Place, h: wp.float64):
         if place.lane == 0:
             begin_plane_step(P, constants(K).gravity, h)
             write_felt_plane(K, P)
@@ -267,12 +274,37 @@ def block_tilting(block_dim: int):
             invert_plane_mass(P)
 
     @wp.func
+    def begin_run(
+        K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), M: wp.array(dtype=wp.float64), place: Place
+    ):
+        if place.lane == 0:
+            P[layout.SUM_MASS] = constants(K).mass
+        barrier()  # all have read the ends
+        sum_up(K, P, M, place)
+
+    @wp.func
+    def end_step(
+        K: wp.array2d(dtype=wp.float64),
+        P: wp.array(dtype=wp.float64),
+        M: wp.array(dtype=wp.float64),
+        place: Place,
+        h: wp.float64,
+    ):
+        sum_up(K, P, M, place)
+        if place.lane == 0:
+            end_plane_step(P, constants(K).gravity, h)
+
+    @wp.func
     def meet(
         K: wp.array2d(dtype=wp.float64),
         P: wp.array(dtype=wp.float64),
         M: wp.array(dtype=wp.float64),
-        own: Chain,
         place: Place,
+        _ground: Ground,
+        own: Chain,
+        _drive: Drive,
+        _world: int,
+        _time: wp.float64,
     ):
         lane = place.lane
         barrier()  # the plane and its mass are those of the new state
@@ -348,4 +380,4 @@ def block_tilting(block_dim: int):
                 K[layout.BOARD_LOST_FIXED, 0] = K[layout.BOARD_LOST_FIXED, 0] + lost
         return hits
 
-    return begin, sum_up, meet
+    return BlockPlane(load, store, begin_run, after_first_stage, begin_step, end_step, meet)

@@ -48,7 +48,7 @@ def placed_link(chain: Chain, own: Link) -> Touching:
 
 @functools.cache
 def block_proximity(features: Features, block_dim: int):
-    """Warp functions (write_proximity, read_proximity, time_to_contact, meet_fixed_body) for these features."""
+    """Warp functions (write_proximity, read_proximity, time_to_contact) for these features."""
     has_floor = features.fixed_body == "floor"
     has_fixed = features.fixed_body != "none"
     has_self = features.self_contact
@@ -124,8 +124,7 @@ def block_proximity(features: Features, block_dim: int):
             distance = wp.min(distance, slack)
         return wp.where(is_near, wp.float32(0.0), quick_quotient(distance, speed))
 
-    meet_fixed_body = block_contact(features.fixed_body) if has_fixed else None
-    return write_proximity, read_proximity, time_to_contact, meet_fixed_body
+    return write_proximity, read_proximity, time_to_contact
 
 
 @functools.cache
