@@ -9,6 +9,13 @@ import warp as wp
 
 wp.set_module_options({"enable_backward": False})
 
+Rows: Any = wp.array2d(dtype=wp.float64)
+"""One row for each quantity, one column for each link or joint, see :mod:`layout`."""
+Row: Any = wp.array(dtype=wp.float64)
+"""One number after the other."""
+Integers: Any = wp.array(dtype=wp.int32)
+"""Likewise, of integers: a neighbour list, or the counters of a block."""
+
 LOADING_TIME = wp.constant(wp.float64(0.25))
 """Time [s] in which multiplied loads fall to the loop's own."""
 

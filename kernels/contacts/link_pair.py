@@ -18,7 +18,7 @@ from warpchain.kernels.layout import (
     Y,
 )
 from warpchain.kernels.physics.elementary import HALF, TWO, ZERO, quotient
-from warpchain.kernels.types import Chain
+from warpchain.kernels.types import Chain, Rows
 
 wp.set_module_options({"enable_backward": False})
 
@@ -108,15 +108,7 @@ def circles_of_links(
 
 
 @wp.func
-def divisors(
-    K: wp.array2d(dtype=wp.float64),
-    link_a: int,
-    link_b: int,
-    a_n: wp.float64,
-    a_t: wp.float64,
-    b_n: wp.float64,
-    b_t: wp.float64,
-):
+def divisors(K: Rows, link_a: int, link_b: int, a_n: wp.float64, a_t: wp.float64, b_n: wp.float64, b_t: wp.float64):
     """1/W_nn [kg] and 1/det W [kg²] of a contact of two links; the levers are those of :func:`circles_of_links`."""
     w_nn, w_nt, w_tt = effective_masses(
         K[INVERSE_MASS, link_a] + K[INVERSE_MASS, link_b],
@@ -139,7 +131,7 @@ def links_of(p: int, q: int, half: int, second: int, n: int):
 
 
 @wp.func
-def touching_circles(K: wp.array2d(dtype=wp.float64), chain: Chain, p: int, q: int, half: int, second: int):
+def touching_circles(K: Rows, chain: Chain, p: int, q: int, half: int, second: int):
     """Geometry of a contact and its divisors, see :func:`links_of`, :func:`circles_of_links` and :func:`divisors`.
 
     The depth is 0 for links that share a joint.
@@ -172,7 +164,7 @@ def touching_circles(K: wp.array2d(dtype=wp.float64), chain: Chain, p: int, q: i
 
 @wp.func
 def collide(
-    K: wp.array2d(dtype=wp.float64),
+    K: Rows,
     chain: Chain,
     link_a: int,
     link_b: int,

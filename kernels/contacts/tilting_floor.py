@@ -35,7 +35,7 @@ from warpchain.kernels.layout import (
 )
 from warpchain.kernels.physics.elementary import HALF, ONE, ZERO, quotient
 from warpchain.kernels.physics.plane import plane_times_inverse
-from warpchain.kernels.types import Chain
+from warpchain.kernels.types import Chain, Row
 
 wp.set_module_options({"enable_backward": False})
 
@@ -73,7 +73,7 @@ class CopyInverse:
 
 
 @wp.func
-def copy_inverse(P: wp.array(dtype=wp.float64), copies: wp.float64) -> CopyInverse:
+def copy_inverse(P: Row, copies: wp.float64) -> CopyInverse:
     """The inverse mass matrix of one of so many copies of the plane."""
     B = CopyInverse()
     B.b00 = copies * P[INVERSE_00]
@@ -291,7 +291,7 @@ def meet_tilting_floor(
 
 
 @wp.func
-def push_plane_by(P: wp.array(dtype=wp.float64), push: wp.float64, moment_x: wp.float64, moment_y: wp.float64):
+def push_plane_by(P: Row, push: wp.float64, moment_x: wp.float64, moment_y: wp.float64):
     """Gives the plane the sum of the impulses on its copies; returns the energy [J] that it loses."""
     du, d1, d2 = plane_times_inverse(P, push, moment_x, moment_y)
     u = P[PLANE_SPEED]

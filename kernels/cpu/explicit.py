@@ -17,13 +17,13 @@ from warpchain.kernels.physics.elementary import LARGEST_TURN, TWO, ZERO, cos_si
 from warpchain.kernels.physics.geometry import end_positions, end_velocities, turned, whole_lanes
 from warpchain.kernels.physics.joint import friction_torque, joint_force, link_acceleration
 from warpchain.kernels.physics.plane import plane_load
-from warpchain.kernels.types import Chain
+from warpchain.kernels.types import Chain, Rows
 
 wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
-def place_ends(K: wp.array2d(dtype=wp.float64), chain: Chain):
+def place_ends(K: Rows, chain: Chain):
     """Directions and end positions of the links, exactly, from the state rows."""
     n = chain.link_count
     lanes = whole_lanes(n)
@@ -44,7 +44,7 @@ def place_ends(K: wp.array2d(dtype=wp.float64), chain: Chain):
 
 
 @wp.func
-def begin_stages(K: wp.array2d(dtype=wp.float64), chain: Chain):
+def begin_stages(K: Rows, chain: Chain):
     """Rows of the first stage from the state: arms, spins, end velocities; :func:`place_ends` has placed the ends."""
     n = chain.link_count
     lanes = whole_lanes(n)
@@ -75,7 +75,7 @@ def sums_over_stages(velocity: tuple[float, ...], position: tuple[float, ...]):
     """
 
     @wp.func
-    def sums(K: wp.array2d(dtype=wp.float64), i: int):
+    def sums(K: Rows, i: int):
         du = ZERO
         dv = ZERO
         dw = ZERO
@@ -122,7 +122,7 @@ def explicit_method(name: str, tilts: bool = False):
     )
 
     @wp.func
-    def derivatives(K: wp.array2d(dtype=wp.float64), chain: Chain, row: int, needs_power: bool):
+    def derivatives(K: Rows, chain: Chain, row: int, needs_power: bool):
         n = chain.link_count
         lanes = whole_lanes(n)
         weightless = chain
@@ -178,12 +178,12 @@ def explicit_method(name: str, tilts: bool = False):
             i += 1
 
     @wp.func
-    def first_stage(K: wp.array2d(dtype=wp.float64), chain: Chain):
+    def first_stage(K: Rows, chain: Chain):
         begin_stages(K, chain)
         derivatives(K, chain, wp.static(STAGES), wp.static(power_needed[0]))
 
     @wp.func
-    def attempt(K: wp.array2d(dtype=wp.float64), chain: Chain, h: wp.float64, tolerance: wp.float64):
+    def attempt(K: Rows, chain: Chain, h: wp.float64, tolerance: wp.float64):
         n = chain.link_count
         lanes = whole_lanes(n)
         a = chain.half_length
@@ -270,7 +270,7 @@ def explicit_method(name: str, tilts: bool = False):
         return greatest
 
     @wp.func
-    def commit(K: wp.array2d(dtype=wp.float64), chain: Chain, h: wp.float64):
+    def commit(K: Rows, chain: Chain, h: wp.float64):
         n = chain.link_count
         lanes = whole_lanes(n)
         i = int(0)

@@ -10,7 +10,7 @@ from warpchain.kernels.cpu.explicit import explicit_method
 from warpchain.kernels.methods.controller import step_controller
 from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.physics.elementary import ZERO
-from warpchain.kernels.types import Chain, Control, State
+from warpchain.kernels.types import Chain, Control, Rows, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -48,24 +48,18 @@ def springs(name: str, tilts: bool) -> Joints:
     reuses_last = method.reuses_last
 
     @wp.func
-    def nothing(_K: wp.array2d(dtype=wp.float64), _chain: Chain, _state: State, _world: int):
+    def nothing(_K: Rows, _chain: Chain, _state: State, _world: int):
         return
 
     @wp.func
-    def first_stage(K: wp.array2d(dtype=wp.float64), chain: Chain, state: State, world: int):
+    def first_stage(K: Rows, chain: Chain, state: State, world: int):
         if state.has_first_stage[world] == 0:
             evaluate(K, chain)
             state.has_first_stage[world] = 1
 
     @wp.func
     def attempt(
-        K: wp.array2d(dtype=wp.float64),
-        chain: Chain,
-        _state: State,
-        _control: Control,
-        _world: int,
-        h: wp.float64,
-        tolerance: wp.float64,
+        K: Rows, chain: Chain, _state: State, _control: Control, _world: int, h: wp.float64, tolerance: wp.float64
     ):
         return attempt_step(K, chain, h, tolerance)
 
@@ -74,15 +68,7 @@ def springs(name: str, tilts: bool) -> Joints:
         return shrink(error)
 
     @wp.func
-    def accept(
-        K: wp.array2d(dtype=wp.float64),
-        chain: Chain,
-        state: State,
-        control: Control,
-        world: int,
-        h: wp.float64,
-        error: wp.float64,
-    ):
+    def accept(K: Rows, chain: Chain, state: State, control: Control, world: int, h: wp.float64, error: wp.float64):
         commit(K, chain, h)
         state.has_first_stage[world] = wp.static(int(reuses_last))
         return growth(error, state.last_error[world], control.proportional), bool(True)

@@ -33,13 +33,13 @@ from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.physics.elementary import ONE, ZERO
 from warpchain.kernels.physics.geometry import whole_lanes
 from warpchain.kernels.physics.scaled_loads import write_links
-from warpchain.kernels.types import Chain, Control, Drive, Model, Record, State, read_ground
+from warpchain.kernels.types import Chain, Control, Drive, Integers, Model, Record, Rows, State, read_ground
 
 wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
-def load_state(K: wp.array2d(dtype=wp.float64), model: Model, state: State, chain: Chain, world: int):
+def load_state(K: Rows, model: Model, state: State, chain: Chain, world: int):
     """Fills the rows of the state; rows of losses start at zero, columns behind the links are links without mass."""
     i = int(0)
     while i < chain.link_count:
@@ -62,7 +62,7 @@ def load_state(K: wp.array2d(dtype=wp.float64), model: Model, state: State, chai
 
 
 @wp.func
-def store_state(K: wp.array2d(dtype=wp.float64), state: State, chain: Chain, world: int, fixed_loss: int):
+def store_state(K: Rows, state: State, chain: Chain, world: int, fixed_loss: int):
     """Writes the state and the losses since loading."""
     friction = ZERO
     damping = ZERO
@@ -83,7 +83,7 @@ def store_state(K: wp.array2d(dtype=wp.float64), state: State, chain: Chain, wor
 
 
 @wp.func
-def state_is_finite(K: wp.array2d(dtype=wp.float64), chain: Chain):
+def state_is_finite(K: Rows, chain: Chain):
     """False if the state or its first derivative holds an infinity or a NaN."""
     finite = bool(True)
     i = int(0)
@@ -141,14 +141,7 @@ def make_advance(features: Features):
 
     @wp.func
     def take_sample(
-        K: wp.array2d(dtype=wp.float64),
-        chain: Chain,
-        model: Model,
-        drive: Drive,
-        state: State,
-        record: Record,
-        control: Control,
-        world: int,
+        K: Rows, chain: Chain, model: Model, drive: Drive, state: State, record: Record, control: Control, world: int
     ) -> Chain:
         """Takes a sample → the chain as the sample has left it."""
         softness = state.softness[world]
@@ -170,15 +163,7 @@ def make_advance(features: Features):
         return after
 
     @wp.func
-    def reject(
-        K: wp.array2d(dtype=wp.float64),
-        chain: Chain,
-        state: State,
-        control: Control,
-        world: int,
-        h: wp.float64,
-        error: wp.float64,
-    ):
+    def reject(K: Rows, chain: Chain, state: State, control: Control, world: int, h: wp.float64, error: wp.float64):
         """Proposes a shorter step, or ends the run."""
         add_count(state, world, layout.REJECTED, wp.int64(1))
         step = h * LEAST_SHRINKAGE
@@ -197,7 +182,7 @@ def make_advance(features: Features):
         module_options={"cpu_compiler_flags": COMPILER_FLAGS},
     )
     def advance(
-        worlds: wp.array(dtype=wp.int32),
+        worlds: Integers,
         model: Model,
         drive: Drive,
         state: State,

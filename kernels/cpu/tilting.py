@@ -54,7 +54,7 @@ from warpchain.kernels.physics.plane import (
     place_terms,
     plane_load,
 )
-from warpchain.kernels.types import Chain, Ground, State
+from warpchain.kernels.types import Chain, Ground, Row, Rows, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -76,13 +76,13 @@ TOUCHES = SUMS + SUMMED_IN_CONTACT
     }
     return ((sums[0] + sums[1]) + (sums[2] + sums[3])) + ((sums[4] + sums[5]) + (sums[6] + sums[7]));
 """)
-def row_sum(K: wp.array2d(dtype=wp.float64), row: int, count: int) -> wp.float64:
+def row_sum(K: Rows, row: int, count: int) -> wp.float64:
     """Sum of the first ``count`` columns of a row, a multiple of 8; in pure Warp clang adds one after the other."""
     ...
 
 
 @wp.func
-def any_touches(K: wp.array2d(dtype=wp.float64), first: int):
+def any_touches(K: Rows, first: int):
     """Whether a link of the vector that begins at this column touches the floor."""
     greatest = ZERO
     for lane in range(wp.static(LANES)):
@@ -91,7 +91,7 @@ def any_touches(K: wp.array2d(dtype=wp.float64), first: int):
 
 
 @wp.func
-def write_sums_of_motion(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), chain: Chain):
+def write_sums_of_motion(K: Rows, P: Row, chain: Chain):
     """Writes the sums over the links that depend on velocities."""
     count = whole_lanes(chain.link_count)
     i = int(0)
@@ -105,7 +105,7 @@ def write_sums_of_motion(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.f
 
 
 @wp.func
-def write_plane_sums(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), chain: Chain):
+def write_plane_sums(K: Rows, P: Row, chain: Chain):
     """Writes all sums over the placed links, and the inverse of the plane's mass matrix."""
     count = whole_lanes(chain.link_count)
     i = int(0)
@@ -124,7 +124,7 @@ def write_plane_sums(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float
 
 
 @wp.func
-def shift_first_stage(K: wp.array2d(dtype=wp.float64), before: Chain, now: Chain):
+def shift_first_stage(K: Rows, before: Chain, now: Chain):
     """Changes the stored first stage from one plane to another; links are the same."""
     a = now.half_length
     i = int(0)
@@ -140,7 +140,7 @@ def shift_first_stage(K: wp.array2d(dtype=wp.float64), before: Chain, now: Chain
 
 
 @wp.func
-def tilting_gap(K: wp.array2d(dtype=wp.float64), chain: Chain):
+def tilting_gap(K: Rows, chain: Chain):
     """Height [m] of the lowest rim of a roller above the floor; negative when it is below."""
     slope = steepness(chain)
     lowest = order_key(middle_height(chain, slope, K[LEFT_X, 0], K[LEFT_Y, 0]))
@@ -154,7 +154,7 @@ def tilting_gap(K: wp.array2d(dtype=wp.float64), chain: Chain):
 
 
 @wp.func
-def greatest_tilting_speed(K: wp.array2d(dtype=wp.float64), chain: Chain):
+def greatest_tilting_speed(K: Rows, chain: Chain):
     """A bound on the speed [m/s] of every point of a roller, across the plane too."""
     greatest = wp.int64(0)
     i = int(0)
@@ -168,7 +168,7 @@ def greatest_tilting_speed(K: wp.array2d(dtype=wp.float64), chain: Chain):
 
 
 @wp.func
-def write_touches(K: wp.array2d(dtype=wp.float64), chain: Chain, slope: wp.float64):
+def write_touches(K: Rows, chain: Chain, slope: wp.float64):
     """Writes 1 for each link that touches the floor and 0 for others; returns their number."""
     touching = wp.int64(0)
     i = int(0)
@@ -194,7 +194,7 @@ def write_touches(K: wp.array2d(dtype=wp.float64), chain: Chain, slope: wp.float
 
 
 @wp.func
-def resolve_tilting_floor(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), own: Chain):
+def resolve_tilting_floor(K: Rows, P: Row, own: Chain):
     """Applies the impulses between rollers and floor to links, plane and sums; returns their number.
 
     The sums must be those of the present places. Lanes of links of which none touches are passed over.
@@ -259,18 +259,11 @@ def tilting_plane(joints: Joints) -> Plane:
     first_stage = joints.first_stage
 
     @wp.func
-    def at_start(P: wp.array(dtype=wp.float64), chain: Chain) -> Chain:
+    def at_start(P: Row, chain: Chain) -> Chain:
         return on_plane(chain, P, 0)
 
     @wp.func
-    def begin_step(
-        K: wp.array2d(dtype=wp.float64),
-        P: wp.array(dtype=wp.float64),
-        chain: Chain,
-        state: State,
-        world: int,
-        h: wp.float64,
-    ) -> Chain:
+    def begin_step(K: Rows, P: Row, chain: Chain, state: State, world: int, h: wp.float64) -> Chain:
         before = on_plane(chain, P, wp.static(layout.PLANE_MID))
         begin_plane_step(P, chain.gravity, h)
         felt = on_plane(chain, P, wp.static(layout.PLANE_MID))
@@ -280,18 +273,16 @@ def tilting_plane(joints: Joints) -> Plane:
         return felt
 
     @wp.func
-    def end_step(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), chain: Chain, h: wp.float64):
+    def end_step(K: Rows, P: Row, chain: Chain, h: wp.float64):
         write_plane_sums(K, P, chain)
         end_plane_step(P, chain.gravity, h)
 
     @wp.func
-    def gap(K: wp.array2d(dtype=wp.float64), chain: Chain, _ground: Ground, _face: Face):
+    def gap(K: Rows, chain: Chain, _ground: Ground, _face: Face):
         return tilting_gap(K, chain)
 
     @wp.func
-    def meet(
-        K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), chain: Chain, _ground: Ground, _face: Face
-    ):
+    def meet(K: Rows, P: Row, chain: Chain, _ground: Ground, _face: Face):
         return resolve_tilting_floor(K, P, chain)
 
     return Plane(write_plane_sums, at_start, begin_step, end_step, gap, meet)

@@ -9,7 +9,7 @@ import warp as wp
 from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.cpu.contacts.proximity import fixed_contacts
 from warpchain.kernels.cpu.joints import Joints
-from warpchain.kernels.types import Chain, Ground, State
+from warpchain.kernels.types import Chain, Ground, Row, Rows, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -43,31 +43,24 @@ def upright_plane(fixed_body: str, joints: Joints) -> Plane:
     first_stage = joints.first_stage
 
     @wp.func
-    def begin_run(_K: wp.array2d(dtype=wp.float64), _P: wp.array(dtype=wp.float64), _chain: Chain):
+    def begin_run(_K: Rows, _P: Row, _chain: Chain):
         return
 
     @wp.func
-    def at_start(_P: wp.array(dtype=wp.float64), chain: Chain) -> Chain:
+    def at_start(_P: Row, chain: Chain) -> Chain:
         return chain
 
     @wp.func
-    def begin_step(
-        K: wp.array2d(dtype=wp.float64),
-        _P: wp.array(dtype=wp.float64),
-        chain: Chain,
-        state: State,
-        world: int,
-        _h: wp.float64,
-    ) -> Chain:
+    def begin_step(K: Rows, _P: Row, chain: Chain, state: State, world: int, _h: wp.float64) -> Chain:
         first_stage(K, chain, state, world)
         return chain
 
     @wp.func
-    def end_step(_K: wp.array2d(dtype=wp.float64), _P: wp.array(dtype=wp.float64), _chain: Chain, _h: wp.float64):
+    def end_step(_K: Rows, _P: Row, _chain: Chain, _h: wp.float64):
         return
 
     @wp.func
-    def meet(K: wp.array2d(dtype=wp.float64), _P: wp.array(dtype=wp.float64), chain: Chain, ground: Ground, face: Face):
+    def meet(K: Rows, _P: Row, chain: Chain, ground: Ground, face: Face):
         return resolve(K, chain, ground, face)
 
     return Plane(begin_run, at_start, begin_step, end_step, gap, meet)

@@ -8,13 +8,13 @@ from warpchain.kernels.events.summary import Summary, summarise
 from warpchain.kernels.layout import COSINE, COULOMB, LEFT_X, LEFT_Y, OMEGA, RIGHT_X, RIGHT_Y, SINE, TIME, VISCOUS, U, V
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.physics.joint import friction_torque, joint_force
-from warpchain.kernels.types import Chain, Record, State
+from warpchain.kernels.types import Chain, Record, Rows, State
 
 wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
-def write_row(rows: wp.array2d(dtype=wp.float64), row: int, time: wp.float64, summary: Summary):
+def write_row(rows: Rows, row: int, time: wp.float64, summary: Summary):
     """Writes a summary as one row of SAMPLE_COLUMNS numbers."""
     rows[row, TIME] = time
     rows[row, layout.CENTER_X] = summary.center_x
@@ -44,9 +44,7 @@ def write_sample(state: State, record: Record, world: int, time: wp.float64, sum
 
 
 @wp.func
-def observe(
-    K: wp.array2d(dtype=wp.float64), chain: Chain, state: State, record: Record, world: int, time: wp.float64
-) -> Summary:
+def observe(K: Rows, chain: Chain, state: State, record: Record, world: int, time: wp.float64) -> Summary:
     """Writes a sample of a chain whose ends are placed."""
     summary = summarise(K, chain)
     write_sample(state, record, world, time, summary)
@@ -54,7 +52,7 @@ def observe(
 
 
 @wp.func
-def write_load(loads: wp.array2d(dtype=wp.float64), row: int, K: wp.array2d(dtype=wp.float64), chain: Chain, i: int):
+def write_load(loads: Rows, row: int, K: Rows, chain: Chain, i: int):
     """Writes force F = k C + b Ċ [N] and friction moment [N m] of joint i, both as they act on the link before it."""
     n = chain.link_count
     j = i + 1
@@ -70,9 +68,7 @@ def write_load(loads: wp.array2d(dtype=wp.float64), row: int, K: wp.array2d(dtyp
 
 
 @wp.func
-def write_frame(
-    K: wp.array2d(dtype=wp.float64), chain: Chain, _state: State, record: Record, world: int, time: wp.float64
-):
+def write_frame(K: Rows, chain: Chain, _state: State, record: Record, world: int, time: wp.float64):
     """Appends all joint positions if frames are kept, and the loads of the joints if these are kept."""
     if record.frames.shape[1] == 0:
         return

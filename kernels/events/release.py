@@ -34,7 +34,7 @@ from warpchain.kernels.codes import FINISHED
 from warpchain.kernels.events.summary import Summary
 from warpchain.kernels.physics.elementary import HALF, ONE, ZERO
 from warpchain.kernels.physics.scaled_loads import DRAG_PER_CROSSING, DRAG_PER_TURN, crossing_time
-from warpchain.kernels.types import LOADING_TIME, Chain, Drive, State
+from warpchain.kernels.types import LOADING_TIME, Chain, Drive, Row, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -62,7 +62,7 @@ def is_watched(state: State, drive: Drive, world: int, time: wp.float64):
 
 
 @wp.func
-def begin_window(watch: wp.array(dtype=wp.float64), time: wp.float64):
+def begin_window(watch: Row, time: wp.float64):
     """Resets the sums of a window."""
     watch[layout.WINDOW_START] = time
     watch[layout.WINDOW_COUNT] = ZERO
@@ -74,7 +74,7 @@ def begin_window(watch: wp.array(dtype=wp.float64), time: wp.float64):
 
 
 @wp.func
-def widen(watch: wp.array(dtype=wp.float64), least: int, greatest: int, mean: wp.float64, is_first: bool):
+def widen(watch: Row, least: int, greatest: int, mean: wp.float64, is_first: bool):
     """Includes a window's mean in the range of a watch, or begins the range with it; returns the width of the range."""
     if is_first:
         watch[least] = mean

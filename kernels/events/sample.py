@@ -14,7 +14,7 @@ from warpchain.kernels.events.tilting import no_fall, observe_in_room, watch_fal
 from warpchain.kernels.layout import TIME
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.physics.scaled_loads import drag_shape
-from warpchain.kernels.types import Chain, Control, Drive, Record, State
+from warpchain.kernels.types import Chain, Control, Drive, Record, Rows, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -51,7 +51,7 @@ def sampling(fixed_body: str, tilts: bool = False):
 
     @wp.func
     def sample(
-        K: wp.array2d(dtype=wp.float64),
+        K: Rows,
         chain: Chain,
         drive: Drive,
         state: State,

@@ -4,7 +4,7 @@ import warp as wp
 
 from warpchain.kernels.layout import COSINE, INERTIA, LEFT_X, LEFT_Y, MASS, OMEGA, RIGHT_X, RIGHT_Y, SINE, U, V, X, Y
 from warpchain.kernels.physics.elementary import HALF, ZERO, from_order_key, order_key
-from warpchain.kernels.types import Chain
+from warpchain.kernels.types import Chain, Rows
 
 wp.set_module_options({"enable_backward": False})
 
@@ -29,7 +29,7 @@ class Summary:
 
 
 @wp.func
-def summarise(K: wp.array2d(dtype=wp.float64), chain: Chain) -> Summary:
+def summarise(K: Rows, chain: Chain) -> Summary:
     """Sums over the placed links.
 
     Loop speed: mean of v·u over links, positive from link i towards link i + 1. Area [m²] inside the loop, positive if

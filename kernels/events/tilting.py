@@ -28,7 +28,7 @@ from warpchain.kernels.layout import (
 )
 from warpchain.kernels.physics.elementary import ZERO, from_order_key, order_key
 from warpchain.kernels.physics.plane import plane_energy
-from warpchain.kernels.types import Chain, Record, State
+from warpchain.kernels.types import Chain, Record, Row, Rows, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -37,13 +37,13 @@ FALLEN = wp.constant(wp.float64(0.7071067811865476))
 
 
 @wp.func
-def component(P: wp.array(dtype=wp.float64), axis: int, x: wp.float64, y: wp.float64, z: wp.float64):
+def component(P: Row, axis: int, x: wp.float64, y: wp.float64, z: wp.float64):
     """Component along a room axis of a vector with these components along e1, e2, e3."""
     return x * P[axis] + y * P[axis + 1] + z * P[axis + 2]
 
 
 @wp.func
-def sideways(P: wp.array(dtype=wp.float64), x: wp.float64, y: wp.float64, z: wp.float64):
+def sideways(P: Row, x: wp.float64, y: wp.float64, z: wp.float64):
     """Component along the room's Z axis, Z = X × Y, of a vector with these components along e1, e2, e3."""
     z1 = P[AHEAD + 1] * P[UP + 2] - P[AHEAD + 2] * P[UP + 1]
     z2 = P[AHEAD + 2] * P[UP] - P[AHEAD] * P[UP + 2]
@@ -52,13 +52,13 @@ def sideways(P: wp.array(dtype=wp.float64), x: wp.float64, y: wp.float64, z: wp.
 
 
 @wp.func
-def across_speed(P: wp.array(dtype=wp.float64), x: wp.float64, y: wp.float64):
+def across_speed(P: Row, x: wp.float64, y: wp.float64):
     """Speed w [m/s] across the plane of the point at (x, y)."""
     return P[PLANE_SPEED] + P[PLANE_TURN_X] * y - P[PLANE_TURN_Y] * x
 
 
 @wp.func
-def in_room(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), chain: Chain, flat: Summary) -> Summary:
+def in_room(K: Rows, P: Row, chain: Chain, flat: Summary) -> Summary:
     """Sums in the room, from those in the plane; height, width and speed of the loop stay those in the plane."""
     n = chain.link_count
     square = flat.rms_speed * flat.rms_speed * wp.float64(n)
@@ -87,7 +87,7 @@ def in_room(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), chai
 
 
 @wp.func
-def write_plane_columns(row: wp.array(dtype=wp.float64), P: wp.array(dtype=wp.float64), flat: Summary):
+def write_plane_columns(row: Row, P: Row, flat: Summary):
     """Writes the further columns of a sample."""
     k = int(0)
     while k < PLANE_VALUES:
@@ -99,9 +99,7 @@ def write_plane_columns(row: wp.array(dtype=wp.float64), P: wp.array(dtype=wp.fl
 
 
 @wp.func
-def observe_in_room(
-    K: wp.array2d(dtype=wp.float64), chain: Chain, state: State, record: Record, world: int, time: wp.float64
-) -> Summary:
+def observe_in_room(K: Rows, chain: Chain, state: State, record: Record, world: int, time: wp.float64) -> Summary:
     """Writes a sample of a chain whose ends are placed: its sums in the room, and the plane."""
     P = state.plane[world]
     flat = summarise(K, chain)
@@ -117,9 +115,7 @@ def observe_in_room(
 
 
 @wp.func
-def write_frame_in_room(
-    K: wp.array2d(dtype=wp.float64), chain: Chain, state: State, record: Record, world: int, time: wp.float64
-):
+def write_frame_in_room(K: Rows, chain: Chain, state: State, record: Record, world: int, time: wp.float64):
     """Appends joint positions and behind them the plane, if frames are kept."""
     row = record.frame_count[world]
     write_frame(K, chain, state, record, world, time)

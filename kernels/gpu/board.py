@@ -7,7 +7,7 @@ from warpchain.kernels.gpu.stage import Attempt, Link, Place, constants, read_li
 from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, MASS, OMEGA, RIGHT_X, RIGHT_Y, SINE, THETA, U, V, X, Y
 from warpchain.kernels.physics.elementary import ZERO, cos_sin
 from warpchain.kernels.physics.geometry import end_positions
-from warpchain.kernels.types import Chain, State
+from warpchain.kernels.types import Chain, Rows, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -29,7 +29,7 @@ def place_of(chain: Chain, lane: int) -> Place:
 
 
 @wp.func
-def load_link(K: wp.array2d(dtype=wp.float64), state: State, world: int, lane: int, n: int):
+def load_link(K: Rows, state: State, world: int, lane: int, n: int):
     """Writes a thread's link on the board; threads without a link get one at the origin that nothing acts on."""
     row = int(0)
     while row < SINE:
@@ -42,14 +42,14 @@ def load_link(K: wp.array2d(dtype=wp.float64), state: State, world: int, lane: i
 
 
 @wp.func
-def store_link(K: wp.array2d(dtype=wp.float64), state: State, world: int, lane: int):
+def store_link(K: Rows, state: State, world: int, lane: int):
     """Stores the state of a thread's link."""
     for k in range(6):
         state.links[world, X + k, lane] = K[X + k, lane]
 
 
 @wp.func
-def write_attempt(K: wp.array2d(dtype=wp.float64), place: Place, result: Attempt, h: wp.float64):
+def write_attempt(K: Rows, place: Place, result: Attempt, h: wp.float64):
     """Writes a link's new state and the losses of its joint on the board."""
     lane = place.lane
     if lane < place.links:
@@ -67,7 +67,7 @@ def write_attempt(K: wp.array2d(dtype=wp.float64), place: Place, result: Attempt
 
 
 @wp.func
-def load_extremes(K: wp.array2d(dtype=wp.float64), state: State, world: int, fixed_depth: int):
+def load_extremes(K: Rows, state: State, world: int, fixed_depth: int):
     """Writes what is greatest or latest so far on the board; for one thread."""
     K[layout.BOARD_VALUES, layout.VALUE_OPENING] = state.extremes[world, layout.OPENING]
     K[layout.BOARD_VALUES, layout.VALUE_FIXED_DEPTH] = state.extremes[world, fixed_depth]
@@ -75,13 +75,13 @@ def load_extremes(K: wp.array2d(dtype=wp.float64), state: State, world: int, fix
 
 
 @wp.func
-def raise_value(K: wp.array2d(dtype=wp.float64), value: int, x: wp.float32):
+def raise_value(K: Rows, value: int, x: wp.float32):
     """Raises one of the chain's values on the board to x; for one thread."""
     K[layout.BOARD_VALUES, value] = wp.max(K[layout.BOARD_VALUES, value], wp.float64(x))
 
 
 @wp.func
-def store_extremes(K: wp.array2d(dtype=wp.float64), state: State, world: int, fixed_depth: int):
+def store_extremes(K: Rows, state: State, world: int, fixed_depth: int):
     """Stores what :func:`load_extremes` has written; for one thread."""
     state.extremes[world, layout.OPENING] = K[layout.BOARD_VALUES, layout.VALUE_OPENING]
     state.extremes[world, fixed_depth] = K[layout.BOARD_VALUES, layout.VALUE_FIXED_DEPTH]
@@ -89,7 +89,7 @@ def store_extremes(K: wp.array2d(dtype=wp.float64), state: State, world: int, fi
 
 
 @wp.func
-def store_losses(K: wp.array2d(dtype=wp.float64), state: State, world: int, n: int, fixed_loss: int):
+def store_losses(K: Rows, state: State, world: int, n: int, fixed_loss: int):
     """Stores the losses since loading, summed over the links in their order; for one thread."""
     friction = ZERO
     damping = ZERO
@@ -109,7 +109,7 @@ def store_losses(K: wp.array2d(dtype=wp.float64), state: State, world: int, n: i
 
 
 @wp.func
-def point(K: wp.array2d(dtype=wp.float64), lane: int):
+def point(K: Rows, lane: int):
     """Writes a link's direction, exactly, from its angle on the board."""
     cosine, sine = cos_sin(K[THETA, lane])
     K[COSINE, lane] = cosine
@@ -123,7 +123,7 @@ def ends_of(link: Link):
 
 
 @wp.func
-def publish(K: wp.array2d(dtype=wp.float64), place: Place):
+def publish(K: Rows, place: Place):
     """Writes a link's ends on the board, without a barrier."""
     lane = place.lane
     n = place.links
@@ -139,7 +139,7 @@ def publish(K: wp.array2d(dtype=wp.float64), place: Place):
 
 
 @wp.func
-def link_is_finite(K: wp.array2d(dtype=wp.float64), lane: int):
+def link_is_finite(K: Rows, lane: int):
     """False if the state or its first derivative holds an infinity or a NaN."""
     finite = bool(True)
     row = int(0)

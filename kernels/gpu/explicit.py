@@ -27,7 +27,7 @@ from warpchain.kernels.layout import INVERSE_INERTIA, INVERSE_MASS, THETA
 from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
 from warpchain.kernels.physics.elementary import LARGEST_TURN, ONE, ZERO, cos_sin
 from warpchain.kernels.physics.geometry import turned
-from warpchain.kernels.types import Ground
+from warpchain.kernels.types import Ground, Rows
 
 wp.set_module_options({"enable_backward": False})
 
@@ -104,7 +104,7 @@ def explicit_attempt(name: str, block_dim: int, write_proximity: Any, read_proxi
         ends: wp.tile[vec5d, block_dim],
         forces: wp.tile[vec3d, block_dim],
         maxima: wp.uint64,
-        K: wp.array2d(dtype=wp.float64),
+        K: Rows,
         place: Place,
         ground: Ground,
         h: wp.float64,

@@ -41,7 +41,7 @@ from warpchain.kernels.gpu.upright import block_upright
 from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step, step_controller
 from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
 from warpchain.kernels.methods.method import find_method
-from warpchain.kernels.types import Control, Drive, Ground, Model, Record, State, read_ground
+from warpchain.kernels.types import Control, Drive, Ground, Integers, Model, Record, Rows, State, read_ground
 
 wp.set_module_options({"enable_backward": False})
 
@@ -95,9 +95,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     take_sample = block_sample(features, touch, plane)
 
     @wp.func
-    def evaluate_first_stage(
-        forces: wp.tile[vec3d, block_dim], K: wp.array2d(dtype=wp.float64), place: Place, next_end: vec5d
-    ):
+    def evaluate_first_stage(forces: wp.tile[vec3d, block_dim], K: Rows, place: Place, next_end: vec5d):
         """Evaluates the first stage of the next step; ``next_end``: left end of the next link."""
         column = place.column
         first = stage(
@@ -113,13 +111,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         after_first_stage()
 
     @wp.func
-    def measure_proximity(
-        ends: wp.tile[vec5d, block_dim],
-        K: wp.array2d(dtype=wp.float64),
-        maxima: wp.uint64,
-        place: Place,
-        ground: Ground,
-    ):
+    def measure_proximity(ends: wp.tile[vec5d, block_dim], K: Rows, maxima: wp.uint64, place: Place, ground: Ground):
         """Left end of the next link, and the proximity of the whole chain, in the state on the board."""
         link = read_link(K, place.lane)
         next_end = exchange_ends(ends, place, link)
@@ -128,9 +120,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         return next_end, read_proximity(maxima)
 
     @wp.func
-    def greatest_error(
-        errors: wp.tile[wp.int32, block_dim], K: wp.array2d(dtype=wp.float64), place: Place, result: Attempt
-    ):
+    def greatest_error(errors: wp.tile[wp.int32, block_dim], K: Rows, place: Place, result: Attempt):
         """Greatest error ratio of all links."""
         own = int(0)
         if place.lane < place.links:
@@ -139,12 +129,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
 
     @wp.func
     def reject(
-        errors: wp.tile[wp.int32, block_dim],
-        K: wp.array2d(dtype=wp.float64),
-        control: Control,
-        place: Place,
-        h: wp.float64,
-        error: wp.float32,
+        errors: wp.tile[wp.int32, block_dim], K: Rows, control: Control, place: Place, h: wp.float64, error: wp.float32
     ):
         """A shorter step [s] after a rejection, and the status."""
         status = int(RUNNING)
@@ -169,7 +154,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         module_options={"cpu_compiler_flags": COMPILER_FLAGS},
     )
     def advance_block(
-        worlds: wp.array(dtype=wp.int32),
+        worlds: Integers,
         model: Model,
         drive: Drive,
         state: State,

@@ -30,22 +30,20 @@ from warpchain.kernels.layout import (
 )
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.physics.scaled_loads import write_link
-from warpchain.kernels.types import Control, Drive, Model, Record, State
+from warpchain.kernels.types import Control, Drive, Integers, Model, Record, Row, Rows, State
 
 wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
-def write_step_bounds(
-    K: wp.array2d(dtype=wp.float64), drive: Drive, state: State, control: Control, world: int, is_driven: bool
-):
+def write_step_bounds(K: Rows, drive: Drive, state: State, control: Control, world: int, is_driven: bool):
     """Writes the bounds of steps on springs after the last sample on the board."""
     K[BOARD_VALUES, VALUE_CONTACT_STEP] = contact_step(state, control, world, is_driven)
     K[BOARD_VALUES, VALUE_TOLERANCE] = spring_tolerance(drive, state, control, world, is_driven)
 
 
 @wp.func
-def write_marks(K: wp.array2d(dtype=wp.float64), state: State, control: Control, world: int):
+def write_marks(K: Rows, state: State, control: Control, world: int):
     """Writes when the run stops and when the next sample or frame is due on the board."""
     K[BOARD_VALUES, VALUE_STOP_TIME] = state.stop_time[world]
     K[BOARD_VALUES, VALUE_NEXT_SAMPLE] = next_mark(state, control, world)
@@ -79,9 +77,9 @@ def block_run(features: Features, touch: TouchLayout, kept_width: int, plane: Bl
 
     @wp.func
     def load(
-        K: wp.array2d(dtype=wp.float64),
-        T: wp.array(dtype=wp.int32),
-        P: wp.array(dtype=wp.float64),
+        K: Rows,
+        T: Integers,
+        P: Row,
         model: Model,
         drive: Drive,
         state: State,
@@ -119,9 +117,9 @@ def block_run(features: Features, touch: TouchLayout, kept_width: int, plane: Bl
 
     @wp.func
     def store(
-        K: wp.array2d(dtype=wp.float64),
-        T: wp.array(dtype=wp.int32),
-        P: wp.array(dtype=wp.float64),
+        K: Rows,
+        T: Integers,
+        P: Row,
         model: Model,
         state: State,
         record: Record,
@@ -178,8 +176,8 @@ def block_sample(features: Features, touch: TouchLayout, plane: BlockPlane):
 
     @wp.func
     def take_by_one(
-        K: wp.array2d(dtype=wp.float64),
-        T: wp.array(dtype=wp.int32),
+        K: Rows,
+        T: Integers,
         model: Model,
         drive: Drive,
         state: State,
@@ -209,9 +207,9 @@ def block_sample(features: Features, touch: TouchLayout, plane: BlockPlane):
 
     @wp.func
     def take_sample(
-        K: wp.array2d(dtype=wp.float64),
-        T: wp.array(dtype=wp.int32),
-        P: wp.array(dtype=wp.float64),
+        K: Rows,
+        T: Integers,
+        P: Row,
         model: Model,
         drive: Drive,
         state: State,

@@ -18,7 +18,7 @@ from warpchain.kernels.physics.elementary import ZERO, order_bits_single
 from warpchain.kernels.physics.geometry import end_positions, end_velocities
 from warpchain.kernels.physics.joint import friction_torque, joint_force, link_acceleration
 from warpchain.kernels.physics.plane import plane_load
-from warpchain.kernels.types import Chain
+from warpchain.kernels.types import Chain, Rows
 
 wp.set_module_options({"enable_backward": False})
 
@@ -96,33 +96,33 @@ class Attempt:
 
 
 @wp.func_native("return reinterpret_cast<::wp::uint64>(K.data + offset);")
-def address_on_board(K: wp.array2d(dtype=wp.float64), offset: int) -> wp.uint64:
+def address_on_board(K: Rows, offset: int) -> wp.uint64:
     """Where a number on the board lies; with ``K.ptr`` the compiler would not know that it is shared memory."""
     ...
 
 
 @wp.func
-def constants_address(K: wp.array2d(dtype=wp.float64)):
+def constants_address(K: Rows):
     """Where the chain's constants lie on the board."""
     return address_on_board(K, wp.static(layout.BOARD_VALUES) * K.shape[1] + wp.static(layout.VALUES))
 
 
 @wp.func
-def constants(K: wp.array2d(dtype=wp.float64)) -> Chain:
+def constants(K: Rows) -> Chain:
     """The chain's constants, from the board; the compiler loads the fields that are used."""
     chains = wp.array(ptr=constants_address(K), shape=(1,), dtype=Chain)
     return chains[0]
 
 
 @wp.func
-def write_constants(K: wp.array2d(dtype=wp.float64), chain: Chain):
+def write_constants(K: Rows, chain: Chain):
     """Writes the chain's constants on the board."""
     chains = wp.array(ptr=constants_address(K), shape=(1,), dtype=Chain)
     chains[0] = chain
 
 
 @wp.func
-def read_link(K: wp.array2d(dtype=wp.float64), column: int) -> Link:
+def read_link(K: Rows, column: int) -> Link:
     """A link, from the board."""
     link = Link()
     link.x = K[X, column]
@@ -137,7 +137,7 @@ def read_link(K: wp.array2d(dtype=wp.float64), column: int) -> Link:
 
 
 @wp.func
-def write_first_stage(K: wp.array2d(dtype=wp.float64), column: int, first: Rates, with_powers: bool):
+def write_first_stage(K: Rows, column: int, first: Rates, with_powers: bool):
     """Writes a link's first stage of the next step on the board."""
     K[layout.BOARD_FIRST, column] = first.x
     K[layout.BOARD_FIRST + 1, column] = first.y
@@ -148,7 +148,7 @@ def write_first_stage(K: wp.array2d(dtype=wp.float64), column: int, first: Rates
 
 
 @wp.func
-def read_first_stage(K: wp.array2d(dtype=wp.float64), column: int) -> Rates:
+def read_first_stage(K: Rows, column: int) -> Rates:
     """A link's first stage, from the board; its powers are those of the last :func:`write_first_stage` with powers."""
     first = Rates()
     first.x = K[layout.BOARD_FIRST, column]
@@ -160,7 +160,7 @@ def read_first_stage(K: wp.array2d(dtype=wp.float64), column: int) -> Rates:
 
 
 @wp.func
-def felt_plane(K: wp.array2d(dtype=wp.float64), own: Chain, first: int) -> Chain:
+def felt_plane(K: Rows, own: Chain, first: int) -> Chain:
     """The chain on the plane whose values begin at this place of the board's values."""
     chain = own
     chain.plane_speed = K[layout.BOARD_VALUES, first]
@@ -249,11 +249,7 @@ def block_stage(block_dim: int, tilts: bool = False):
     """
 
     @wp.func
-    def exchange_ends(
-        ends: wp.tile[vec5d, block_dim],
-        place: Place,
-        link: Link,
-    ):
+    def exchange_ends(ends: wp.tile[vec5d, block_dim], place: Place, link: Link):
         left_x, left_y, _right_x, _right_y = end_positions(link.x, link.y, link.arm_x, link.arm_y)
         left_u, left_v, _right_u, _right_v = end_velocities(link.u, link.v, link.omega, link.arm_x, link.arm_y)
         ends[place.lane] = vec5d(left_x, left_y, left_u, left_v, link.omega)
@@ -262,7 +258,7 @@ def block_stage(block_dim: int, tilts: bool = False):
     @wp.func
     def stage(
         forces: wp.tile[vec3d, block_dim],
-        K: wp.array2d(dtype=wp.float64),
+        K: Rows,
         place: Place,
         next_end: vec5d,
         link: Link,

@@ -11,6 +11,8 @@ import functools
 
 import warp as wp
 
+from warpchain.kernels.types import Integers
+
 wp.set_module_options({"enable_backward": False})
 
 
@@ -36,7 +38,7 @@ def barrier():
     return any;
 #endif
 """)
-def barrier_if_any(flags: wp.array(dtype=wp.int32), slot: int, x: bool) -> bool:
+def barrier_if_any(flags: Integers, slot: int, x: bool) -> bool:
     """A barrier that returns to all threads whether x is true in any of them; one instruction on a GPU.
 
     Fibers use ``flags[slot]`` instead, which is 0 before and after.

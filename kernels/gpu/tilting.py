@@ -56,7 +56,7 @@ from warpchain.kernels.physics.plane import (
     place_terms,
     plane_load,
 )
-from warpchain.kernels.types import Chain, Drive, Ground, State
+from warpchain.kernels.types import Chain, Drive, Ground, Row, Rows, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -101,7 +101,7 @@ def sum_up_source(count: int) -> str:
 
 
 @wp.func_native(sum_up_source(4))
-def add_up_four(memory: wp.array(dtype=wp.float64), slot: int, lane: int, block_dim: int, x: vec4d):
+def add_up_four(memory: Row, slot: int, lane: int, block_dim: int, x: vec4d):
     """Writes the sums of four values over each hardware warp, from ``slot`` on; a fiber is a warp of its own.
 
     After a barrier :func:`added_up` reads the sums over the block.
@@ -110,7 +110,7 @@ def add_up_four(memory: wp.array(dtype=wp.float64), slot: int, lane: int, block_
 
 
 @wp.func_native(sum_up_source(8))
-def add_up_eight(memory: wp.array(dtype=wp.float64), slot: int, lane: int, block_dim: int, x: vec8d):
+def add_up_eight(memory: Row, slot: int, lane: int, block_dim: int, x: vec8d):
     """The same for eight values, which fibers have no memory for."""
     ...
 
@@ -128,13 +128,13 @@ def add_up_eight(memory: wp.array(dtype=wp.float64), slot: int, lane: int, block
     return count;
 #endif
 """)
-def barrier_count(memory: wp.array(dtype=wp.float64), slot: int, lane: int, block_dim: int, x: bool) -> int:
+def barrier_count(memory: Row, slot: int, lane: int, block_dim: int, x: bool) -> int:
     """A barrier that returns to all threads in how many of them x is true; fibers count in a slot of the memory."""
     ...
 
 
 @wp.func
-def added_up(memory: wp.array(dtype=wp.float64), slot: int, block_dim: int):
+def added_up(memory: Row, slot: int, block_dim: int):
     """The sum over all threads of the block."""
     warps = block_dim // warp_width()
     total = ZERO
@@ -146,7 +146,7 @@ def added_up(memory: wp.array(dtype=wp.float64), slot: int, block_dim: int):
 
 
 @wp.func
-def write_felt_plane(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64)):
+def write_felt_plane(K: Rows, P: Row):
     """Writes the plane of the middle of the step on the board; what lay there becomes that of the attempt before."""
     for k in range(wp.static(FELT)):
         K[BOARD_VALUES, VALUE_PLANE_BEFORE + k] = K[BOARD_VALUES, VALUE_PLANE + k]
@@ -159,7 +159,7 @@ def write_felt_plane(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float
 
 
 @wp.func
-def copy_plane(target: wp.array(dtype=wp.float64), source: wp.array(dtype=wp.float64)):
+def copy_plane(target: Row, source: Row):
     """Copies a plane with all its sums."""
     row = int(0)
     while row < layout.PLANE_ROWS:
@@ -168,7 +168,7 @@ def copy_plane(target: wp.array(dtype=wp.float64), source: wp.array(dtype=wp.flo
 
 
 @wp.func
-def shift_first_stage(K: wp.array2d(dtype=wp.float64), lane: int):
+def shift_first_stage(K: Rows, lane: int):
     """Changes a link's first stage on the board from the plane of the attempt before to that of this one."""
     own = constants(K)
     link = read_link(K, lane)
@@ -182,19 +182,19 @@ def shift_first_stage(K: wp.array2d(dtype=wp.float64), lane: int):
 
 
 @wp.func
-def places_of(K: wp.array2d(dtype=wp.float64), i: int):
+def places_of(K: Rows, i: int):
     """The part of link i in the sums for its plane that depend on places."""
     return place_terms(constants(K), K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[COSINE, i], K[SINE, i])
 
 
 @wp.func
-def motion_of(K: wp.array2d(dtype=wp.float64), i: int):
+def motion_of(K: Rows, i: int):
     """The part of link i in those that depend on velocities."""
     return motion_terms(K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[U, i], K[V, i], K[OMEGA, i])
 
 
 @wp.func
-def add_places_one_by_one(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), n: int):
+def add_places_one_by_one(K: Rows, P: Row, n: int):
     """Writes the sums over all links that depend on places, by one fiber."""
     for k in range(wp.static(SUMS_OF_PLACES)):
         P[wp.static(layout.PLANE_SUMS + k)] = ZERO
@@ -207,7 +207,7 @@ def add_places_one_by_one(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.
 
 
 @wp.func
-def add_motion_one_by_one(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), n: int):
+def add_motion_one_by_one(K: Rows, P: Row, n: int):
     """Writes those that depend on velocities, by one fiber."""
     for k in range(wp.static(SUMS_OF_MOTION)):
         P[wp.static(layout.MOTION_SUMS + k)] = ZERO
@@ -225,12 +225,12 @@ def block_tilting(block_dim: int) -> BlockPlane:
     count_slot, sum_slot = 0, 1
 
     @wp.func
-    def load(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), state: State, world: int):
+    def load(K: Rows, P: Row, state: State, world: int):
         copy_plane(P, state.plane[world])
         write_felt_plane(K, P)
 
     @wp.func
-    def store(P: wp.array(dtype=wp.float64), state: State, world: int):
+    def store(P: Row, state: State, world: int):
         copy_plane(state.plane[world], P)
 
     @wp.func
@@ -238,7 +238,7 @@ def block_tilting(block_dim: int) -> BlockPlane:
         barrier()  # all have read the plane that they feel
 
     @wp.func
-    def begin_step(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), place: Place, h: wp.float64):
+    def begin_step(K: Rows, P: Row, place: Place, h: wp.float64):
         if place.lane == 0:
             begin_plane_step(P, constants(K).gravity, h)
             write_felt_plane(K, P)
@@ -247,12 +247,7 @@ def block_tilting(block_dim: int) -> BlockPlane:
             shift_first_stage(K, place.lane)
 
     @wp.func
-    def sum_up(
-        K: wp.array2d(dtype=wp.float64),
-        P: wp.array(dtype=wp.float64),
-        M: wp.array(dtype=wp.float64),
-        place: Place,
-    ):
+    def sum_up(K: Rows, P: Row, M: Row, place: Place):
         if warp_width() > 1:
             places = places_of(K, place.column)
             motion = motion_of(K, place.column)
@@ -274,31 +269,23 @@ def block_tilting(block_dim: int) -> BlockPlane:
             invert_plane_mass(P)
 
     @wp.func
-    def begin_run(
-        K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), M: wp.array(dtype=wp.float64), place: Place
-    ):
+    def begin_run(K: Rows, P: Row, M: Row, place: Place):
         if place.lane == 0:
             P[layout.SUM_MASS] = constants(K).mass
         barrier()  # all have read the ends
         sum_up(K, P, M, place)
 
     @wp.func
-    def end_step(
-        K: wp.array2d(dtype=wp.float64),
-        P: wp.array(dtype=wp.float64),
-        M: wp.array(dtype=wp.float64),
-        place: Place,
-        h: wp.float64,
-    ):
+    def end_step(K: Rows, P: Row, M: Row, place: Place, h: wp.float64):
         sum_up(K, P, M, place)
         if place.lane == 0:
             end_plane_step(P, constants(K).gravity, h)
 
     @wp.func
     def meet(
-        K: wp.array2d(dtype=wp.float64),
-        P: wp.array(dtype=wp.float64),
-        M: wp.array(dtype=wp.float64),
+        K: Rows,
+        P: Row,
+        M: Row,
         place: Place,
         _ground: Ground,
         own: Chain,

@@ -8,7 +8,7 @@ import warp as wp
 
 from warpchain.kernels.gpu.contacts.proximity import block_contact
 from warpchain.kernels.gpu.stage import Place
-from warpchain.kernels.types import Chain, Drive, Ground, State
+from warpchain.kernels.types import Chain, Drive, Ground, Row, Rows, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -46,17 +46,15 @@ def block_upright(fixed_body: str) -> BlockPlane:
     meet_body = block_contact(fixed_body)
 
     @wp.func
-    def load(_K: wp.array2d(dtype=wp.float64), _P: wp.array(dtype=wp.float64), _state: State, _world: int):
+    def load(_K: Rows, _P: Row, _state: State, _world: int):
         return
 
     @wp.func
-    def store(_P: wp.array(dtype=wp.float64), _state: State, _world: int):
+    def store(_P: Row, _state: State, _world: int):
         return
 
     @wp.func
-    def begin_run(
-        _K: wp.array2d(dtype=wp.float64), _P: wp.array(dtype=wp.float64), _M: wp.array(dtype=wp.float64), _place: Place
-    ):
+    def begin_run(_K: Rows, _P: Row, _M: Row, _place: Place):
         return
 
     @wp.func
@@ -64,24 +62,18 @@ def block_upright(fixed_body: str) -> BlockPlane:
         return
 
     @wp.func
-    def begin_step(_K: wp.array2d(dtype=wp.float64), _P: wp.array(dtype=wp.float64), _place: Place, _h: wp.float64):
+    def begin_step(_K: Rows, _P: Row, _place: Place, _h: wp.float64):
         return
 
     @wp.func
-    def end_step(
-        _K: wp.array2d(dtype=wp.float64),
-        _P: wp.array(dtype=wp.float64),
-        _M: wp.array(dtype=wp.float64),
-        _place: Place,
-        _h: wp.float64,
-    ):
+    def end_step(_K: Rows, _P: Row, _M: Row, _place: Place, _h: wp.float64):
         return
 
     @wp.func
     def meet(
-        K: wp.array2d(dtype=wp.float64),
-        _P: wp.array(dtype=wp.float64),
-        _M: wp.array(dtype=wp.float64),
+        K: Rows,
+        _P: Row,
+        _M: Row,
         place: Place,
         ground: Ground,
         chain: Chain,

@@ -69,7 +69,7 @@ from warpchain.kernels.layout import (
     UP,
 )
 from warpchain.kernels.physics.elementary import HALF, ONE, quotient
-from warpchain.kernels.types import Chain
+from warpchain.kernels.types import Chain, Row
 
 wp.set_module_options({"enable_backward": False})
 
@@ -90,7 +90,7 @@ def plane_load(chain: Chain, x: wp.float64, y: wp.float64, arm_x: wp.float64, ar
 
 
 @wp.func
-def on_plane(own: Chain, P: wp.array(dtype=wp.float64), first: int) -> Chain:
+def on_plane(own: Chain, P: Row, first: int) -> Chain:
     """The chain on the plane whose values begin at this row."""
     chain = own
     chain.plane_speed = P[first + PLANE_SPEED]
@@ -128,13 +128,7 @@ def place_terms(
 
 @wp.func
 def motion_terms(
-    mass: wp.float64,
-    inertia: wp.float64,
-    x: wp.float64,
-    y: wp.float64,
-    u: wp.float64,
-    v: wp.float64,
-    omega: wp.float64,
+    mass: wp.float64, inertia: wp.float64, x: wp.float64, y: wp.float64, u: wp.float64, v: wp.float64, omega: wp.float64
 ):
     """One link's part of the sums SUM_MU, SUM_MV and SUM_MOMENT, in that order."""
     mu = mass * u
@@ -143,7 +137,7 @@ def motion_terms(
 
 
 @wp.func
-def invert_plane_mass(P: wp.array(dtype=wp.float64)):
+def invert_plane_mass(P: Row):
     """Writes the inverse of the plane's mass matrix, from the sums."""
     a00 = P[SUM_MASS]
     a01 = P[SUM_MY]
@@ -164,7 +158,7 @@ def invert_plane_mass(P: wp.array(dtype=wp.float64)):
 
 
 @wp.func
-def plane_times_inverse(P: wp.array(dtype=wp.float64), q0: wp.float64, q1: wp.float64, q2: wp.float64):
+def plane_times_inverse(P: Row, q0: wp.float64, q1: wp.float64, q2: wp.float64):
     """A⁻¹ q: rates of (u, ω1, ω2) under generalised forces, or their change by impulses."""
     return (
         P[INVERSE_00] * q0 + P[INVERSE_01] * q1 + P[INVERSE_02] * q2,
@@ -186,7 +180,7 @@ class Plane:
 
 
 @wp.func
-def read_plane(P: wp.array(dtype=wp.float64), first: int) -> Plane:
+def read_plane(P: Row, first: int) -> Plane:
     """The plane whose values begin at this row."""
     plane = Plane()
     plane.speed = P[first + PLANE_SPEED]
@@ -199,7 +193,7 @@ def read_plane(P: wp.array(dtype=wp.float64), first: int) -> Plane:
 
 
 @wp.func
-def write_plane(P: wp.array(dtype=wp.float64), first: int, plane: Plane):
+def write_plane(P: Row, first: int, plane: Plane):
     """Writes a plane's values from this row on."""
     P[first + PLANE_SPEED] = plane.speed
     P[first + PLANE_TURN_X] = plane.turn_x
@@ -211,7 +205,7 @@ def write_plane(P: wp.array(dtype=wp.float64), first: int, plane: Plane):
 
 
 @wp.func
-def momenta(P: wp.array(dtype=wp.float64), plane: Plane):
+def momenta(P: Row, plane: Plane):
     """A (u, ω1, ω2), from the sums."""
     u = plane.speed
     w1 = plane.turn_x
@@ -224,7 +218,7 @@ def momenta(P: wp.array(dtype=wp.float64), plane: Plane):
 
 
 @wp.func
-def momentum_rates(P: wp.array(dtype=wp.float64), gravity: wp.float64, plane: Plane):
+def momentum_rates(P: Row, gravity: wp.float64, plane: Plane):
     """Rates of the plane's momenta, from the sums."""
     weight = gravity * plane.up[2]
     return (
@@ -252,7 +246,7 @@ def moved(start: Plane, slope: Plane, h: wp.float64) -> Plane:
 
 
 @wp.func
-def pushed(P: wp.array(dtype=wp.float64), gravity: wp.float64, start: Plane, slope: Plane, h: wp.float64) -> Plane:
+def pushed(P: Row, gravity: wp.float64, start: Plane, slope: Plane, h: wp.float64) -> Plane:
     """The plane ``start`` and h times the rates that it has at ``slope``, with A ν̇ = ṗ − Ȧ ν."""
     u = slope.speed
     w1 = slope.turn_x
@@ -284,7 +278,7 @@ def straightened(plane: Plane) -> Plane:
 
 
 @wp.func
-def begin_plane_step(P: wp.array(dtype=wp.float64), gravity: wp.float64, h: wp.float64):
+def begin_plane_step(P: Row, gravity: wp.float64, h: wp.float64):
     """Writes the mean of the plane over a step, and its momenta after the first half."""
     half = HALF * h
     plane = read_plane(P, 0)
@@ -300,7 +294,7 @@ def begin_plane_step(P: wp.array(dtype=wp.float64), gravity: wp.float64, h: wp.f
 
 
 @wp.func
-def end_plane_step(P: wp.array(dtype=wp.float64), gravity: wp.float64, h: wp.float64):
+def end_plane_step(P: Row, gravity: wp.float64, h: wp.float64):
     """Carries the plane to the end of the step that has begun; the sums must be those of the links there."""
     half = HALF * h
     inverse = ONE / h
@@ -322,7 +316,7 @@ def end_plane_step(P: wp.array(dtype=wp.float64), gravity: wp.float64, h: wp.flo
 
 
 @wp.func
-def plane_energy(P: wp.array(dtype=wp.float64)):
+def plane_energy(P: Row):
     """Energy [J] of the motion across the plane, from the sums."""
     plane = read_plane(P, 0)
     p0, p1, p2 = momenta(P, plane)

@@ -42,7 +42,7 @@ from warpchain.kernels.layout import (
     V,
 )
 from warpchain.kernels.physics.elementary import HALF, ONE, TWO
-from warpchain.kernels.types import Chain, Model
+from warpchain.kernels.types import Chain, Model, Rows
 
 wp.set_module_options({"enable_backward": False})
 
@@ -74,7 +74,7 @@ def under_load(own: Chain, factor: wp.float64) -> Chain:
 
 
 @wp.func
-def write_link(K: wp.array2d(dtype=wp.float64), model: Model, world: int, i: int, factor: wp.float64):
+def write_link(K: Rows, model: Model, world: int, i: int, factor: wp.float64):
     """Writes the constants of link i and of joint i, with loads multiplied by a factor, into their rows."""
     mass = model.links[world, OWN_MASS, i]
     length = TWO * model.chains[world].half_length
@@ -88,7 +88,7 @@ def write_link(K: wp.array2d(dtype=wp.float64), model: Model, world: int, i: int
 
 
 @wp.func
-def write_links(K: wp.array2d(dtype=wp.float64), model: Model, world: int, factor: wp.float64):
+def write_links(K: Rows, model: Model, world: int, factor: wp.float64):
     """Writes the constants of all links and joints, see :func:`write_link`."""
     i = int(0)
     while i < model.chains[world].link_count:
@@ -121,7 +121,7 @@ def crossing_time(speed: wp.float64, gravity: wp.float64, radius: wp.float64, he
 
 
 @wp.func
-def drag_shape(K: wp.array2d(dtype=wp.float64), chain: Chain, left: wp.float64):
+def drag_shape(K: Rows, chain: Chain, left: wp.float64):
     """Multiplies the part of each link's velocity that is across the path of the loop by ``left``."""
     n = chain.link_count
     i = int(0)

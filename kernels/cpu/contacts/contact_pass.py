@@ -17,7 +17,7 @@ from warpchain.kernels.cpu.upright import Plane
 from warpchain.kernels.events.tallies import add_count, book_loss, count_bounce, of_fixed_body, raise_extreme
 from warpchain.kernels.features import Features
 from warpchain.kernels.physics.elementary import ZERO
-from warpchain.kernels.types import Chain, Control, Drive, Ground, State
+from warpchain.kernels.types import Chain, Control, Drive, Ground, Integers, Row, Rows, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -40,15 +40,7 @@ def body_pass(features: Features, plane: Plane):
 
     @wp.func
     def meet_bodies(
-        K: wp.array2d(dtype=wp.float64),
-        P: wp.array(dtype=wp.float64),
-        chain: Chain,
-        felt: Chain,
-        ground: Ground,
-        still: Face,
-        drive: Drive,
-        state: State,
-        world: int,
+        K: Rows, P: Row, chain: Chain, felt: Chain, ground: Ground, still: Face, drive: Drive, state: State, world: int
     ):
         time = state.time[world]
         impulses = wp.int64(0)
@@ -90,30 +82,14 @@ def link_pass(features: Features, joints: Joints):
     margins = joints.margins
 
     @wp.func
-    def make_list(
-        K: wp.array2d(dtype=wp.float64),
-        L: wp.array(dtype=wp.int32),
-        chain: Chain,
-        state: State,
-        world: int,
-        skin: wp.float64,
-        opening: wp.float64,
-    ):
+    def make_list(K: Rows, L: Integers, chain: Chain, state: State, world: int, skin: wp.float64, opening: wp.float64):
         if wp.static(has_self):
             if not build_list(K, L, chain, skin, opening):
                 state.status[world] = LIST_OVERFLOW
             state.slack[world] = list_slack(K, chain, skin, opening)
 
     @wp.func
-    def meet_links(
-        K: wp.array2d(dtype=wp.float64),
-        L: wp.array(dtype=wp.int32),
-        chain: Chain,
-        state: State,
-        control: Control,
-        world: int,
-        opening: wp.float64,
-    ):
+    def meet_links(K: Rows, L: Integers, chain: Chain, state: State, control: Control, world: int, opening: wp.float64):
         impulses = wp.int64(0)
         if wp.static(has_self):
             skin, least_slack = margins(state, control, world)

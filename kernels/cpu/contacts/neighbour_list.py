@@ -15,13 +15,13 @@ from warpchain.kernels.contacts.pair_list import bucket_of, listing_reach
 from warpchain.kernels.layout import LISTED_X, LISTED_Y, RIGHT_X, RIGHT_Y
 from warpchain.kernels.physics.elementary import HALF, order_bits
 from warpchain.kernels.physics.geometry import whole_lanes
-from warpchain.kernels.types import Chain
+from warpchain.kernels.types import Chain, Integers, Rows
 
 wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
-def greatest_displacement(K: wp.array2d(dtype=wp.float64), chain: Chain):
+def greatest_displacement(K: Rows, chain: Chain):
     """Greatest displacement [m] of a joint since the list was built."""
     greatest = wp.int64(0)
     i = int(0)
@@ -39,7 +39,7 @@ def neighbour_list(columns: int):
     lists = list_layout(columns)
 
     @wp.func
-    def remember_positions(K: wp.array2d(dtype=wp.float64), chain: Chain):
+    def remember_positions(K: Rows, chain: Chain):
         i = int(0)
         while i < chain.link_count:
             K[LISTED_X, i] = K[RIGHT_X, i]
@@ -47,7 +47,7 @@ def neighbour_list(columns: int):
             i += 1
 
     @wp.func
-    def arrange(L: wp.array(dtype=wp.int32), total: int):
+    def arrange(L: Integers, total: int):
         """Sorts the pairs found, (p, q) ascending, by (p mod 2, q mod 2); the sort is stable."""
         kept = int(0)
         parity = int(0)
@@ -65,13 +65,7 @@ def neighbour_list(columns: int):
         L[wp.static(lists.count)] = total
 
     @wp.func
-    def build(
-        K: wp.array2d(dtype=wp.float64),
-        L: wp.array(dtype=wp.int32),
-        chain: Chain,
-        skin: wp.float64,
-        opening: wp.float64,
-    ):
+    def build(K: Rows, L: Integers, chain: Chain, skin: wp.float64, opening: wp.float64):
         n = chain.link_count
         reach = listing_reach(chain, skin, opening)
         square = reach * reach
@@ -127,6 +121,6 @@ def neighbour_list(columns: int):
 
 
 @wp.func
-def list_slack(K: wp.array2d(dtype=wp.float64), chain: Chain, skin: wp.float64, opening: wp.float64):
+def list_slack(K: Rows, chain: Chain, skin: wp.float64, opening: wp.float64):
     """How far joints may still move [m] before the list may lack a pair; 0 or less: the list is stale."""
     return HALF * skin - opening - greatest_displacement(K, chain)

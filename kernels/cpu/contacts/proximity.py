@@ -30,7 +30,7 @@ from warpchain.kernels.layout import (
 )
 from warpchain.kernels.physics.elementary import ONE, TWO, ZERO, from_order_key, order_bits, order_key
 from warpchain.kernels.physics.geometry import LANES, whole_lanes
-from warpchain.kernels.types import Chain, Ground
+from warpchain.kernels.types import Chain, Ground, Rows
 
 wp.set_module_options({"enable_backward": False})
 
@@ -40,7 +40,7 @@ GAP = ERROR
 
 
 @wp.func
-def greatest_opening(K: wp.array2d(dtype=wp.float64), chain: Chain):
+def greatest_opening(K: Rows, chain: Chain):
     """Greatest joint opening |C| [m] of the placed links."""
     greatest = wp.int64(0)
     i = int(0)
@@ -53,7 +53,7 @@ def greatest_opening(K: wp.array2d(dtype=wp.float64), chain: Chain):
 
 
 @wp.func
-def greatest_speed(K: wp.array2d(dtype=wp.float64), chain: Chain):
+def greatest_speed(K: Rows, chain: Chain):
     """A bound on the speed [m/s] of every circle's centre: the greatest √2 √(v² + (a ω)²) ≥ |v| + a |ω|."""
     greatest = wp.int64(0)
     i = int(0)
@@ -66,7 +66,7 @@ def greatest_speed(K: wp.array2d(dtype=wp.float64), chain: Chain):
 
 
 @wp.func
-def overlaps(K: wp.array2d(dtype=wp.float64), first: int):
+def overlaps(K: Rows, first: int):
     """Whether a link of the vector that begins at this column overlaps the body."""
     least = ONE
     for lane in range(wp.static(LANES)):
@@ -75,7 +75,7 @@ def overlaps(K: wp.array2d(dtype=wp.float64), first: int):
 
 
 @wp.func
-def placed_link(K: wp.array2d(dtype=wp.float64), i: int) -> Touching:
+def placed_link(K: Rows, i: int) -> Touching:
     """A placed link, as a fixed body meets it."""
     link = Touching()
     link.left_x = K[LEFT_X, i]
@@ -96,13 +96,13 @@ def placed_link(K: wp.array2d(dtype=wp.float64), i: int) -> Touching:
 
 
 @wp.func
-def endless_gap(_K: wp.array2d(dtype=wp.float64), _chain: Chain, _ground: Ground, _face: Face):
+def endless_gap(_K: Rows, _chain: Chain, _ground: Ground, _face: Face):
     """The gap [m] to no body."""
     return wp.float64(wp.inf)
 
 
 @wp.func
-def no_impulses(_K: wp.array2d(dtype=wp.float64), _chain: Chain, _ground: Ground, _face: Face):
+def no_impulses(_K: Rows, _chain: Chain, _ground: Ground, _face: Face):
     """The number of impulses of no body."""
     return wp.int64(0)
 
@@ -121,7 +121,7 @@ def fixed_contacts(fixed_body: str):
     in_cells = BODIES[fixed_body].in_cells
 
     @wp.func
-    def least_gap(K: wp.array2d(dtype=wp.float64), chain: Chain, ground: Ground, face: Face):
+    def least_gap(K: Rows, chain: Chain, ground: Ground, face: Face):
         least = FURTHEST
         i = int(0)
         while i < whole_lanes(chain.link_count):
@@ -132,7 +132,7 @@ def fixed_contacts(fixed_body: str):
         return from_order_key(least)
 
     @wp.func
-    def resolve(K: wp.array2d(dtype=wp.float64), chain: Chain, ground: Ground, face: Face):
+    def resolve(K: Rows, chain: Chain, ground: Ground, face: Face):
         impulses = wp.int64(0)
         first = int(0)
         while first < whole_lanes(chain.link_count):

@@ -28,7 +28,7 @@ from warpchain.kernels.contacts.link_pair import (
 from warpchain.kernels.contacts.list_layout import GEOMETRY_COLUMNS, GEOMETRY_ROWS, list_layout
 from warpchain.kernels.layout import LEFT_X, LEFT_Y, RIGHT_X, RIGHT_Y, X, Y
 from warpchain.kernels.physics.elementary import TWO, ZERO, order_bits
-from warpchain.kernels.types import Chain
+from warpchain.kernels.types import Chain, Integers, Rows
 
 wp.set_module_options({"enable_backward": False})
 
@@ -42,15 +42,7 @@ DEPTH, NORMAL_X, NORMAL_Y, A_N, A_T, B_N, B_T = range(7)
 
 
 @wp.func
-def copy_circle(
-    K: wp.array2d(dtype=wp.float64),
-    G: wp.array2d(dtype=wp.float64),
-    row: int,
-    k: int,
-    end_x: wp.float64,
-    end_y: wp.float64,
-    link: int,
-):
+def copy_circle(K: Rows, G: Rows, row: int, k: int, end_x: wp.float64, end_y: wp.float64, link: int):
     """Copies a circle and its link's centre of mass into column k of the scratch."""
     G[row + END_X, k] = end_x
     G[row + END_Y, k] = end_y
@@ -64,7 +56,7 @@ def self_contacts(columns: int):
     lists = list_layout(columns)
 
     @wp.func
-    def list_touching(K: wp.array2d(dtype=wp.float64), L: wp.array(dtype=wp.int32), chain: Chain, opening: wp.float64):
+    def list_touching(K: Rows, L: Integers, chain: Chain, opening: wp.float64):
         """Lists the pairs of joints that may touch, in the order of the list; returns their number."""
         reach = TWO * chain.circle_radius + TWO * opening
         square = reach * reach
@@ -83,14 +75,7 @@ def self_contacts(columns: int):
         return touching
 
     @wp.func
-    def copy_circles(
-        K: wp.array2d(dtype=wp.float64),
-        L: wp.array(dtype=wp.int32),
-        G: wp.array2d(dtype=wp.float64),
-        n: int,
-        first: int,
-        count: int,
-    ):
+    def copy_circles(K: Rows, L: Integers, G: Rows, n: int, first: int, count: int):
         """Copies the circles of ``count`` touching pairs of joints side by side."""
         k = int(0)
         while k < count:
@@ -104,16 +89,7 @@ def self_contacts(columns: int):
             k += 1
 
     @wp.func
-    def evaluate(
-        K: wp.array2d(dtype=wp.float64),
-        L: wp.array(dtype=wp.int32),
-        G: wp.array2d(dtype=wp.float64),
-        chain: Chain,
-        first: int,
-        count: int,
-        half: int,
-        second: int,
-    ):
+    def evaluate(K: Rows, L: Integers, G: Rows, chain: Chain, first: int, count: int, half: int, second: int):
         """Evaluates the geometry of one contact of a half for each of these pairs."""
         a = wp.where(second == 0, P_LEFT_HAND, P_RIGHT_HAND)
         b = wp.where(second == half, Q_LEFT_HAND, Q_RIGHT_HAND)
@@ -144,9 +120,7 @@ def self_contacts(columns: int):
             k += 1
 
     @wp.func
-    def resolve_self_contacts(
-        K: wp.array2d(dtype=wp.float64), L: wp.array(dtype=wp.int32), chain: Chain, opening: wp.float64
-    ):
+    def resolve_self_contacts(K: Rows, L: Integers, chain: Chain, opening: wp.float64):
         """Resolves all contacts of a chain whose list is made; ``opening``: greatest |C| [m].
 
         Returns:

@@ -17,7 +17,7 @@ from warpchain.kernels.cpu.tilting import greatest_tilting_speed
 from warpchain.kernels.features import Features
 from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, OMEGA, RIGHT_X, RIGHT_Y, SINE, U, V
 from warpchain.kernels.physics.elementary import HALF, ONE, TWO, ZERO, order_bits
-from warpchain.kernels.types import Chain, Control, State
+from warpchain.kernels.types import Chain, Control, Integers, Rows, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -32,7 +32,7 @@ SMALLEST_GAP = wp.constant(wp.float64(1e-9))
 
 
 @wp.func
-def meeting_of(K: wp.array2d(dtype=wp.float64), chain: Chain, p: int, q: int):
+def meeting_of(K: Rows, chain: Chain, p: int, q: int):
     """(Relative speed) / (distance) [1/s] of the circles of two joints."""
     a = chain.half_length
     dx = K[RIGHT_X, q] - K[RIGHT_X, p]
@@ -56,7 +56,7 @@ def fastest_approach(fixed_body: str):
         return wp.max(-(nx * u + ny * v), ZERO) / wp.max(gap, SMALLEST_GAP)
 
     @wp.func
-    def fastest(K: wp.array2d(dtype=wp.float64), chain: Chain, face: Face):
+    def fastest(K: Rows, chain: Chain, face: Face):
         greatest = wp.int64(0)
         i = int(0)
         while i < chain.link_count:
@@ -78,7 +78,7 @@ def fastest_meeting(columns: int):
     lists = list_layout(columns)
 
     @wp.func
-    def meeting(K: wp.array2d(dtype=wp.float64), L: wp.array(dtype=wp.int32), chain: Chain):
+    def meeting(K: Rows, L: Integers, chain: Chain):
         greatest = wp.int64(0)
         total = L[wp.static(lists.count)]
         k = int(0)
@@ -108,14 +108,7 @@ def step_bound(features: Features, has_flight: bool):
 
     @wp.func
     def bound(
-        K: wp.array2d(dtype=wp.float64),
-        L: wp.array(dtype=wp.int32),
-        chain: Chain,
-        face: Face,
-        control: Control,
-        state: State,
-        world: int,
-        longest: wp.float64,
+        K: Rows, L: Integers, chain: Chain, face: Face, control: Control, state: State, world: int, longest: wp.float64
     ):
         if wp.static(not (has_fixed or has_self)):
             return wp.float64(wp.inf)

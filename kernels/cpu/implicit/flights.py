@@ -15,15 +15,13 @@ from warpchain.kernels.methods.controller import classical_controller
 from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.methods.w_tableaus import ROS34PW2
 from warpchain.kernels.physics.elementary import ONE, ZERO
-from warpchain.kernels.types import Chain, Control, State
+from warpchain.kernels.types import Chain, Control, Rows, State
 
 wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
-def swap_models(
-    K: wp.array2d(dtype=wp.float64), chain: Chain, state: State, world: int, is_rigid: int, lost: wp.float64
-):
+def swap_models(K: Rows, chain: Chain, state: State, world: int, is_rigid: int, lost: wp.float64):
     """Goes on with the other model of the joints, and with the last step that was proposed for it."""
     state.is_rigid[world] = is_rigid
     step = state.step[world]
@@ -46,7 +44,7 @@ def rigid_in_flight(name: str, columns: int) -> Joints:
     spring_shrinkage, spring_accept = on_springs.shrinkage, on_springs.accept
 
     @wp.func
-    def settle(K: wp.array2d(dtype=wp.float64), chain: Chain, state: State, world: int):
+    def settle(K: Rows, chain: Chain, state: State, world: int):
         # soft joints are not made rigid: their springs still ring when the next impulse comes
         time = state.time[world]
         if state.is_rigid[world] == 0 and time >= state.closing_time[world] and state.softness[world] == ZERO:
@@ -57,19 +55,13 @@ def rigid_in_flight(name: str, columns: int) -> Joints:
                 swap_models(K, chain, state, world, 1, lost)
 
     @wp.func
-    def first_stage(K: wp.array2d(dtype=wp.float64), chain: Chain, state: State, world: int):
+    def first_stage(K: Rows, chain: Chain, state: State, world: int):
         if state.is_rigid[world] == 0:
             spring_stage(K, chain, state, world)
 
     @wp.func
     def attempt(
-        K: wp.array2d(dtype=wp.float64),
-        chain: Chain,
-        state: State,
-        control: Control,
-        world: int,
-        h: wp.float64,
-        tolerance: wp.float64,
+        K: Rows, chain: Chain, state: State, control: Control, world: int, h: wp.float64, tolerance: wp.float64
     ):
         bits = wp.int64(0)
         if state.is_rigid[world] == 0:
@@ -85,15 +77,7 @@ def rigid_in_flight(name: str, columns: int) -> Joints:
         return shrink(error)
 
     @wp.func
-    def accept(
-        K: wp.array2d(dtype=wp.float64),
-        chain: Chain,
-        state: State,
-        control: Control,
-        world: int,
-        h: wp.float64,
-        error: wp.float64,
-    ):
+    def accept(K: Rows, chain: Chain, state: State, control: Control, world: int, h: wp.float64, error: wp.float64):
         may_stay = bool(True)
         factor = ONE
         if state.is_rigid[world] == 0:
@@ -113,7 +97,7 @@ def rigid_in_flight(name: str, columns: int) -> Joints:
         return skin, least_slack
 
     @wp.func
-    def react(K: wp.array2d(dtype=wp.float64), chain: Chain, state: State, world: int):
+    def react(K: Rows, chain: Chain, state: State, world: int):
         state.closing_time[world] = state.time[world] + QUIET_TIME
         if state.is_rigid[world] != 0:
             swap_models(K, chain, state, world, 0, open_joints(K, chain))

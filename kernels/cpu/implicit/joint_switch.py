@@ -19,7 +19,7 @@ from warpchain.kernels.cpu.implicit.rigid_layout import BASE, FORCE, force_layou
 from warpchain.kernels.cpu.implicit.solver import link_at, place_column, segment_places
 from warpchain.kernels.layout import X
 from warpchain.kernels.physics.elementary import ONE, TWO, ZERO
-from warpchain.kernels.types import Chain
+from warpchain.kernels.types import Chain, Rows
 
 wp.set_module_options({"enable_backward": False})
 
@@ -48,7 +48,7 @@ def joint_switch(columns: int, first_row: int):
     right = force_layout(columns).right
 
     @wp.func
-    def close_joints(K: wp.array2d(dtype=wp.float64), chain: Chain):
+    def close_joints(K: Rows, chain: Chain):
         S = flight_rows(K)
         R = force_rows(K)
         places, full, _ = segment_places(chain.link_count)
@@ -71,7 +71,7 @@ def joint_switch(columns: int, first_row: int):
         return closed, held + ringing
 
     @wp.func
-    def open_joints(K: wp.array2d(dtype=wp.float64), chain: Chain):
+    def open_joints(K: Rows, chain: Chain):
         S = flight_rows(K)
         R = force_rows(K)
         n = chain.link_count

@@ -49,7 +49,7 @@ from warpchain.kernels.layout import STAGES, X
 from warpchain.kernels.physics.elementary import HALF, ONE, ZERO, cos_sin, order_bits
 from warpchain.kernels.physics.joint import friction_torque
 from warpchain.kernels.physics.rigid_joint import inward_pull, opening_rate_of, pushed, turning_share
-from warpchain.kernels.types import Chain
+from warpchain.kernels.types import Chain, Rows
 
 wp.set_module_options({"enable_backward": False})
 
@@ -124,7 +124,7 @@ def rigid_joints(columns: int) -> RigidJoints:
     pad_solution = pad_joints((right, right + 1))
 
     @wp.func
-    def load(S: wp.array2d(dtype=wp.float64), K: wp.array2d(dtype=wp.float64), chain: Chain):
+    def load(S: Rows, K: Rows, chain: Chain):
         n = chain.link_count
         places, full, _ = segment_places(n)
         p = int(0)
@@ -144,7 +144,7 @@ def rigid_joints(columns: int) -> RigidJoints:
         pad_constants(S, places, full)
 
     @wp.func
-    def store(S: wp.array2d(dtype=wp.float64), K: wp.array2d(dtype=wp.float64), chain: Chain):
+    def store(S: Rows, K: Rows, chain: Chain):
         n = chain.link_count
         places, full, _ = segment_places(n)
         p = int(0)
@@ -161,7 +161,7 @@ def rigid_joints(columns: int) -> RigidJoints:
             p += 1
 
     @wp.func
-    def assemble(S: wp.array2d(dtype=wp.float64), chain: Chain, places: int, full: int):
+    def assemble(S: Rows, chain: Chain, places: int, full: int):
         a = chain.half_length
         pad_directions(S, places, full)
         end = place_column(places + 1)
@@ -187,19 +187,17 @@ def rigid_joints(columns: int) -> RigidJoints:
             c += 1
 
     @wp.func
-    def factorise(
-        S: wp.array2d(dtype=wp.float64), R: wp.array2d(dtype=wp.float64), chain: Chain, places: int, full: int
-    ):
+    def factorise(S: Rows, R: Rows, chain: Chain, places: int, full: int):
         assemble(S, chain, places, full)
         factor(S, R, places, full)
 
     @wp.func
-    def solve_joints(S: wp.array2d(dtype=wp.float64), R: wp.array2d(dtype=wp.float64), places: int, full: int):
+    def solve_joints(S: Rows, R: Rows, places: int, full: int):
         solve(S, R, places)
         pad_solution(S, places, full)
 
     @wp.func
-    def pushed_at(S: wp.array2d(dtype=wp.float64), a: wp.float64, c: int):
+    def pushed_at(S: Rows, a: wp.float64, c: int):
         """Change of the link of a column by the last solution, forces or impulses of the joints."""
         ax, ay, turn = pushed(
             a,
@@ -215,9 +213,7 @@ def rigid_joints(columns: int) -> RigidJoints:
         return ax, ay, turn
 
     @wp.func
-    def solve_forces(
-        S: wp.array2d(dtype=wp.float64), R: wp.array2d(dtype=wp.float64), chain: Chain, places: int, full: int
-    ):
+    def solve_forces(S: Rows, R: Rows, chain: Chain, places: int, full: int):
         a = chain.half_length
         end = place_column(places + 1)
         c = int(8)
@@ -252,7 +248,7 @@ def rigid_joints(columns: int) -> RigidJoints:
         """Warp function that adds the changes by the last solution to three rows from this one on."""
 
         @wp.func
-        def push(S: wp.array2d(dtype=wp.float64), chain: Chain, places: int):
+        def push(S: Rows, chain: Chain, places: int):
             a = chain.half_length
             end = place_column(places + 1)
             c = int(8)
@@ -268,7 +264,7 @@ def rigid_joints(columns: int) -> RigidJoints:
     displace, push = pusher(BASE), pusher(BASE + 3)
 
     @wp.func
-    def openings(S: wp.array2d(dtype=wp.float64), chain: Chain, places: int, full: int):
+    def openings(S: Rows, chain: Chain, places: int, full: int):
         a = chain.half_length
         end = place_column(places + 1)
         c = int(8)
@@ -293,7 +289,7 @@ def rigid_joints(columns: int) -> RigidJoints:
         return wp.sqrt(wp.cast(greatest, wp.float64))
 
     @wp.func
-    def opening_rates(S: wp.array2d(dtype=wp.float64), chain: Chain, places: int, full: int):
+    def opening_rates(S: Rows, chain: Chain, places: int, full: int):
         """Sets the right-hand side to Ċ."""
         a = chain.half_length
         end = place_column(places + 1)
@@ -319,7 +315,7 @@ def rigid_joints(columns: int) -> RigidJoints:
             c += 1
 
     @wp.func
-    def stretching(S: wp.array2d(dtype=wp.float64), chain: Chain, places: int):
+    def stretching(S: Rows, chain: Chain, places: int):
         total = ZERO
         c = int(8)
         while c < place_column(places + 1):
@@ -330,13 +326,7 @@ def rigid_joints(columns: int) -> RigidJoints:
         return HALF * chain.joint_stiffness * total
 
     @wp.func
-    def close(
-        rows: wp.array2d(dtype=wp.float64),
-        separators: wp.array2d(dtype=wp.float64),
-        chain: Chain,
-        places: int,
-        full: int,
-    ):
+    def close(rows: Rows, separators: Rows, chain: Chain, places: int, full: int):
         # clang does not inline this function: its loops vectorise only if static shapes are given here again
         S = wp.array(ptr=rows.ptr, shape=(wp.static(ROWS_OF_RIGID), wp.static(width)), dtype=wp.float64)
         R = wp.array(ptr=separators.ptr, shape=(wp.static(separator_rows), LANES), dtype=wp.float64)
@@ -361,7 +351,7 @@ def rigid_joints(columns: int) -> RigidJoints:
         return widest <= CLOSED
 
     @wp.func
-    def begin(S: wp.array2d(dtype=wp.float64), R: wp.array2d(dtype=wp.float64), chain: Chain, places: int, full: int):
+    def begin(S: Rows, R: Rows, chain: Chain, places: int, full: int):
         end = place_column(places + 1)
         c = int(8)
         while c < end:
@@ -377,7 +367,7 @@ def rigid_joints(columns: int) -> RigidJoints:
             c += 1
 
     @wp.func
-    def kinetic_energy(S: wp.array2d(dtype=wp.float64), end: int):
+    def kinetic_energy(S: Rows, end: int):
         total = ZERO
         c = int(8)
         while c < end:
@@ -389,7 +379,7 @@ def rigid_joints(columns: int) -> RigidJoints:
         return HALF * total
 
     @wp.func
-    def are_stiff(S: wp.array2d(dtype=wp.float64), chain: Chain, end: int):
+    def are_stiff(S: Rows, chain: Chain, end: int):
         square = ZERO
         c = int(8)
         while c < end:

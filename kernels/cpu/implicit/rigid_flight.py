@@ -65,7 +65,7 @@ from warpchain.kernels.methods.controller import error_bits
 from warpchain.kernels.methods.w_tableaus import ROS34PW2
 from warpchain.kernels.physics.elementary import ONE, TWO, ZERO, cos_sin, order_bits
 from warpchain.kernels.physics.rigid_joint import steepness, switch_smoothing
-from warpchain.kernels.types import Chain
+from warpchain.kernels.types import Chain, Rows
 
 wp.set_module_options({"enable_backward": False})
 
@@ -119,7 +119,7 @@ def flight_method(columns: int, first_row: int):
     first = FIRST_STAGE_ROW
 
     @wp.func
-    def prepare(S: wp.array2d(dtype=wp.float64), chain: Chain, h: wp.float64, places: int, full: int):
+    def prepare(S: Rows, chain: Chain, h: wp.float64, places: int, full: int):
         """Smoothing and slopes of friction for a step h, and the matrix of its stages."""
         a = chain.half_length
         g = wp.static(wp.float64(gamma)) * h
@@ -181,7 +181,7 @@ def flight_method(columns: int, first_row: int):
             c += 1
 
     @wp.func
-    def place_stage(S: wp.array2d(dtype=wp.float64), stage: int, end: int):
+    def place_stage(S: Rows, stage: int, end: int):
         """Directions and rates of a stage, and Σ γ_ij k_j of the rates."""
         for i in range(wp.static(stages)):
             if stage == i:
@@ -221,14 +221,7 @@ def flight_method(columns: int, first_row: int):
             c += 1
 
     @wp.func
-    def damp(
-        S: wp.array2d(dtype=wp.float64),
-        R: wp.array2d(dtype=wp.float64),
-        h: wp.float64,
-        weight: wp.float64,
-        places: int,
-        full: int,
-    ):
+    def damp(S: Rows, R: Rows, h: wp.float64, weight: wp.float64, places: int, full: int):
         """Solves for (λ, y) of a stage from its accelerations; adds its part of the power lost to friction."""
         end = place_column(places + 1)
         c = int(8)
@@ -254,7 +247,7 @@ def flight_method(columns: int, first_row: int):
         pad_solution(S, places, full)
 
     @wp.func
-    def keep_stage(S: wp.array2d(dtype=wp.float64), stage: int, h: wp.float64, end: int):
+    def keep_stage(S: Rows, stage: int, h: wp.float64, end: int):
         """Stores k of a stage."""
         for i in range(wp.static(stages)):
             if stage == i:
@@ -278,7 +271,7 @@ def flight_method(columns: int, first_row: int):
                     c += 1
 
     @wp.func
-    def attempt(K: wp.array2d(dtype=wp.float64), chain: Chain, h: wp.float64, tolerance: wp.float64):
+    def attempt(K: Rows, chain: Chain, h: wp.float64, tolerance: wp.float64):
         S = flight_rows_of(K)
         R = force_rows_of(K)
         Q = friction_rows_of(K)
@@ -326,7 +319,7 @@ def flight_method(columns: int, first_row: int):
         return greatest
 
     @wp.func
-    def commit(K: wp.array2d(dtype=wp.float64), chain: Chain, h: wp.float64):
+    def commit(K: Rows, chain: Chain, h: wp.float64):
         S = flight_rows_of(K)
         R = force_rows_of(K)
         n = chain.link_count

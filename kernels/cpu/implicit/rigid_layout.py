@@ -10,6 +10,7 @@ import warp as wp
 
 from warpchain.kernels.cpu.implicit.solver import LANES, SegmentLayout, segment_columns
 from warpchain.kernels.methods.w_tableaus import ROS34PW2
+from warpchain.kernels.types import Rows
 
 wp.set_module_options({"enable_backward": False})
 
@@ -60,7 +61,7 @@ def pad_behind(rows: tuple[int, ...]):
     """Warp function that copies, in these rows, the next segment's first link behind each segment's last."""
 
     @wp.func
-    def pad(S: wp.array2d(dtype=wp.float64), places: int, full: int):
+    def pad(S: Rows, places: int, full: int):
         s = int(0)
         while s < 8:
             after = (s + 1) % 8
@@ -77,7 +78,7 @@ def pad_joints(rows: tuple[int, ...]):
     """Warp function that copies, in these rows, the previous joint before each segment's first place."""
 
     @wp.func
-    def pad(S: wp.array2d(dtype=wp.float64), places: int, full: int):
+    def pad(S: Rows, places: int, full: int):
         s = int(0)
         while s < 8:
             # a short segment repeats the last joint of the segment before; that one's predecessor is copied

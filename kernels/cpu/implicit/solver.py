@@ -17,6 +17,8 @@ from dataclasses import dataclass
 
 import warp as wp
 
+from warpchain.kernels.types import Rows
+
 wp.set_module_options({"enable_backward": False})
 
 LANES = 8
@@ -66,7 +68,7 @@ def view(offset: int, rows: int, columns: int):
     """Warp function ``at(K)`` → (rows, columns) numbers that lie at an offset [B] in a chain's scratch."""
 
     @wp.func
-    def at(K: wp.array2d(dtype=wp.float64)):
+    def at(K: Rows):
         return wp.array(
             ptr=K.ptr + wp.uint64(wp.static(offset)), shape=(wp.static(rows), wp.static(columns)), dtype=wp.float64
         )
@@ -336,11 +338,11 @@ def cyclic_solver(layout: SegmentLayout):
     def solve_lanes(segments: wp.uint64, separators: wp.uint64, places: int): ...
 
     @wp.func
-    def factor(S: wp.array2d(dtype=wp.float64), R: wp.array2d(dtype=wp.float64), places: int, full: int):
+    def factor(S: Rows, R: Rows, places: int, full: int):
         factor_lanes(S.ptr, R.ptr, places, full)
 
     @wp.func
-    def solve(S: wp.array2d(dtype=wp.float64), R: wp.array2d(dtype=wp.float64), places: int):
+    def solve(S: Rows, R: Rows, places: int):
         solve_lanes(S.ptr, R.ptr, places)
 
     return factor, solve

@@ -16,7 +16,7 @@ from warpchain.kernels.gpu.contacts.self_contacts import TouchLayout, block_self
 from warpchain.kernels.gpu.stage import Place, Proximity, constants
 from warpchain.kernels.gpu.threads import barrier_if_any
 from warpchain.kernels.gpu.upright import BlockPlane
-from warpchain.kernels.types import Control, Drive, Ground, State
+from warpchain.kernels.types import Control, Drive, Ground, Integers, Row, Rows, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -48,10 +48,10 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
 
     @wp.func
     def begin(
-        K: wp.array2d(dtype=wp.float64),
-        L: wp.array(dtype=wp.int32),
-        P: wp.array(dtype=wp.float64),
-        M: wp.array(dtype=wp.float64),
+        K: Rows,
+        L: Integers,
+        P: Row,
+        M: Row,
         state: State,
         control: Control,
         place: Place,
@@ -77,13 +77,13 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
 
     @wp.func
     def meet(
-        K: wp.array2d(dtype=wp.float64),
-        L: wp.array(dtype=wp.int32),
-        T: wp.array(dtype=wp.int32),
-        E: wp.array2d(dtype=wp.float64),
-        F: wp.array2d(dtype=wp.float64),
-        P: wp.array(dtype=wp.float64),
-        M: wp.array(dtype=wp.float64),
+        K: Rows,
+        L: Integers,
+        T: Integers,
+        E: Rows,
+        F: Rows,
+        P: Row,
+        M: Row,
         drive: Drive,
         state: State,
         control: Control,

@@ -11,7 +11,7 @@ from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.contacts.pair_list import bucket_of, listing_reach
 from warpchain.kernels.gpu.threads import barrier
 from warpchain.kernels.layout import BOARD_LISTED_X, BOARD_LISTED_Y, RIGHT_X, RIGHT_Y
-from warpchain.kernels.types import Chain
+from warpchain.kernels.types import Chain, Integers, Rows
 
 wp.set_module_options({"enable_backward": False})
 
@@ -27,7 +27,7 @@ def block_list(columns: int, block_dim: int):
     lists = list_layout(columns)
 
     @wp.func
-    def search_cells(K: wp.array2d(dtype=wp.float64), L: wp.array(dtype=wp.int32), p: int, square: wp.float64):
+    def search_cells(K: Rows, L: Integers, p: int, square: wp.float64):
         near = int(0)
         while near < 9:
             cell_x = L[wp.static(lists.cell_x) + p] + near % 3 - 1
@@ -47,14 +47,7 @@ def block_list(columns: int, block_dim: int):
             near += 1
 
     @wp.func
-    def build(
-        K: wp.array2d(dtype=wp.float64),
-        L: wp.array(dtype=wp.int32),
-        chain: Chain,
-        lane: int,
-        skin: wp.float64,
-        opening: wp.float64,
-    ):
+    def build(K: Rows, L: Integers, chain: Chain, lane: int, skin: wp.float64, opening: wp.float64):
         """For all threads; the board's rows RIGHT_X and RIGHT_Y are written, and a barrier has passed."""
         n = chain.link_count
         reach = listing_reach(chain, skin, opening)

@@ -14,7 +14,7 @@ from warpchain.kernels.gpu.threads import block_maxima, vec4i
 from warpchain.kernels.layout import COSINE, INVERSE_INERTIA, INVERSE_MASS, OMEGA, SINE, U, V
 from warpchain.kernels.methods.controller import quick_quotient, quick_root
 from warpchain.kernels.physics.elementary import TWO, from_order_key_single, order_bits_single, order_key_single
-from warpchain.kernels.types import Chain, Control, Drive, Ground, State
+from warpchain.kernels.types import Chain, Control, Drive, Ground, Rows, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -60,14 +60,7 @@ def block_proximity(features: Features, block_dim: int):
     _maximum, write_maxima, read_maxima = block_maxima(block_dim)
 
     @wp.func
-    def write_proximity(
-        K: wp.array2d(dtype=wp.float64),
-        memory: wp.uint64,
-        place: Place,
-        ground: Ground,
-        link: Link,
-        next_end: vec5d,
-    ):
+    def write_proximity(K: Rows, memory: wp.uint64, place: Place, ground: Ground, link: Link, next_end: vec5d):
         """Writes a link's share of the maxima; computed in double, compared in single precision."""
         left_x, left_y, right_x, right_y = ends_of(link)
         values = vec4i(0, order_key_single(wp.float32(-wp.inf)), 0, 0)
@@ -134,15 +127,7 @@ def block_contact(fixed_body: str):
     face_of, face_at = BODIES[fixed_body].face, BODIES[fixed_body].motion
 
     @wp.func
-    def meet_body(
-        K: wp.array2d(dtype=wp.float64),
-        place: Place,
-        ground: Ground,
-        chain: Chain,
-        drive: Drive,
-        world: int,
-        time: wp.float64,
-    ):
+    def meet_body(K: Rows, place: Place, ground: Ground, chain: Chain, drive: Drive, world: int, time: wp.float64):
         link = placed_link(chain, read_link(K, place.lane))
         link.cosine = K[COSINE, place.lane]
         link.sine = K[SINE, place.lane]
@@ -166,14 +151,7 @@ def moving_sprocket_contact():
 
     @wp.func
     def meet_and_count(
-        K: wp.array2d(dtype=wp.float64),
-        place: Place,
-        ground: Ground,
-        chain: Chain,
-        drive: Drive,
-        state: State,
-        world: int,
-        time: wp.float64,
+        K: Rows, place: Place, ground: Ground, chain: Chain, drive: Drive, state: State, world: int, time: wp.float64
     ):
         hits = meet_sprocket(K, place, ground, chain, drive, world, time)
         if hits > 0:

@@ -21,7 +21,7 @@ from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.gpu.threads import barrier, barrier_if_any
 from warpchain.kernels.layout import BOARD_LOST_SELF, RIGHT_X, RIGHT_Y, consecutive_offsets
 from warpchain.kernels.physics.elementary import TWO, ZERO
-from warpchain.kernels.types import Chain
+from warpchain.kernels.types import Chain, Integers, Rows
 
 wp.set_module_options({"enable_backward": False})
 
@@ -123,14 +123,14 @@ def links_at(key: int, n: int):
 
 
 @wp.func
-def claim(T: wp.array(dtype=wp.int32), owners: int, link_a: int, link_b: int, key: int):
+def claim(T: Integers, owners: int, link_a: int, link_b: int, key: int):
     """Writes a contact's key to both links if none there is smaller."""
     wp.atomic_min(T, natural(owners + link_a), key)
     wp.atomic_min(T, natural(owners + link_b), key)
 
 
 @wp.func
-def owns_links(T: wp.array(dtype=wp.int32), owners: int, link_a: int, link_b: int, key: int):
+def owns_links(T: Integers, owners: int, link_a: int, link_b: int, key: int):
     """Whether a contact owns both links: no pending contact of theirs has a smaller key."""
     return T[natural(owners + link_a)] == key and T[natural(owners + link_b)] == key
 
@@ -141,7 +141,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
     lists = list_layout(columns)
 
     @wp.func
-    def clear(T: wp.array(dtype=wp.int32), lane: int, n: int):
+    def clear(T: Integers, lane: int, n: int):
         """Before a barrier that precedes ``find``."""
         if lane < n:
             T[wp.static(touch.owners) + lane] = FREE
@@ -151,7 +151,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
             T[wp.static(touch.touching)] = 0
 
     @wp.func
-    def pair_at(L: wp.array(dtype=wp.int32), T: wp.array(dtype=wp.int32), k: int):
+    def pair_at(L: Integers, T: Integers, k: int):
         pair = int(0)
         if k < wp.static(touch.shared_pairs):
             pair = T[wp.static(touch.pairs) + k]
@@ -160,7 +160,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         return pair
 
     @wp.func
-    def order(L: wp.array(dtype=wp.int32), T: wp.array(dtype=wp.int32), lane: int, touching: int):
+    def order(L: Integers, T: Integers, lane: int, touching: int):
         """Sorts the pairs by their keys.
 
         It is called when not every contact has a thread of its own. A thread's first contact takes other code than
@@ -188,15 +188,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         barrier()
 
     @wp.func
-    def find(
-        K: wp.array2d(dtype=wp.float64),
-        L: wp.array(dtype=wp.int32),
-        T: wp.array(dtype=wp.int32),
-        chain: Chain,
-        lane: int,
-        pairs: int,
-        opening: wp.float64,
-    ):
+    def find(K: Rows, L: Integers, T: Integers, chain: Chain, lane: int, pairs: int, opening: wp.float64):
         """Number of pairs of joints that may touch now; the board is written. ``opening``: greatest |C| [m]."""
         reach = TWO * chain.circle_radius + TWO * opening
         square = reach * reach
@@ -220,26 +212,16 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         return touching
 
     @wp.func
-    def raise_depth(T: wp.array(dtype=wp.int32), depth: wp.float64):
+    def raise_depth(T: Integers, depth: wp.float64):
         wp.atomic_max(T, wp.static(touch.deepest), wp.cast(wp.float32(depth), wp.int32))
 
     @wp.func
-    def count_strands(T: wp.array(dtype=wp.int32), chain: Chain, link_a: int, link_b: int, hits: wp.int64):
+    def count_strands(T: Integers, chain: Chain, link_a: int, link_b: int, hits: wp.int64):
         if are_strands(link_a, link_b, chain.link_count):
             wp.atomic_add(T, wp.static(touch.strand_hits), int(hits))
 
     @wp.func
-    def prepare(
-        K: wp.array2d(dtype=wp.float64),
-        T: wp.array(dtype=wp.int32),
-        E: wp.array2d(dtype=wp.float64),
-        F: wp.array2d(dtype=wp.float64),
-        chain: Chain,
-        pair: int,
-        half: int,
-        second: int,
-        lane: int,
-    ):
+    def prepare(K: Rows, T: Integers, E: Rows, F: Rows, chain: Chain, pair: int, half: int, second: int, lane: int):
         """Stores the geometry of a thread's first contact but its depth [m].
 
         Returns:
@@ -264,15 +246,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
 
     @wp.func
     def resolve_prepared(
-        K: wp.array2d(dtype=wp.float64),
-        T: wp.array(dtype=wp.int32),
-        E: wp.array2d(dtype=wp.float64),
-        F: wp.array2d(dtype=wp.float64),
-        chain: Chain,
-        link_a: int,
-        link_b: int,
-        lane: int,
-        depth: wp.float64,
+        K: Rows, T: Integers, E: Rows, F: Rows, chain: Chain, link_a: int, link_b: int, lane: int, depth: wp.float64
     ):
         """Resolves a thread's first contact; returns the number of impulses."""
         lost_before = K[BOARD_LOST_SELF, link_a]
@@ -296,9 +270,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         return int(hits)
 
     @wp.func
-    def overlaps(
-        K: wp.array2d(dtype=wp.float64), T: wp.array(dtype=wp.int32), chain: Chain, pair: int, half: int, second: int
-    ):
+    def overlaps(K: Rows, T: Integers, chain: Chain, pair: int, half: int, second: int):
         """1 if the circles of a further contact overlap, else 0; raises the greatest depth."""
         depth, _nx, _ny, _a_n, _a_t, _b_n, _b_t, _inverse_nn, _inverse_determinant = touching_circles(
             K, chain, first_joint(pair), second_joint(pair), half, second
@@ -307,9 +279,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         return wp.where(depth > ZERO, 1, 0)
 
     @wp.func
-    def resolve_further(
-        K: wp.array2d(dtype=wp.float64), T: wp.array(dtype=wp.int32), chain: Chain, key: int, link_a: int, link_b: int
-    ):
+    def resolve_further(K: Rows, T: Integers, chain: Chain, key: int, link_a: int, link_b: int):
         """Resolves a further contact; returns the number of impulses."""
         depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = touching_circles(
             K, chain, first_joint(pair_of(key)), second_joint(pair_of(key)), half_of(key), key & 1
@@ -322,16 +292,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         return int(hits)
 
     @wp.func
-    def resolve(
-        K: wp.array2d(dtype=wp.float64),
-        L: wp.array(dtype=wp.int32),
-        T: wp.array(dtype=wp.int32),
-        E: wp.array2d(dtype=wp.float64),
-        F: wp.array2d(dtype=wp.float64),
-        chain: Chain,
-        lane: int,
-        touching: int,
-    ):
+    def resolve(K: Rows, L: Integers, T: Integers, E: Rows, F: Rows, chain: Chain, lane: int, touching: int):
         """Resolves all contacts; the board is written. Returns this thread's impulses and ends with a barrier.
 
         A thread keeps the geometry of its first contact in its columns of E and F. With more contacts than threads, the
