@@ -4,7 +4,6 @@ import inspect
 import io
 import re
 import sys
-import types
 
 import numpy as np
 import pandas
@@ -200,22 +199,16 @@ def test_a_terminal_shows_a_bar(tmp_path, monkeypatch):
     assert "1 of 1 walks" in text and "1 time_limit" in text
 
 
-def test_a_notebook_shows_a_bar(tmp_path, monkeypatch):
-    """One output of the cell, which is updated until all walks are done."""
-    shown = []
-
-    class Handle:
-        def update(self, content, raw):
-            shown.append(content)
-
-    def display(content, raw, display_id):
-        shown.append(content)
-        return Handle()
-
-    kernel = types.SimpleNamespace(config={"IPKernelApp": {}})
-    monkeypatch.setitem(sys.modules, "IPython", types.SimpleNamespace(get_ipython=lambda: kernel))
-    monkeypatch.setitem(sys.modules, "IPython.display", types.SimpleNamespace(display=display))
+def test_a_notebook_shows_a_line(tmp_path, monkeypatch):
+    """In the output of the cell, of sweeps and of walks, which are silent in a terminal."""
+    screen = type("OutStream", (io.StringIO,), {"__module__": "ipykernel.iostream"})()
+    monkeypatch.setattr(sys, "stdout", screen)
     warpchain.sweep(grid={"links": [30]}, samples=1, scene=SHORT, preset="soft", out=tmp_path / "shown")
-    assert shown[0]["text/plain"].startswith("compiling kernels")
-    assert shown[-1]["text/plain"].startswith("1 of 1 walks") and shown[-1]["text/plain"].endswith("1 time_limit")
-    assert '<progress value="1" max="1">' in shown[-1]["text/html"]
+    lines = screen.getvalue().split("\r")
+    assert "compiling kernels" in lines[1] and "[##########] 1 of 1 walks" in lines[-1] and "1 time_limit" in lines[-1]
+    warpchain.walk(links=30, preset="soft", **SHORT)
+    assert "compiling kernels" in screen.getvalue().splitlines()[1]
+    monkeypatch.setattr(sys, "stdout", Terminal())
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    warpchain.walk(links=30, preset="soft", **SHORT)
+    assert sys.stdout.getvalue() == sys.stderr.getvalue() == ""

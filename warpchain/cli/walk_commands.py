@@ -78,7 +78,7 @@ def walk(
     as_json: Annotated[bool, JSON] = False,
 ) -> None:
     """Spin up one chain, drop it, and follow it until it rests."""
-    from warpchain.cli.terminal import print_walk, progress_text, status_line
+    from warpchain.cli.terminal import print_walk
     from warpchain.cli.walk_files import try_walk_folder, write_walk
     from warpchain.inputs.distributions import LARGEST_SEED
     from warpchain.inputs.options import replaced_by
@@ -86,6 +86,7 @@ def walk(
     from warpchain.inputs.setup import DEFAULT_PRESET, continued, read_setup
     from warpchain.inputs.validation import InputError, checked_whole, printable
     from warpchain.inputs.yaml_files import parse_yaml
+    from warpchain.run.progress_bar import changing_line, walk_progress_text
     from warpchain.run.single_walk import complete_setup
     from warpchain.walks.one_walk import run_walk
 
@@ -114,13 +115,13 @@ def walk(
     interval = _frame_interval(folder, animation, frame_interval, record_loads)
     if folder is not None:
         try_walk_folder(folder, animation)
-    with status_line() as show:
+    with changing_line() as show:
         result = run_walk(
             setup,
             seed=number,
             frame_interval=interval,
             record_loads=record_loads,
-            on_progress=lambda progress: show(progress_text(progress)),
+            on_progress=show and (lambda progress: show(walk_progress_text(progress))),
         )
     if as_json:
         print(json.dumps(result.to_dict(), indent=2, allow_nan=False))

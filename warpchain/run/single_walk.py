@@ -8,7 +8,7 @@ from warpchain.inputs.sections import by_section, takes_fields
 from warpchain.inputs.setup import DEFAULT_PRESET, Setup, continued, resolve
 from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError, checked_whole, full_name, plain, shown
-from warpchain.run.progress_bar import walk_in_notebook
+from warpchain.run.progress_bar import changing_line, walk_progress_text
 from warpchain.walks.one_walk import OnProgress, run_walk
 from warpchain.walks.walk_result import WalkResult
 
@@ -91,14 +91,15 @@ def walk(
         setup = complete_setup(DEFAULT_PRESET if preset is None else preset, by_section(given), seed, loads)
     else:
         _check_repeated(setup, given if preset is None else {"preset": preset, **given}, seed)
-    return run_walk(
-        setup,
-        seed=seed,
-        frame_interval=frame_interval,
-        record_before=record_before,
-        record_loads=loads,
-        on_progress=on_progress or walk_in_notebook(),
-    )
+    with changing_line(in_terminals=False) as show:
+        return run_walk(
+            setup,
+            seed=seed,
+            frame_interval=frame_interval,
+            record_before=record_before,
+            record_loads=loads,
+            on_progress=on_progress or (show and (lambda progress: show(walk_progress_text(progress)))),
+        )
 
 
 def _check_repeated(setup: object, others: Mapping[str, object], seed: int | None) -> None:
