@@ -22,11 +22,12 @@ from warpchain.inputs.distributions import DRAWABLE
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
 from warpchain.inputs.scene import Scene
-from warpchain.inputs.setup import read_setup, resolve
+from warpchain.inputs.setup import resolve
 from warpchain.inputs.validation import FIELDS, LONGEST_LINE, NAME_OF_SYMBOL, SECTION_OF, InputError, field_choices
 from warpchain.inputs.yaml_files import parse_yaml
 from warpchain.sweeps.designs import SAMPLERS
 from warpchain.sweeps.plan import load_sweep
+from warpchain.sweeps.sweep_file import read_walk_file
 from warpchain.walks import one_walk
 
 SECONDS = 5.0
@@ -203,7 +204,7 @@ def test_yaml(tmp_path: Path, text: str) -> None:
     path.write_bytes(text.encode("utf-8", "surrogatepass"))
     taken(lambda: parse_yaml(text, "text"))
     taken(lambda: load_sweep(path))
-    found = taken(lambda: read_setup(path))
+    found = taken(lambda: read_walk_file(path))
     if found is not None:
         taken(lambda: resolve(found[0], **found[1]))
 

@@ -17,7 +17,7 @@ import warpchain
 from tests.hard_cases.starts import dropped
 from tests.support.setups import setup_walk
 from warpchain.inputs.sections import SECTION_OF, SECTIONS
-from warpchain.inputs.setup import read_setup, resolve
+from warpchain.inputs.setup import resolve
 from warpchain.inputs.validation import (
     DEEPEST,
     LONGEST_LINE,
@@ -33,6 +33,7 @@ from warpchain.inputs.validation import (
 from warpchain.inputs.yaml_files import LARGEST_FILE, read_yaml
 from warpchain.kernels.methods.method import find_method, method_names
 from warpchain.sweeps.plan import load_sweep
+from warpchain.sweeps.sweep_file import read_walk_file
 
 SWEEP = {"version": 1, "name": "x", "seed": 1, "samples": 1, "preset": "soft"}
 FIELDS = {name: field for model in SECTIONS.values() for name, field in model.model_fields.items()}
@@ -269,7 +270,7 @@ def test_a_hostile_file_is_refused_in_one_line(tmp_path: Path, text: str) -> Non
     path.write_text(text, encoding="utf-8")
 
     def setup() -> None:
-        preset, sections = read_setup(path)
+        preset, sections = read_walk_file(path)
         resolve(preset, **sections)
 
     assert "\n" not in refusal(setup)
@@ -278,7 +279,7 @@ def test_a_hostile_file_is_refused_in_one_line(tmp_path: Path, text: str) -> Non
 @pytest.mark.parametrize("path", ["a\0b", "\ud800", "/dev/zero", "x" * 300, "x/" * 3000, "none.yaml", "/"])
 def test_what_is_no_regular_file_is_refused(path: str) -> None:
     """NULs, halves of characters, devices, folders and names that no file can have, of sweeps and of walks."""
-    for read in (read_setup, load_sweep):
+    for read in (read_walk_file, load_sweep):
         refusal(lambda read=read: read(path))
 
 

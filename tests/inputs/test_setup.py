@@ -10,8 +10,9 @@ from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS, Parameters, preset
 from warpchain.inputs.scene import Scene
 from warpchain.inputs.sections import NAME_OF_SYMBOL, SECTION_OF, SYMBOL_OF
-from warpchain.inputs.setup import Setup, read_setup, resolve
+from warpchain.inputs.setup import Setup, resolve
 from warpchain.inputs.validation import InputError
+from warpchain.sweeps.sweep_file import read_walk_file
 
 SYMBOLS = {
     "links": "n", "frequency": "nu", "link_length": "ell", "sprocket_radius": "R", "inner_mass": "m_inner",
@@ -48,14 +49,14 @@ def test_a_file_gives_the_setup_of_its_values(tmp_path: Path) -> None:
       self_contact: no
     parameters:
     """
-    name, sections = read_setup(written(tmp_path, text))
+    name, sections = read_walk_file(written(tmp_path, text))
     assert resolve(name, **sections) == resolve(
         "paper",
         scene={"links": 80, "frequency": 20.0, "start": "ellipse"},
         options={"tolerance": 1e-7, "step_limit": 1_000_000, "self_contact": False},
         parameters={},
     )
-    assert read_setup(written(tmp_path, "scene: {n: 8}")) == (
+    assert read_walk_file(written(tmp_path, "scene: {n: 8}")) == (
         None, {"scene": {"links": 8}, "options": {}, "parameters": {}}
     )  # fmt: skip
 
@@ -76,14 +77,14 @@ def test_symbols_stand_for_names(tmp_path: Path, name: str) -> None:
         assert setup_walk("soft", {symbol: value}, None) == expected
         assert preset("soft").with_values({symbol: value}) == expected.parameters
         path = written(tmp_path, f"preset: soft\nparameters: {{{symbol}: {value!r}}}")
-        assert read_setup(path)[1]["parameters"] == {name: value}
+        assert read_walk_file(path)[1]["parameters"] == {name: value}
 
 
 def test_a_value_is_given_once(tmp_path: Path) -> None:
     """A value by name and by symbol is refused."""
     path = written(tmp_path, "preset: soft\nparameters: {mu_fc: 0.3, floor_friction: 0.3}")
     with pytest.raises(InputError, match=r"^parameters\.floor_friction: given twice, also as 'mu_fc'; leave one out$"):
-        read_setup(path)
+        read_walk_file(path)
     for call in (warpchain.walk, lambda **both: preset("soft").with_values(both)):
         with pytest.raises(InputError, match=r"^(parameters\.)?gravity: given twice, also as 'g'; leave one out$"):
             call(gravity=9.0, g=9.0)

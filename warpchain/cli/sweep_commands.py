@@ -133,25 +133,20 @@ def plot(
     a walk: film_strip.png, height_and_speed.png, loop.png, energy.png and, if the plane tilts, tilt.png; a line says
     what is left out and why.
     """
-    from warpchain.cli.walk_files import draw_figures, record_of, try_folder
+    from warpchain.cli.walk_files import draw_figures, saved, try_folder
     from warpchain.files import make_folder
-    from warpchain.hdf5_files import kind_of_hdf5
     from warpchain.inputs.validation import InputError, printable
     from warpchain.pictures.walk_shape import kinds_of
     from warpchain.reports.sweep_figures import figures
-    from warpchain.store.sweep_result import KIND, load
-    from warpchain.walks.walk_result import WalkResult, load_walk
+    from warpchain.walks.walk_result import WalkResult
 
-    path, wanted = record_of(path), "give the folder of a sweep, a merged file, or the file of a saved walk"
-    is_file = os.path.isfile(path)
-    is_missing = path.suffix == ".h5" and not os.path.exists(path)
-    is_walk = is_missing or (is_file and kind_of_hdf5(path, wanted) != KIND)
+    found = saved(path, "give the folder of a sweep, a merged file, or the file of a saved walk")
+    is_walk = isinstance(found, WalkResult)
     if is_walk and quantity is not None:
         raise InputError("--quantity: a saved walk has no columns; leave it out, or give the folder of a sweep")
     if kind is not None and not is_walk:
         raise InputError("--kind: a sweep has none; leave it out, or give the file of a saved walk")
-    found = load_walk(path) if is_walk else load(path)
-    folder = folder or (path.parent if is_file else path)
+    folder = folder or (path.parent if os.path.isfile(path) else path)
     try_folder(folder)
     make_folder(folder)
     drawn = (

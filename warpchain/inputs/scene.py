@@ -1,17 +1,17 @@
 """What happens in a walk: how long the chain is, how fast it is spun, from which height it is released."""
 
 import math
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 import numpy as np
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import Discriminator, Field, Strict, Tag, model_validator
 
-from warpchain.inputs.floor import Array, Points, checked_profile, slope_points
+from warpchain.inputs.floor import Array, Points, slope_points
 from warpchain.inputs.link_values import LinkValues, alternating
 from warpchain.inputs.options import on_gpu
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.sprocket_motion import Motion, checked_motion
-from warpchain.inputs.validation import InputError, Section, Whole, number_field, shown
+from warpchain.inputs.sprocket_motion import Rows
+from warpchain.inputs.validation import InputError, Section, Whole, number_field
 
 MOST_LINKS: Final = 100_000
 """A chain of so many links takes 0.4 GB, and kernels of its own."""
@@ -45,16 +45,7 @@ TAP: Final = ("lateral_speed", "tilt", "tilt_rate", "yaw_rate")
 upright, so that a scene with a tilting plane alone is the paper's."""
 
 
-def _as_tuple(given: Any) -> Any:
-    if given is not None and not isinstance(given, list | tuple):
-        raise ValueError(f"{shown(given)} is no list; give a number for each link, or null")
-    return None if given is None else tuple(given)
-
-
-_Numbers = Annotated[
-    tuple[Annotated[float, Field(ge=0, le=1e12)], ...] | None,
-    BeforeValidator(_as_tuple),
-]
+_Numbers = Annotated[tuple[Annotated[float, Field(ge=0, le=1e12)], ...], Strict(False)] | None
 """A number for each link or joint; null: what the parameters say."""
 
 
@@ -136,13 +127,16 @@ class Scene(Section):
     walk_limit: float = number_field(
         20.0, "s", "longest time from the release to rest; then the walk ends as time_limit", gt=0, le=LONGEST
     )
-    release: Annotated[Motion | None, BeforeValidator(checked_motion)] = Field(
+    release: Rows | None = Field(
         default=None,
         description="motion of the sprocket after the release: rows [time in s, x and y in m from its place, "
         "frequency in Hz]; it vanishes after the last, or at once (null); "
         "what sinks too deep presses the chain into the floor",
     )
-    floor: Annotated[Literal["flat"] | Points, BeforeValidator(checked_profile)] = Field(
+    floor: Annotated[
+        Annotated[Literal["flat"], Tag("(flat)")] | Annotated[Points, Tag("(points)")],
+        Discriminator(lambda given: "(flat)" if isinstance(given, str) else "(points)"),
+    ] = Field(
         default="flat",
         description="flat, or a profile [[x, y], …] in m, whose ends go on straight",
     )

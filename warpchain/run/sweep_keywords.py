@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from warpchain.inputs.scene import LISTS
 from warpchain.inputs.sections import SECTION_OF, by_section
 from warpchain.inputs.setup import DEFAULT_PRESET
 from warpchain.inputs.validation import InputError, by_name, plain
@@ -35,12 +34,6 @@ def sweep_of_keywords(given: Mapping[str, object], out: str | os.PathLike[str] |
     if isinstance(content.get("preset"), list):
         values = {"preset": content.pop("preset"), **values}
     for name, value in by_name(values).items():
-        if name in LISTS and isinstance(value, list | dict):
-            raise InputError(f'{name}: a list of its own, and a list is an axis here; give scene={{"{name}": …}}')
-        if name == "start" and not isinstance(value, list | str):
-            raise InputError(
-                "start: sweeps go on from no state; give 'rest', 'spinning' or 'ellipse', or walk(start=…) for one walk"
-            )
         key = "grid" if isinstance(value, list | dict) else SECTION_OF[name]
         others = content.setdefault(key, {})
         if isinstance(others, dict):  # the check of the content refuses anything else

@@ -9,11 +9,12 @@ import contextlib
 import os
 import re
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
+from pydantic import Field
 
 from warpchain.engine.devices import gpu_turn, has_gpu_turn, start_device
 from warpchain.engine.kernel_choice import shared_threads
@@ -21,7 +22,7 @@ from warpchain.engine.processors import processors
 from warpchain.inputs.options import Options, on_gpu
 from warpchain.inputs.sections import takes_fields
 from warpchain.inputs.setup import Setup
-from warpchain.inputs.validation import InputError, checked_path, plain, shown, validated
+from warpchain.inputs.validation import InputError, Whole, checked, checked_path, plain, shown, validated
 from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text, progress_bar
 from warpchain.run.sweep_keywords import KEYS, sweep_of_keywords
 from warpchain.run.workers import DaskClient, Executor, Pulse, losses_named, pulsing_threads
@@ -33,6 +34,8 @@ from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import PlannedWalk, Sweep, load_sweep
 from warpchain.walks.rows import LENGTHS, MISSING, derived_columns, faults_of_columns, fill_row, missing_rows
 from warpchain.walks.scheduler import compile_kernels, run_setups
+
+T = TypeVar("T")
 
 SHARD_WALKS = 256
 """Most walks in a shard."""
@@ -104,8 +107,7 @@ def sweep(
         OSError: The folder cannot be read or written.
         LostWorkersError: Worker processes were killed, or the scheduler of a Dask client was closed.
     """
-    planned, folder, own = _checked_call(source, out, settings, device, workers, part)
-    count = plain(workers, "workers")
+    planned, folder, own, count = _checked_call(source, out, settings, device, workers, part)
     if isinstance(executor, DaskClient):
         count = count or sum(executor.nthreads().values())
         executor = executor.get_executor(pure=False)  # pure: a task that failed would fail again, unrun
@@ -123,39 +125,42 @@ def _checked_call(
     device: str | None,
     workers: int | None,
     part: str | None,
-) -> tuple[Sweep, Path, tuple[int, int]]:
-    """The sweep on its device, its folder, and its part.
+) -> tuple[Sweep, Path, tuple[int, int], int | None]:
+    """The sweep on its device, its folder, its part, and the number of workers.
 
     Raises:
         InputError: Something is refused; one line for each value.
     """
-    problems, planned, own = [], None, (1, 1)
+    problems: list[str] = []
+
+    def gathered(check: Callable[[], T]) -> T | None:
+        try:
+            return check()
+        except InputError as error:
+            problems.extend(error.args)
+            return None
+
+    def plan() -> Sweep:
+        found = sweep_of_keywords(settings, folder) if source is None else load_sweep(source, **replaced)
+        return found if device is None else on_device(found, device)
+
     settings = {name: value for name, value in settings.items() if value is not None or name not in KEYS}
     replaced = {name: plain(settings[name], name) for name in ("seed", "samples") if name in settings}
     if source is not None and (others := [name for name in settings if name not in replaced]):
         names = ", ".join(others)
         problems.append(f"{names}: given together with a source; leave one out, or write it into the source")
-    if out is None:
-        problems.append("out: missing; give the folder of the results")
-    else:
-        out = checked_path(out, "out")
-    count = plain(workers, "workers")
-    if count is not None and (isinstance(count, bool) or not isinstance(count, int) or count < 1):
-        problems.append(f"workers: {shown(count)} is not a number of workers; give a whole number from 1")
-    try:
-        own = own if part is None else checked_part(part)
-        planned = sweep_of_keywords(settings, out) if source is None else load_sweep(source, **replaced)
-        if device is not None:
-            planned = on_device(planned, device)
-    except InputError as error:
-        problems += error.args
-    if problems or planned is None or out is None:
+    folder = gathered(lambda: checked_path(out, "out"))
+    count = gathered(lambda: checked(workers, "workers", Annotated[Whole, Field(ge=1)] | None))
+    own, planned = gathered(lambda: checked_part(part)), gathered(plan)
+    if problems or planned is None or folder is None or own is None:
         raise InputError(*problems)
-    return planned, out, own
+    return planned, folder, own, count
 
 
 def checked_part(given: object) -> tuple[int, int]:
-    """Number of a part and number of parts of "k/N", or an `InputError`."""
+    """Number of a part and number of parts of "k/N", 1/1 of None, or an `InputError`."""
+    if given is None:
+        return 1, 1
     found = re.fullmatch(r"([1-9]\d{0,5})/([1-9]\d{0,5})", given) if isinstance(given, str) else None
     if found is None or int(found[1]) > int(found[2]):
         raise InputError(f"part: {shown(given)} is no part; give k/N with 1 ≤ k ≤ N, such as 3/8")

@@ -165,7 +165,7 @@ class Sweep:
         """
         most = max(block.samples for block in self.blocks)
         for name, choice in self.recording.choices.items():
-            if choice.samples is not None and choice.samples[-1] >= most:
+            if choice.samples != "all" and choice.samples[-1] >= most:
                 raise InputError(
                     f"sweep.record.{name}.samples: {choice.samples[-1]} is no sample of any block; "
                     f"give numbers from 0 to {most - 1}"
