@@ -217,7 +217,7 @@ class Scene(Section):
     coulomb_frictions: _Numbers = number_field(None, "N m", "coulomb_friction of each joint; null: the same for all")
 
     @model_validator(mode="after")
-    def _links_are_there(self) -> Self:
+    def _goes_together(self) -> Self:
         for name in ("charm_link", "stiff_joint"):
             if getattr(self, name) >= self.links:
                 raise InputError(
@@ -229,34 +229,17 @@ class Scene(Section):
                 raise InputError(f"{name}: {len(values)} numbers for {self.links} links; give one for each")
             if values is not None and name.startswith("link") and min(values) == 0:
                 raise InputError(f"{name}[{values.index(0)}]: 0 is no {name[5:-2]}; give more")
-        return self
-
-    @model_validator(mode="after")
-    def _one_floor(self) -> Self:
         if self.slope != 0 and self.floor != "flat":
             raise InputError(f"slope: {self.slope} of a floor that is a profile; give slope: 0, or floor: flat")
         if self.plane == "tilting" and floor_points(self) is not None:
             raise InputError("plane: 'tilting' needs a flat floor; give plane: fixed, or floor: flat and slope: 0")
-        return self
-
-    @model_validator(mode="after")
-    def _tap_needs_tilting_plane(self) -> Self:
-        for name in TAP:
-            if getattr(self, name) != 0 and self.plane == "fixed":
-                raise InputError(
-                    f"{name}: {getattr(self, name)} moves the plane of the chain, which is fixed; give plane: tilting"
-                )
-        return self
-
-    @model_validator(mode="after")
-    def _motion_needs_sprocket(self) -> Self:
+        if self.plane == "fixed" and (name := next((name for name in TAP if getattr(self, name) != 0), "")):
+            raise InputError(
+                f"{name}: {getattr(self, name)} moves the plane of the chain, which is fixed; give plane: tilting"
+            )
         if self.release is not None and (self.start == "ellipse" or self.plane == "tilting"):
             word = "start: ellipse" if self.start == "ellipse" else "plane: tilting"
             raise InputError(f"release: a motion of the sprocket, which {word} does not go with; leave one out")
-        return self
-
-    @model_validator(mode="after")
-    def _hanging_needs_rest(self) -> Self:
         if self.clearance_of == "hanging" and self.start != "rest":
             raise InputError(
                 f"clearance_of: 'hanging' needs a chain that hangs, but start is {self.start!r}; "
