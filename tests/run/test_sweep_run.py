@@ -292,18 +292,3 @@ def wait_for_workers(where: Path, count: int) -> str:
     with Client(scheduler_file=str(where)) as client:
         client.wait_for_workers(count, timeout=60)
         return str(client.scheduler.address)
-
-
-def test_sweep_refuses_what_it_cannot_do(tmp_path):
-    """Bad arguments are refused in one line, and no folder is made."""
-    for arguments, message in (
-        ((TINY | {"samples": 0}, tmp_path / "a"), "samples"),
-        ((tmp_path / "none.yaml", tmp_path / "a"), "none.yaml"),
-    ):
-        with pytest.raises((warpchain.InputError, OSError), match=message):
-            sweep(*arguments)
-    with pytest.raises(warpchain.InputError, match="workers: 0 is not a number of workers"):
-        sweep(TINY, tmp_path / "a", workers=0)
-    with pytest.raises(warpchain.InputError, match=r"options\.device: 'gpu' is no device"):
-        sweep(TINY, tmp_path / "a", device="gpu")
-    assert not (tmp_path / "a").exists()

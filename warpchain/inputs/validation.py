@@ -390,7 +390,8 @@ def one_line(text: str, kind: str = "") -> str:
     """
     ends = text if len(text) < 10 * LONGEST_LINE else text[: 5 * LONGEST_LINE] + text[-5 * LONGEST_LINE :]
     text, room = printable(" ".join(ends.split())), LONGEST_LINE - len(kind)
-    return kind + (text if len(text) <= room else f"{text[: room // 2]}...{text[3 + room // 2 - room :]}")
+    head = 4 * room // 5
+    return kind + (text if len(text) <= room else f"{text[:head]}...{text[3 + head - room :]}")
 
 
 def json_value(value: Any) -> Any:
