@@ -8,7 +8,7 @@ import pytest
 
 from tests.support.sweep_content import UNIFORM, blocks, content
 from warpchain.inputs.validation import InputError
-from warpchain.run.sweep_run import on_device, one_of_each_kind
+from warpchain.run.sweep_run import on_device
 from warpchain.sweeps.plan import load_sweep
 
 
@@ -54,16 +54,6 @@ def test_a_method_by_need_is_that_of_the_device(options: dict[str, Any], expecte
     assert there.tolerance == options.get("tolerance", here.tolerance)
     again = load_sweep(on_device(planned, "cuda:1").canonical())
     assert again.planned(0).setup.options == there
-
-
-def test_parameter_sets_may_have_links_and_methods() -> None:
-    """Each set has its own, on the device that is asked for; all that kernels may differ by is found."""
-    points = {"links": [60, 90, 120], "method": ["dp5", "bs32", "dp5"], "mu_fc": [0.1, 0.2, 0.3]}
-    planned = on_device(load_sweep(content(points=points, grid={"frequency": [5, 10]}, options={})), "cpu")
-    setups = [planned.planned(index).setup for index in planned.indices.tolist()]
-    assert {(s.scene.links, s.options.method) for s in setups} == {(60, "dp5"), (90, "bs32"), (120, "dp5")}
-    kinds = one_of_each_kind(planned)
-    assert {(s.scene.links, s.options.method) for s in kinds} == {(s.scene.links, s.options.method) for s in setups}
 
 
 def test_a_device_is_refused_beside_devices_on_an_axis() -> None:

@@ -51,12 +51,6 @@ def test_an_index_stays_when_samples_are_added() -> None:
     assert len(set(many.indices.tolist())) == many.walk_count
 
 
-def test_more_blocks_change_nothing_before() -> None:
-    """A sample stays what it is when its cell gets more samples and when blocks are added behind."""
-    few, many = load_sweep(blocks({})), load_sweep(blocks({"samples": 50}, {}))
-    assert (drawn(few, 3) == drawn(many, 3)).all()
-
-
 def test_first_sample_is_that_of_a_single_walk() -> None:
     """Sample 0 of cell 0 is what a single walk draws from the same seed; the others follow the same rule."""
     settings = {"links": 90, "frequency": 12.0, "floor_friction": 0.1}
