@@ -89,21 +89,6 @@ def test_bad_input_is_refused_in_one_line(command: Command, tmp_path: Path, argu
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(
-    ("arguments", "line"),
-    [
-        ("foo", "No such command 'foo'; see warpchain --help"),
-        ("info", "Missing argument 'DIR'; see warpchain info --help"),
-        ("walk --json=1", "Option '--json' does not take a value; see warpchain --help"),
-    ],
-)
-def test_what_is_no_command_names_the_help(command: Command, arguments: str, line: str) -> None:
-    """A line that is no command, or lacks something, is refused with the help that says what there is."""
-    answer = command(*arguments.split())
-    assert (answer.status, answer.out) == (2, "")
-    assert answer.err == f"error: {line}\n"
-
-
 @pytest.mark.parametrize("folder", ["file", "file/below", "/dev/null/below", "x" * 300])
 def test_a_folder_that_cannot_be_is_found_before_the_walk(
     command: Command, monkeypatch: pytest.MonkeyPatch, folder: str
@@ -218,19 +203,6 @@ def test_a_chain_that_was_never_released_leaves_no_pictures(command: Command) ->
     assert [path.name for path in Path("new").iterdir()] == ["walk.h5"]
     lines = answer.err.splitlines()
     assert [line.partition(":")[0] for line in lines] == ["new/film_strip.png", "not_steady"]
-
-
-@pytest.mark.parametrize("name", ["walk.h5", "loop.png", "walk.gif"])
-def test_what_a_file_cannot_replace_is_found_before_the_walk(
-    command: Command, monkeypatch: pytest.MonkeyPatch, name: str
-) -> None:
-    """A folder in the place of one of the files is refused, and no walk is run."""
-    Path("new", name).mkdir(parents=True)
-    monkeypatch.setattr(WALK_MODULE, "run_walk", None)
-    answer = command("walk", *QUICK, "--animate", "gif", "-o", "new")
-    assert (answer.status, answer.out) == (2, "")
-    assert answer.err == f"error: new/{name}: cannot be written (it is a folder); give another path\n"
-    assert [path.name for path in Path("new").iterdir()] == [name]
 
 
 def test_a_defect_is_not_disguised_as_bad_input(monkeypatch: pytest.MonkeyPatch) -> None:

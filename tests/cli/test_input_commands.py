@@ -50,6 +50,8 @@ def test_parameters_as_a_table(command: Command) -> None:
             f"x: neither a file nor a shipped sweep; give one of {', '.join(shipped_sweeps())}",
         ),
         ("sweep --new no/new.yaml", "--new: no/new.yaml: cannot be written (No such file or directory); give"),
+        ("foo", "No such command 'foo'; see warpchain --help"),
+        ("info", "Missing argument 'DIR'; see warpchain info --help"),
         ("sweep --new new.yaml -o new", "--new: given together with other arguments; leave them out"),
     ],
 )

@@ -9,7 +9,6 @@ import pytest
 import warpchain
 from tests.support import command_line
 from tests.support.command_line import Command
-from warpchain.cli import walk_commands
 from warpchain.inputs.validation import InputError
 from warpchain.walks.walk_result import STORED, WalkResult
 
@@ -158,15 +157,3 @@ def test_bad_input_is_refused_in_one_line(command: Command, saved: Path, argumen
     assert (answer.status, answer.out) == (2, "")
     assert answer.err.startswith(f"error: {REFUSED[arguments]}") and answer.err.count("\n") == 1
     assert sorted(Path().rglob("*")) == before
-
-
-def test_a_refusal_of_several_lines_is_printed_as_several(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each of several problems has a line of its own."""
-
-    def refuse(*_: object) -> None:
-        raise InputError("links: 3 is odd;  give an even number", "samples: 0 is less than 1; give 1 or more")
-
-    monkeypatch.setattr(walk_commands, "_given_values", refuse)
-    answer = command("walk")
-    lines = ["error: links: 3 is odd; give an even number", "error: samples: 0 is less than 1; give 1 or more"]
-    assert answer.status == 2 and answer.err.splitlines() == lines

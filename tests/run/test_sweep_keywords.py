@@ -115,17 +115,6 @@ def test_parameter_sets(tmp_path):
     assert lines[0].startswith("sweep.points.sprocket_radius: 1 values, but floor_friction has 2;")
 
 
-def test_a_planned_end_is_no_failure(tmp_path):
-    """A walk that goes on when its time is over is finished, without Δx, and in the means of what it has."""
-    result = warpchain.sweep(
-        links=30, start="ellipse", walk_until=0.02, preset="soft", samples=2, out=tmp_path / "until", progress=False
-    )
-    assert result.summary() == {"at_rest": 0, "finished": 2, "missing": 0} and np.isnan(result.dx).all()
-    times = result.statistics("walk_time")
-    assert (times.mean, times.count, times.failed) == (pytest.approx(0.02), 2, 0)
-    assert result.statistics("dx").absent == 2
-
-
 def test_a_sweep_runs_from_keywords(tmp_path, capfd):
     """It goes on where it was, the preset may be an axis, and nothing is printed without a terminal."""
     keywords = {"grid": {"preset": ["soft"], "links": range(30, 34, 2)}, "samples": 1, "scene": SHORT}

@@ -5,7 +5,6 @@ import contextlib
 import gc
 import multiprocessing
 import os
-import random
 import signal
 import subprocess
 import sys
@@ -149,42 +148,6 @@ def test_a_failing_walk_stops_the_sweep_and_keeps_what_is_done(tmp_path, monkeyp
     assert kept.items() <= uninterrupted.items()
     sweep(TINY, tmp_path / "sweep")
     assert data_of(tmp_path / "sweep") == uninterrupted
-
-
-@pytest.mark.slow
-def test_killed_at_any_moment_a_sweep_goes_on(tmp_path, uninterrupted):
-    """SIGKILL at 20 random moments, resumed each time: the data are those of a run never interrupted, to the byte."""
-    folder, generator = tmp_path / "sweep", random.Random(20)
-    context = multiprocessing.get_context("forkserver")  # whose processes need not import anything
-    context.set_forkserver_preload(["warpchain.run.sweep_run"])
-
-    def begun() -> multiprocessing.process.BaseProcess:
-        process = context.Process(target=sweep, args=(TINY, folder), kwargs={"workers": 2})
-        process.start()
-        return process
-
-    begun().join()  # starts the server, too
-    for shard in (folder / "shards").glob("[0-9]*.h5"):
-        shard.unlink()
-    began = time.monotonic()
-    begun().join()
-    whole = time.monotonic() - began
-    assert data_of(folder) == uninterrupted
-    for shard in (folder / "shards").glob("[0-9]*.h5"):
-        shard.unlink()
-    killed = 0
-    while killed < 20:
-        process = begun()
-        time.sleep(generator.uniform(0.0, 1.0) * whole)
-        process.kill()
-        process.join()
-        killed += 1
-        if len(data_of(folder)) == len(uninterrupted):  # it was complete: begin again
-            assert data_of(folder) == uninterrupted
-            for shard in sorted((folder / "shards").glob("[0-9]*.h5"))[::2]:
-                shard.unlink()
-    begun().join()
-    assert data_of(folder) == uninterrupted
 
 
 @pytest.mark.slow

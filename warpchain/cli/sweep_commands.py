@@ -221,11 +221,7 @@ def _print_estimate(source: Path, **given: Any) -> None:
 
 @contextlib.contextmanager
 def _executor(gpus: int | None, scheduler: str | None) -> "Iterator[Executor | DaskClient | None]":
-    """Workers on GPUs, or the client of a Dask cluster; None if neither is asked for.
-
-    Raises:
-        InputError: there are not so many GPUs, Dask is not installed, or the scheduler does not answer.
-    """
+    """Workers on GPUs, or the client of a Dask cluster; None if neither is asked for."""
     from warpchain.engine.devices import gpu_count
     from warpchain.inputs.validation import InputError
     from warpchain.run.gpu_workers import gpu_workers, visible_gpus

@@ -158,11 +158,7 @@ def animate(
 
 
 def _given_values(named: Mapping[str, str | None], assignments: Sequence[str]) -> dict[str, dict[str, object]]:
-    """Values of the command line by section; named options and `NAME=VALUE` are on a par.
-
-    Raises:
-        InputError: an assignment is not of that form, its name is unknown, or a name is given twice.
-    """
+    """Values of the command line by section; named options and `NAME=VALUE` are on a par."""
     from warpchain.inputs.sections import SECTION_OF, by_section, dotted_name
     from warpchain.inputs.validation import InputError, shown
     from warpchain.inputs.yaml_files import parse_yaml
@@ -184,12 +180,7 @@ def _given_values(named: Mapping[str, str | None], assignments: Sequence[str]) -
 
 
 def _saved(path: Path, index: str | None) -> tuple["Setup", int | None]:
-    """Setup and seed of a saved walk, or of the walk with a number of a sweep.
-
-    Raises:
-        InputError: there is no such walk, or the number is missing.
-        OSError: the file or folder cannot be read.
-    """
+    """Setup and seed of a saved walk, or of the walk with a number of a sweep."""
     from warpchain.cli.walk_files import saved
     from warpchain.inputs.validation import InputError
     from warpchain.inputs.yaml_files import parse_yaml
@@ -205,11 +196,7 @@ def _saved(path: Path, index: str | None) -> tuple["Setup", int | None]:
 
 
 def _frame_interval(folder: Path | None, animation: str | None, text: str | None, records_loads: bool) -> Any:
-    """Time between two frames [s], which the walk checks; None without a folder to write them to.
-
-    Raises:
-        InputError: an option needs a folder, or MP4 cannot be written.
-    """
+    """Time between two frames [s], which the walk checks; None without a folder to write them to."""
     from importlib.util import find_spec
 
     from warpchain.inputs.validation import InputError

@@ -275,15 +275,7 @@ def _fitted(joints: Array, rates: Array, length: float) -> tuple[Array, Array]:
 def _pull(span: Array, change: Array) -> Array:
     """The least motion of the joints, (n, 2), that changes half the squares of the spans by so much, (n,)."""
     n = len(span)
-    along = np.arange(n)
-    before = np.roll(along, 1)
-    matrix = np.zeros((n, n))
-    matrix[along, along] = 2 * np.sum(span**2, axis=1)
-    product = -np.sum(span * np.roll(span, 1, axis=0), axis=1)
-    matrix[along, before] += product
-    matrix[before, along] += product
-    try:
-        pulls = np.linalg.solve(matrix, change)[:, None] * span
-    except np.linalg.LinAlgError:
-        raise InputError("joints: all of them lie on one line; give a loop") from None
-    return pulls - np.roll(pulls, -1, axis=0)
+    rates = np.zeros((n, n, 2))  # of each half square by each joint
+    rates[np.arange(n), np.arange(n)] = span
+    rates[np.arange(n), np.arange(n) - 1] -= span
+    return np.linalg.lstsq(rates.reshape(n, 2 * n), change)[0].reshape(n, 2)

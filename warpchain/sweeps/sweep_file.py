@@ -383,8 +383,7 @@ def _drawn(
 ) -> dict[str, Distribution]:
     """What a block draws, in the order of drawing.
 
-    Given values are exact, on an axis or not. A distribution of the quantity's own name is drawn about each of them,
-    and refused if it has a mean or ends of its own.
+    Given values are exact, unless their quantity has a distribution of its own name, without a mean and ends.
     """
     drawn: dict[str, Distribution] = {}
     for name in DRAWABLE:
@@ -410,11 +409,7 @@ def _same_samples_along(written: list[str], known: set[str]) -> tuple[str, ...]:
 
 
 def _numbered(blocks: list[Block], same_samples_along: tuple[str, ...]) -> Iterator[Block]:
-    """The blocks with their first walks and streams, numbered through all of them.
-
-    Raises:
-        InputError: there are too many cells or walks.
-    """
+    """The blocks, numbered through their cells and streams; an `InputError` if there are too many cells or walks."""
     walks = first_stream = cells = 0
     stride = sum(math.prod(block.shape[:-1]) for block in blocks)
     for block in blocks:
