@@ -63,20 +63,3 @@ def test_the_command_prints_tables_or_json(command: Command, monkeypatch: pytest
     lines = answer.out.splitlines()
     assert answer.err == "" and lines[-1].split()[:4] == [record["walks"]["method"], "0.003", "2", "0"]
     assert [line.split()[1] for line in lines if line.strip().startswith("8 ")] == [*method_names(), "DOP853"]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "problem"),
-    [
-        ("--links 61", "bench.links: 61 is odd"),
-        ("--links 60 --links 2", "bench.links: Input should be greater than or equal to 4"),
-        ("--device gpu", "bench.device: 'gpu' is no device"),
-        ("--device cuda:99", "options.device: there is no cuda:99 on this machine"),
-        ("--device cuda:99 --links 2000", "bench.links: 2000 links are more than a GPU's block has threads"),
-    ],
-)
-def test_bad_input_is_refused_in_one_line(command: Command, arguments: str, problem: str) -> None:
-    """Before anything is measured."""
-    answer = command("bench", *arguments.split())
-    assert (answer.status, answer.out) == (2, "")
-    assert answer.err.startswith(f"error: {problem}") and answer.err.count("\n") == 1

@@ -58,30 +58,6 @@ def test_a_sweep_runs_on_gpu_workers(tmp_path: Path) -> None:
     assert data_of(tmp_path / "two") == data_of(tmp_path / "one")
 
 
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        (["--gpus", "0"], "Invalid value for '--gpus'"),
-        (["--gpus", "2", "--workers", "3"], "error: --workers: given together with --gpus; leave one out"),
-        (["--gpus", "2", "--scheduler", "tcp://a:1"], "error: --scheduler: given together with --gpus; leave one out"),
-        (["--gpus", "2", "--device", "cpu"], "error: --device: cpu is given together with --gpus; give cuda"),
-        (["--gpus", "2"], "error: --gpus: 2 wanted, but CUDA_VISIBLE_DEVICES is '3'; give at most 1"),
-    ],
-)
-def test_what_contradicts_gpus_is_refused(
-    tmp_path: Path, given: list[str], message: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    """One line says which option, and no folder is made."""
-    monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "3")
-    source = tmp_path / "tiny.yaml"
-    source.write_text(yaml.safe_dump(TINY, sort_keys=False))
-    with pytest.raises(SystemExit) as caught:
-        main(["sweep", str(source), "-o", str(tmp_path / "sweep"), *given])
-    assert caught.value.code == 2
-    assert message in capfd.readouterr().err
-    assert not (tmp_path / "sweep").exists()
-
-
 @pytest.mark.skipif(wp.get_cuda_device_count() > 0, reason="there is a GPU")
 @pytest.mark.parametrize("given", (["--device", "cuda"], ["--gpus", "1"], ["--gpus", "99999"]))
 def test_a_missing_gpu_leaves_no_folder(
