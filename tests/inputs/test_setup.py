@@ -6,11 +6,9 @@ import pytest
 
 import warpchain
 from tests.support.setups import setup_walk
-from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import PRESETS, Parameters, preset
-from warpchain.inputs.scene import Scene
+from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.sections import NAME_OF_SYMBOL, SECTION_OF, SYMBOL_OF
-from warpchain.inputs.setup import Setup, resolve
+from warpchain.inputs.setup import resolve
 from warpchain.inputs.validation import InputError
 from warpchain.sweeps.sweep_file import read_walk_file
 
@@ -29,13 +27,6 @@ def written(folder: Path, text: str) -> Path:
     path = folder / "walk.yaml"
     path.write_text(text, encoding="utf-8")
     return path
-
-
-def test_values_are_completed() -> None:
-    """Values that are not given come from the preset and from the defaults."""
-    setup = resolve("soft", scene={"links": 80}, options={"method": "dp5"}, parameters={"gravity": 1.62})
-    parameters = PRESETS["soft"].with_values({"gravity": 1.62})
-    assert setup == Setup("soft", parameters, Scene(links=80), Options(method="dp5"))
 
 
 def test_a_file_gives_the_setup_of_its_values(tmp_path: Path) -> None:
