@@ -11,7 +11,7 @@ import pytest
 
 import warpchain
 from warpchain.inputs.validation import InputError
-from warpchain.run.sweep_keywords import sweep_of_keywords
+from warpchain.run.sweep_run import sweep_of_keywords
 from warpchain.sweeps.plan import load_sweep
 
 SHORT = {"start": "ellipse", "walk_limit": 0.02}

@@ -14,7 +14,6 @@ from warpchain.cli.walk_commands import FAILED
 from warpchain.cli.words import JSON, argument, option, output, output_path
 
 if TYPE_CHECKING:
-    from warpchain.run.workers import DaskClient, Executor
     from warpchain.store.sweep_result import SweepResult
 
 _FILE: Final = "The sweep, or the bare name of one that comes with warpchain, such as figure6."
@@ -220,7 +219,7 @@ def _print_estimate(source: Path, **given: Any) -> None:
 
 
 @contextlib.contextmanager
-def _executor(gpus: int | None, scheduler: str | None) -> "Iterator[Executor | DaskClient | None]":
+def _executor(gpus: int | None, scheduler: str | None) -> Iterator[Any]:
     """Workers on GPUs, or the client of a Dask cluster; None if neither is asked for."""
     from warpchain.engine.devices import gpu_count
     from warpchain.inputs.validation import InputError

@@ -136,23 +136,12 @@ class Scene(Section):
     floor: Annotated[
         Annotated[Literal["flat"], Tag("(flat)")] | Annotated[Points, Tag("(points)")],
         Discriminator(lambda given: "(flat)" if isinstance(given, str) else "(points)"),
-    ] = Field(
-        default="flat",
-        description="flat, or a profile [[x, y], …] in m, whose ends go on straight",
-    )
+    ] = Field(default="flat", description="flat, or a profile [[x, y], …] in m, whose ends go on straight")
     slope: float = number_field(
-        0.0,
-        "°",
-        "of an endless floor; positive: it falls the way the chain walks",
-        ge=-STEEPEST,
-        le=STEEPEST,
+        0.0, "°", "of an endless floor; positive: it falls the way the chain walks", ge=-STEEPEST, le=STEEPEST
     )
     distance_limit: float | None = number_field(
-        None,
-        "m",
-        "distance along the floor at which a walk ends as distance_limit; null: none",
-        gt=0,
-        le=HIGHEST,
+        None, "m", "distance along the floor at which a walk ends as distance_limit; null: none", gt=0, le=HIGHEST
     )
     walk_until: float | None = number_field(
         None,
@@ -195,11 +184,7 @@ class Scene(Section):
         0.0, "kg m²", "moment of inertia of the charm about that centre, added likewise", ge=0, le=1e12
     )
     stiff_joint: int = number_field(
-        0,
-        "1",
-        "joint that is stiff: the one at the end of this link",
-        ge=0,
-        le=MOST_LINKS - 1,
+        0, "1", "joint that is stiff: the one at the end of this link", ge=0, le=MOST_LINKS - 1
     )
     stiff_joint_factor: float = number_field(
         1.0, "1", "by which viscous and Coulomb friction of stiff_joint are multiplied", ge=0, le=1e6

@@ -278,4 +278,5 @@ def _pull(span: Array, change: Array) -> Array:
     rates = np.zeros((n, n, 2))  # of each half square by each joint
     rates[np.arange(n), np.arange(n)] = span
     rates[np.arange(n), np.arange(n) - 1] -= span
-    return np.linalg.lstsq(rates.reshape(n, 2 * n), change)[0].reshape(n, 2)
+    least = np.linalg.lstsq(rates.reshape(n, 2 * n), change)[0]
+    return np.asarray(least, dtype=np.float64).reshape(n, 2)

@@ -11,7 +11,7 @@ import re
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Final, TypeVar
 
 import numpy as np
 from pydantic import Field
@@ -20,23 +20,25 @@ from warpchain.engine.devices import gpu_turn, has_gpu_turn, start_device
 from warpchain.engine.kernel_choice import shared_threads
 from warpchain.engine.processors import processors
 from warpchain.inputs.options import Options, on_gpu
-from warpchain.inputs.sections import takes_fields
-from warpchain.inputs.setup import Setup
-from warpchain.inputs.validation import InputError, Whole, checked, checked_path, plain, shown, validated
+from warpchain.inputs.sections import SECTION_OF, by_section, takes_fields
+from warpchain.inputs.setup import DEFAULT_PRESET, Setup
+from warpchain.inputs.validation import InputError, Whole, by_name, checked, checked_path, plain, shown, validated
 from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text, progress_bar
-from warpchain.run.sweep_keywords import KEYS, sweep_of_keywords
-from warpchain.run.workers import DaskClient, Executor, Pulse, losses_named, pulsing_threads
+from warpchain.run.workers import Pulse, losses_named, pulsing_threads
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
 from warpchain.store.manifest import Shard
 from warpchain.store.shards import read_shard, write_shard
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import PlannedWalk, Sweep, load_sweep
+from warpchain.sweeps.sweep_file import VERSION, BlockKeys
 from warpchain.walks.rows import LENGTHS, MISSING, derived_columns, faults_of_columns, fill_row, missing_rows
 from warpchain.walks.scheduler import compile_kernels, run_setups
 
 T = TypeVar("T")
 
+KEYS: Final = (*BlockKeys.model_fields, "same_samples_along", "record", "name", "seed")
+"""Keys of a sweep file that are keywords."""
 SHARD_WALKS = 256
 """Most walks in a shard."""
 GPU_TASK_WALKS = 262144
@@ -57,7 +59,7 @@ def sweep(
     *,
     part: str | None = None,
     device: str | None = None,
-    executor: "Executor | DaskClient | None" = None,
+    executor: Any = None,
     workers: int | None = None,
     fresh: bool = False,
     progress: bool = True,
@@ -93,8 +95,8 @@ def sweep(
         part: ``"k/N"``: run only the k-th of N parts, in a folder of its own; ``warpchain merge`` puts them together.
         device: ``"cpu"``, ``"cuda"`` or ``"cuda:N"`` instead of what the sweep says. Method ``standard`` is then what
             it means there; the ``sweep.yaml`` of a folder names the method that was run, which stays.
-        executor: Where shards are run, an executor or a Dask client; its workers must see ``out``. Default: threads of
-            this process.
+        executor: Where shards are run: what has ``submit`` as the executors of ``concurrent.futures`` and
+            ``mpi4py.futures``, or a Dask client; its workers must see ``out``. Default: threads of this process.
         workers: Number of tasks at a time. Default: the processors of this machine; with a Dask client the threads of
             its workers. With an executor, at least the number of its workers. Without one, a GPU has one task.
         fresh: Delete what another sweep left in the folder.
@@ -108,7 +110,7 @@ def sweep(
         LostWorkersError: Worker processes were killed, or the scheduler of a Dask client was closed.
     """
     planned, folder, own, count = _checked_call(source, out, settings, device, workers, part)
-    if isinstance(executor, DaskClient):
+    if hasattr(executor, "get_executor"):
         count = count or sum(executor.nthreads().values())
         executor = executor.get_executor(pure=False)  # pure: a task that failed would fail again, unrun
     with contextlib.ExitStack() as shown:
@@ -157,6 +159,37 @@ def _checked_call(
     return planned, folder, own, count
 
 
+def sweep_of_keywords(given: Mapping[str, object], out: str | os.PathLike[str] | None) -> Sweep:
+    """The sweep that keyword arguments describe.
+
+    Args:
+        given: `KEYS`, and fields of a walk by name or symbol; a list or a range is an axis of the grid, behind those
+            given. Left out, the name is that of the folder, the seed 0, and the preset that of a walk, unless it is
+            an axis.
+        out: Folder of the results.
+
+    Raises:
+        InputError: Something is refused; one line for each value.
+    """
+    usual = {"name": (Path(out).absolute().name if out is not None else "") or "sweep", "seed": 0, "version": VERSION}
+    values = plain(given, "sweep")
+    content: dict[str, Any] = usual | {key: values.pop(key) for key in KEYS if key in values}
+    by_section(values)  # refuses unknown names
+    if isinstance(content.get("preset"), list):
+        values = {"preset": content.pop("preset"), **values}
+    for name, value in by_name(values).items():
+        key = "grid" if isinstance(value, list | dict) else SECTION_OF[name]
+        others = content.setdefault(key, {})
+        if isinstance(others, dict):  # the check of the content refuses anything else
+            if name in by_name(others):
+                raise InputError(f"{name}: given twice, also in {key}; leave one out")
+            content[key] = {**others, name: value}
+    grid = content.get("grid")
+    if not (isinstance(grid, Mapping) and "preset" in grid):
+        content.setdefault("preset", DEFAULT_PRESET)
+    return load_sweep(content)
+
+
 def checked_part(given: object) -> tuple[int, int]:
     """Number of a part and number of parts of "k/N", 1/1 of None, or an `InputError`."""
     if given is None:
@@ -170,7 +203,7 @@ def checked_part(given: object) -> tuple[int, int]:
 def _run_in_folder(
     planned: Sweep,
     folder: Path,
-    executor: Executor | None,
+    executor: Any,
     workers: int | None,
     fresh: bool,
     part: tuple[int, int],
@@ -312,7 +345,7 @@ def _shared_threads(planned: Sweep) -> int | None:
 
 
 def _run(
-    executor: Executor,
+    executor: Any,
     pulse: Pulse | None,
     planned: Sweep,
     store: SweepFolder,
