@@ -212,12 +212,12 @@ def _run_in_folder(
     """Run what is missing in a folder."""
     at_once = workers or processors()
     if executor is None:
-        devices = _devices(planned)
-        if has_gpu_turn() and any(map(on_gpu, devices)):
+        kinds = _Kinds(planned)
+        if has_gpu_turn() and any(map(on_gpu, kinds.devices)):
             raise InputError("device: this thread is in the middle of a walk on a GPU; begin a sweep when it is over")
-        for device in devices:
+        for device in kinds.devices:
             start_device(device)  # refuses one that is not there before anything is written
-        if _is_on_gpu(planned):
+        if kinds.on_gpu:
             at_once = 1  # the others would wait for it
     size = shard_size(planned.walk_count)
     with SweepFolder.open(folder, planned, fresh=fresh, shard_size=size, part=part) as store:
@@ -260,16 +260,6 @@ def on_device(planned: Sweep, device: str) -> Sweep:
     return load_sweep(canonical)
 
 
-def _devices(planned: Sweep) -> set[str]:
-    """Devices of all walks."""
-    return {setup.options.device for setup in one_of_each_kind(planned)}
-
-
-def _is_on_gpu(planned: Sweep) -> bool:
-    """Whether all walks go to a GPU."""
-    return all(map(on_gpu, _devices(planned)))
-
-
 def shard_size(walks: int) -> int:
     """Walks per shard; it depends on the sweep only, so that equal sweeps leave equal files."""
     return max(1, min(SHARD_WALKS, walks // SHARDS))
@@ -307,7 +297,8 @@ def run_shards(
 
     with gpu_turn((setup.options.device for setup in setups), stop):
         # all at once, and in this process: a walk that needs one would wait for it alone
-        compile_kernels(one_of_each_kind(planned) if _is_on_gpu(planned) else setups, threads)
+        kinds = _Kinds(planned)
+        compile_kernels(kinds.setups if kinds.on_gpu else setups, threads)
         for number, run in run_setups(setups, draw=draw, keeps=keeps, threads=threads, stop=stop):
             shard, row = places[number]
             if pulse is not None:
@@ -321,27 +312,28 @@ def run_shards(
 
 def prepare(planned: Sweep) -> None:
     """Load every kernel that the walks of a sweep need into this process, compiled if need be."""
-    compile_kernels(one_of_each_kind(planned), _shared_threads(planned))
+    kinds = _Kinds(planned)
+    compile_kernels(kinds.setups, kinds.threads)
 
 
-def one_of_each_kind(planned: Sweep) -> list[Setup]:
-    """Setups with all options, numbers of links and starts that walks of a sweep have, but not with all else."""
-    return [setup for block in planned.blocks for setup in block.fixed_in(block.cells_along(_KIND))]
+class _Kinds:
+    """Setups with all options, numbers of links and starts that walks of a sweep have, but not with all else.
 
+    Attributes:
+        setups: these.
+        devices: of all walks.
+        on_gpu: Whether all walks go to a GPU.
+        threads: Of every block if the sweep runs on a GPU with one method; None: as many as a chain needs.
+    """
 
-_KIND = frozenset((*Options.model_fields, "links", "start", "plane"))
-"""Axes along which kernels or their threads may differ."""
-
-
-def _shared_threads(planned: Sweep) -> int | None:
-    """Threads of every block if the sweep runs on a GPU with one method; None: as many as a chain needs."""
-    if not _is_on_gpu(planned):
-        return None
-    cells = one_of_each_kind(planned)
-    methods = {setup.options.method for setup in cells}
-    if len(methods) > 1:
-        return None
-    return shared_threads(methods.pop(), (setup.scene.links for setup in cells), planned.walk_count)
+    def __init__(self, planned: Sweep) -> None:
+        axes = (*Options.model_fields, "links", "start", "plane")
+        self.setups = [setup for block in planned.blocks for setup in block.fixed_in(block.cells_along(axes))]
+        self.devices = {setup.options.device for setup in self.setups}
+        self.on_gpu, methods = all(map(on_gpu, self.devices)), {setup.options.method for setup in self.setups}
+        links = (setup.scene.links for setup in self.setups)
+        alike = self.on_gpu and len(methods) == 1
+        self.threads = shared_threads(methods.pop(), links, planned.walk_count) if alike else None
 
 
 def _run(
@@ -357,7 +349,7 @@ def _run(
     """Give each worker two tasks at a time, so that memory does not grow with the sweep."""
     report(progress)
     began, written_walks = time.perf_counter(), 0
-    threads = _shared_threads(planned)
+    threads = _Kinds(planned).threads
     waiting = _tasks(planned, missing, workers if pulse is None else 1)  # threads take turns on a GPU
     folder, stamp = store.directory / "shards", store.stamp
     pending: dict[concurrent.futures.Future[None], list[Shard]] = {}  # with the shards still to be counted
