@@ -50,25 +50,6 @@ LAUNCHERS = {"warpchain.engine.batch", "warpchain.engine.devices"}
 GPU_OR_NOT = "warpchain.engine.devices"
 """The only module that asks Warp whether a device is a GPU: what differs stands there, with a form for CPU fibers."""
 LAUNCHES = ("launch", "launch_tiled", "capture_launch")
-TOP_LEVEL = {
-    ".ci",
-    ".gitignore",
-    ".mkdocs.yml",
-    ".pre-commit-config.yaml",
-    "CHANGELOG.md",
-    "CITATION.cff",
-    "CONTRIBUTING.md",
-    "LICENSE",
-    "README.md",
-    "docs",
-    "kernels",
-    "pyproject.toml",
-    "studies",
-    "sweeps",
-    "tests",
-    "warpchain",
-}
-
 Graph = Mapping[str, Iterable[str]]
 """What each module imports."""
 
@@ -157,15 +138,6 @@ def violations(graph: Graph) -> list[str]:
     return found
 
 
-def circle(graph: Graph) -> list[str]:
-    """Modules that import one another in a circle; empty if there is none."""
-    try:
-        graphlib.TopologicalSorter(graph).prepare()
-    except graphlib.CycleError as error:
-        return list(error.args[1])
-    return []
-
-
 def launches(source: str) -> set[str]:
     """Calls in a text that launch kernels."""
     calls = {ast.unparse(node.func) for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call)}
@@ -210,22 +182,7 @@ def test_imports_go_downwards() -> None:
     """No wing imports one above it, none what is not for it, and there is no circle."""
     graph = real_graph()
     assert violations(graph) == []
-    assert circle(graph) == []
-
-
-@pytest.mark.parametrize(
-    ("module", "target", "rule"),
-    [
-        ("engine.batch", "pictures.style", "not downwards"),
-        ("__main__", "bench.flights", "only cli may"),
-        ("walks.scheduler", "kernels.cpu.loop", "only engine may"),
-        ("kernels.contacts.impulse", "kernels.methods.controller", "not downwards"),
-    ],
-)
-def test_a_planted_import_is_found(module: str, target: str, rule: str) -> None:
-    """Each rule, broken by one import."""
-    (found,) = violations({f"warpchain.{module}": [f"warpchain.{target}"]})
-    assert found.endswith(rule)
+    graphlib.TopologicalSorter(graph).prepare()  # a CycleError names a circle
 
 
 @pytest.mark.parametrize("path", STUDIES, ids=lambda path: path.relative_to(ROOT).as_posix())
@@ -240,19 +197,6 @@ def test_the_package_knows_no_study() -> None:
     """Neither the host nor a kernel imports one."""
     for path in MODULES.values():
         assert not [name for name in imports(path.read_text(encoding="utf-8")) if name.startswith("studies")], path
-
-
-def test_planted_sins_are_found() -> None:
-    """A circle, a launch, a foreign import, a lazy one, and what a study must not take are seen."""
-    assert private("from warpchain.status import Status\nimport warpchain\nwarpchain.engine, warpchain.walk") == [
-        "warpchain.engine",
-        "warpchain.status.Status",
-    ]
-    assert set(circle({"a": ["b"], "b": ["c"], "c": ["a"], "d": ["a"]})) == {"a", "b", "c"}
-    assert launches("def f(): wp.launch(kernel, dim=1)") == {"wp.launch"}
-    assert foreign("import warp as wp, numpy\nfrom warpchain.engine import batch") == ["numpy", "warpchain"]
-    lazy = "def f():\n    from warpchain.run import single_walk"
-    assert imported_modules(f"{lazy}\nif TYPE_CHECKING:\n    import warpchain.status") == {"warpchain.run.single_walk"}
 
 
 def test_the_drawing_shows_the_arrows() -> None:
@@ -317,16 +261,11 @@ def test_importing_starts_and_loads_nothing() -> None:
     assert (done.stdout, done.stderr) == ("[]\n[]\nNone\n", "")
 
 
-def test_the_repository_holds_only_the_project() -> None:
-    """The top level is fixed: no environment, cache or result is under version control."""
-    assert {name.partition("/")[0] for name in tracked()} <= TOP_LEVEL
-
-
 def test_texts_do_not_point_outside() -> None:
     """No file names a folder of the machine it was written on."""
     outside = ["/".join(("", "work", "")), "/".join(("shared", "")), "/".join(("", "tmp", "plan"))]
     for name in tracked():
         path = ROOT / name
-        if name.partition("/")[0] in TOP_LEVEL and path.is_file():
+        if path.is_file():
             text = path.read_bytes()
             assert not [word for word in outside if word.encode() in text], name

@@ -45,15 +45,6 @@ def test_only_regular_files_are_replaced(tmp_path: Path, kind: str, reason: str)
     assert path.lstat() == before and other.read_text() == "mine" and len(list(tmp_path.iterdir())) == 2
 
 
-def test_what_comes_while_a_file_is_written_is_not_replaced(tmp_path: Path) -> None:
-    """What may be replaced is decided again just before it is."""
-    path = tmp_path / "file"
-    with pytest.raises(NotReplaceable, match="no regular file"), replacing(path) as part:
-        part.write_text("new")
-        os.mkfifo(path)
-    assert path.is_fifo() and parts(tmp_path) == []
-
-
 @pytest.mark.parametrize(
     ("path", "problem"),
     [("", "a path is empty"), ("a\0b", r"'a\\x00b': has a NUL"), ("a\ud800b", r"'a\\ud800b': has a NUL or a lone")],

@@ -39,18 +39,20 @@ from warpchain import version as _version
 
 if TYPE_CHECKING:
     from warpchain import films as films
-    from warpchain.inputs.parameters import Parameters
+    from warpchain.inputs.parameters import Parameters as Parameters
     from warpchain.inputs.parameters import preset as preset
-    from warpchain.inputs.state import State
-    from warpchain.inputs.validation import InputError
+    from warpchain.inputs.state import State as State
+    from warpchain.inputs.validation import InputError as InputError
     from warpchain.run.simulation import Chains as Chains
-    from warpchain.run.simulation import simulate
-    from warpchain.run.single_walk import walk
-    from warpchain.run.sweep_run import sweep
-    from warpchain.status import Status
-    from warpchain.store.sweep_result import SweepResult, load
-    from warpchain.walks.trajectory import Trajectory
-    from warpchain.walks.walk_result import WalkResult, load_walk
+    from warpchain.run.simulation import simulate as simulate
+    from warpchain.run.single_walk import walk as walk
+    from warpchain.run.sweep_run import sweep as sweep
+    from warpchain.status import Status as Status
+    from warpchain.store.sweep_result import SweepResult as SweepResult
+    from warpchain.store.sweep_result import load as load
+    from warpchain.walks.trajectory import Trajectory as Trajectory
+    from warpchain.walks.walk_result import WalkResult as WalkResult
+    from warpchain.walks.walk_result import load_walk as load_walk
 
 __version__ = _version.VERSION
 
@@ -72,23 +74,7 @@ _HOMES = {
     "walk": "run.single_walk",
 }
 
-__all__ = [
-    "Chains",
-    "InputError",
-    "Parameters",
-    "State",
-    "Status",
-    "SweepResult",
-    "Trajectory",
-    "WalkResult",
-    "films",
-    "load",
-    "load_walk",
-    "preset",
-    "simulate",
-    "sweep",
-    "walk",
-]
+__all__ = [*_HOMES]
 
 
 def __getattr__(name: str) -> Any:

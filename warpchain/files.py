@@ -44,14 +44,6 @@ def failure(number: int, text: str) -> OSError:
     return error
 
 
-def is_possible(path: str) -> bool:
-    """Whether the system could have a file of that path: it has no NUL and can be encoded."""
-    try:
-        return b"\0" not in os.fsencode(path)
-    except UnicodeEncodeError:  # a lone surrogate
-        return False
-
-
 def given_path(path: str | os.PathLike[str]) -> Path:
     """A path as a user gave it.
 
@@ -61,7 +53,7 @@ def given_path(path: str | os.PathLike[str]) -> Path:
     text = os.fspath(path)
     if not text:
         raise failure(errno.ENOENT, "a path is empty; name a file or folder")
-    if not is_possible(text):
+    if "\0" in text or (not text.isascii() and text.encode(errors="ignore").decode() != text):
         raise failure(errno.EINVAL, f"{ascii(text)[:100]}: has a NUL or a lone surrogate; leave it out")
     return Path(path)
 

@@ -13,7 +13,6 @@ Fields of a dataclass that a file keeps are annotated with `Stored`; `write_fiel
 import hashlib
 import io
 import os
-import re
 import stat
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -32,9 +31,6 @@ if TYPE_CHECKING:
 _SIGNATURE: Final = b"\x89HDF\r\n\x1a\n"
 _LINE: Final = "\nwarpchain SHA-256: {}\n"
 _LINE_LENGTH: Final = len(_LINE.format("0" * 64))
-_OLDER_LINE: Final = re.compile(rb"\nwarpchain checksums: SHA-256 of \d{16} bytes in pieces, ")
-_OLDER_LENGTH: Final = 150
-"""Among so many bytes at the end of a file of warpchain 0.1 is the line above."""
 _PIECE: Final = 2**20
 _FIXED: Final[dict[str, Any]] = {"libver": ("v108", "v108"), "track_order": True}
 """Version bounds without which equal content would not give equal bytes; they also leave out times."""
@@ -205,7 +201,7 @@ def _compare(path: str | os.PathLike[str], remedy: str, wanted: str | None) -> N
         try:
             head = file.read(len(_SIGNATURE))
             left = file.seek(0, os.SEEK_END) - _LINE_LENGTH
-            file.seek(max(0, left + _LINE_LENGTH - _OLDER_LENGTH))
+            file.seek(max(0, left))
             end = file.read()
             file.seek(0)
             digest = hashlib.sha256()
@@ -214,13 +210,11 @@ def _compare(path: str | os.PathLike[str], remedy: str, wanted: str | None) -> N
                 left -= len(piece)
         except OSError as error:
             raise unreadable(path, error) from error
-    if end.endswith(_LINE.format(digest.hexdigest()).encode()):
+    if end == _LINE.format(digest.hexdigest()).encode():
         return
-    if _OLDER_LINE.search(end):
-        raise InputError(f"{path}: of warpchain 0.1, which reads it; {remedy}")
     if wanted and head != _SIGNATURE and b"warpchain SHA-256: " not in end:
         raise InputError(f"{path}: not an HDF5 file; {wanted}")
-    raise DamagedFileError(f"{path}: damaged or cut short; {remedy}")
+    raise DamagedFileError(f"{path}: damaged or cut short; {remedy} (or of warpchain 0.1, which reads it)")
 
 
 def open_regular(path: str | os.PathLike[str]) -> BinaryIO:

@@ -56,68 +56,6 @@ def test_help_is_quick_and_complete(tmp_path: Path) -> None:
     assert min(computed) < 2.5 * min(libraries)
 
 
-REFUSED = {
-    "--links 61": "scene.links: 61 is odd",
-    "--frequency -5": "scene.frequency: Input should be greater than or equal to 0, in Hz; given -5",
-    "--method rk4": "options.method: 'rk4' is unknown",
-    "--method rodas5p": "options.method: 'rodas5p' was removed; give dp5",
-    "--preset hard": "preset: 'hard' is unknown",
-    "--seed -1": "seed: -1",
-    "--set parameters.gravity=yes": "parameters.gravity: Input should be a valid number, in m/s²; given True",
-    "--set clearance=[1": "scene.clearance, line 1: ",
-    "--set clearance": "--set: 'clearance' gives no value",
-    "--set clearence=0.01": "--set 'clearence': unknown name; did you mean scene.clearance?",
-    "--set scene.gravity=1": "--set 'scene.gravity': unknown name; did you mean parameters.gravity?",
-    "--set links=62 --links 64": "scene.links: given twice",
-    "--device cuda:98": "options.device: there is no cuda:98 on this machine",
-    "--device cpu --set device=cpu": "options.device: given twice",
-    "--config nowhere.yaml": "nowhere.yaml: No such file",
-    "--frame-interval 0": "frame_interval: 0 is no positive time in s",
-    "--animate avi": "'--animate'",
-    "--frobnicate": "(Possible options: --animate); see warpchain walk --help",
-    "extra": "unexpected extra argument(s) (extra); see warpchain walk --help",
-}
-"""Bad arguments of `walk` → how the line of refusal begins, or what it holds."""
-
-
-@pytest.mark.parametrize("arguments", REFUSED)
-def test_bad_input_is_refused_in_one_line(command: Command, tmp_path: Path, arguments: str) -> None:
-    """Status 2, one line on stderr that names the field, nothing on stdout, no folder."""
-    answer = command("walk", *arguments.split(" "), "-o", "new")
-    assert answer.status == 2 and answer.out == ""
-    assert answer.err.startswith("error: ") and answer.err.count("\n") == 1 and answer.err.endswith("\n")
-    assert REFUSED[arguments] in answer.err
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    ("arguments", "line"),
-    [
-        ("foo", "No such command 'foo'; see warpchain --help"),
-        ("info", "Missing argument 'DIR'; see warpchain info --help"),
-        ("walk --json=1", "Option '--json' does not take a value; see warpchain --help"),
-    ],
-)
-def test_what_is_no_command_names_the_help(command: Command, arguments: str, line: str) -> None:
-    """A line that is no command, or lacks something, is refused with the help that says what there is."""
-    answer = command(*arguments.split())
-    assert (answer.status, answer.out) == (2, "")
-    assert answer.err == f"error: {line}\n"
-
-
-@pytest.mark.parametrize("folder", ["file", "file/below", "/dev/null/below", "x" * 300])
-def test_a_folder_that_cannot_be_is_found_before_the_walk(
-    command: Command, monkeypatch: pytest.MonkeyPatch, folder: str
-) -> None:
-    """A folder that cannot be written is refused, and no walk is run for it."""
-    Path("file").touch()
-    monkeypatch.setattr(WALK_MODULE, "run_walk", None)
-    answer = command("walk", "-o", folder)
-    assert (answer.status, answer.out) == (2, "")
-    assert answer.err.startswith("error: --output: ") and answer.err.count("\n") == 1
-    assert [path.name for path in Path().iterdir()] == ["file"]
-
-
 def test_mp4_without_its_extra_is_found_before_the_walk(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without imageio-ffmpeg an MP4 is refused at once, with the command that installs it."""
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
@@ -219,19 +157,6 @@ def test_a_chain_that_was_never_released_leaves_no_pictures(command: Command) ->
     assert [path.name for path in Path("new").iterdir()] == ["walk.h5"]
     lines = answer.err.splitlines()
     assert [line.partition(":")[0] for line in lines] == ["new/film_strip.png", "not_steady"]
-
-
-@pytest.mark.parametrize("name", ["walk.h5", "loop.png", "walk.gif"])
-def test_what_a_file_cannot_replace_is_found_before_the_walk(
-    command: Command, monkeypatch: pytest.MonkeyPatch, name: str
-) -> None:
-    """A folder in the place of one of the files is refused, and no walk is run."""
-    Path("new", name).mkdir(parents=True)
-    monkeypatch.setattr(WALK_MODULE, "run_walk", None)
-    answer = command("walk", *QUICK, "--animate", "gif", "-o", "new")
-    assert (answer.status, answer.out) == (2, "")
-    assert answer.err == f"error: new/{name}: cannot be written (it is a folder); give another path\n"
-    assert [path.name for path in Path("new").iterdir()] == [name]
 
 
 def test_a_defect_is_not_disguised_as_bad_input(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,6 @@ from tests.support.command_line import Command
 from warpchain.inputs.sections import SECTION_OF
 from warpchain.store.folder import SweepFolder
 from warpchain.sweeps.plan import Sweep, load_sweep
-from warpchain.sweeps.shipped import shipped_sweeps
 from warpchain.sweeps.sweep_file import sweep_schema
 
 command = command_line.command
@@ -30,35 +29,6 @@ def test_parameters_as_a_table(command: Command) -> None:
     assert rows["load_factor"].startswith("load_factor null [1, 10000] by which gravity")
     some = command("parameters", "k", "scene.nu", "--preset", "soft").out.splitlines()
     assert [line.split()[:3] for line in some[1:]] == [["joint_stiffness", "k", "1e7"], ["frequency", "nu", "15"]]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "line"),
-    [
-        ("parameters floor_frictoin", "'floor_frictoin': unknown name; did you mean parameters.floor_friction?"),
-        ("parameters --preset hard", "preset: 'hard' is unknown; presets are paper, soft"),
-        (
-            "walk --set mu_fc=0.3 --set floor_friction=0.3",
-            "parameters.floor_friction: given twice on the command line;",
-        ),
-        ("schema -o no/schema.json", "no/schema.json: cannot be written"),
-        ("sweep", "FILE.yaml: missing; give a sweep file, or --new FILE.yaml"),
-        ("sweep figure6", "--output: missing; give a folder for the results with -o DIR"),
-        ("sweep figur6 -o new", "figur6: neither a file nor a shipped sweep; did you mean figure6?"),
-        (
-            "sweep x -o new",
-            f"x: neither a file nor a shipped sweep; give one of {', '.join(shipped_sweeps())}",
-        ),
-        ("sweep --new no/new.yaml", "--new: no/new.yaml: cannot be written (No such file or directory); give"),
-        ("sweep --new new.yaml -o new", "--new: given together with other arguments; leave them out"),
-    ],
-)
-def test_bad_input_is_refused_in_one_line(command: Command, tmp_path: Path, arguments: str, line: str) -> None:
-    """Status 2, one line on stderr, and nothing else anywhere."""
-    answer = command(*arguments.split())
-    assert (answer.status, answer.out) == (2, "")
-    assert answer.err.startswith(f"error: {line}") and answer.err.count("\n") == 1
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_symbols_on_the_line_and_in_the_file(command: Command) -> None:

@@ -69,7 +69,7 @@ def assert_refused(answer: Answer, status: int, *words: str) -> None:
         assert word in answer.err
 
 
-@pytest.mark.parametrize("line", [*OUTPUTS, "walk -o {}", "sweep some.yaml -o {}", "bench -o {}"])
+@pytest.mark.parametrize("line", [*OUTPUTS, "walk -o {}", "sweep some.yaml -o {}"])
 def test_an_empty_path_is_refused(command: Command, line: str) -> None:
     """It is not taken for the current folder; status 2, one line, nothing written."""
     prepare()
@@ -79,11 +79,11 @@ def test_an_empty_path_is_refused(command: Command, line: str) -> None:
     assert answer.out == "" and content() == before
 
 
-@pytest.mark.parametrize("line", [*OUTPUTS, "bench -o {}"])
+@pytest.mark.parametrize("line", OUTPUTS)
 def test_a_pipe_in_the_way_is_refused(command: Command, line: str) -> None:
     """No command waits for a pipe or replaces it; status 2, one line, nothing written."""
     prepare()
-    name = OUTPUTS.get(line, "bench.json")
+    name = OUTPUTS[line]
     os.mkfifo(name)
     before = content()
     answer = command(*line.format(name).split())

@@ -42,17 +42,3 @@ def test_a_kernel_cache_that_cannot_be_used_is_named(tmp_path: Path, inside: str
     assert answer.returncode == 2
     assert answer.stderr.startswith(f"error: WARP_CACHE_PATH: {tmp_path}/file") and answer.stderr.count("\n") == 1
     assert "name a folder for kernels that can be written to" in answer.stderr
-
-
-def test_a_working_directory_that_was_deleted_is_named(tmp_path: Path) -> None:
-    """A command that needs the working directory says that it is gone."""
-    Path(tmp_path, "gone").mkdir()
-    answer = subprocess.run(
-        ["sh", "-c", f"rmdir ../gone; {sys.executable} -m warpchain {WALK} -o out"],
-        cwd=tmp_path / "gone",
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-    )
-    assert answer.returncode == 2
-    assert answer.stderr == "error: working directory: it was deleted; change to another one\n"

@@ -45,17 +45,6 @@ def test_without_a_terminal_lines_of_progress_are_printed(
     assert lines[-1].startswith("80 of 80 walks   ") and " a second   0 s left   80 time_limit" in lines[-1]
 
 
-def test_walks_are_counted_before_their_shard_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """While the only shard is under way, walks that are over count."""
-    monkeypatch.setattr(sweep_run, "POLL", 0.01)
-    monkeypatch.setattr(sweep_run, "SHARDS", 1)
-    seen: list[int] = []
-    given = TINY | {"grid": {"links": [30]}, "samples": 16}
-    sweep_run.sweep(given, tmp_path / "one", workers=1, on_progress=lambda progress: seen.append(progress.done))
-    assert len(list((tmp_path / "one/shards").iterdir())) == 1
-    assert seen == sorted(seen) and seen[-1] == 16 and any(0 < done < 16 for done in seen)
-
-
 def test_an_estimate_says_time_and_size(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A few walks are run, nothing is written; the size is that of what the sweep then writes, but for its headers."""
     recorded = TINY | {"samples": 40, "record": {"series": {"samples": [0]}}}

@@ -9,7 +9,6 @@ import pytest
 import warpchain
 from tests.support import command_line
 from tests.support.command_line import Command
-from warpchain.cli import walk_commands
 from warpchain.inputs.validation import InputError
 from warpchain.walks.walk_result import STORED, WalkResult
 
@@ -130,43 +129,3 @@ def test_a_method_beside_like_brings_its_settings(
     monkeypatch.setattr("warpchain.walks.one_walk.run_walk", run_walk)
     assert command("walk", "--like", str(saved), *line.split()).err == "error: enough\n"
     assert seen[0].options == Options.model_validate(expected)
-
-
-REFUSED = {
-    "plot nowhere.h5": "nowhere.h5: cannot be read (No such file or directory)",
-    "plot text.h5": "text.h5: not an HDF5 file",
-    "plot saved/walk.h5 --quantity dx": "--quantity: a saved walk has no columns",
-    "plot saved/walk.h5 -o text": "--output: text: Not a directory",
-    "animate nowhere.h5": "nowhere.h5: cannot be read (No such file or directory)",
-    "animate saved -o walk.avi": "walk.avi: unknown kind of picture",
-    "animate saved --fps 0": "fps: 0.0 is not a positive number",
-    "animate saved -o nowhere/walk.gif": "nowhere/walk.gif: cannot be written",
-    "walk --like nowhere.h5": "nowhere.h5: cannot be read (No such file or directory)",
-    "walk --like saved/walk.h5 --seed 3": "--seed: given together with --like",
-    "walk --like saved/walk.h5 --links 61": "scene.links: 61 is odd",
-}
-"""Bad arguments → how the line of refusal begins."""
-
-
-@pytest.mark.parametrize("arguments", REFUSED)
-def test_bad_input_is_refused_in_one_line(command: Command, saved: Path, arguments: str) -> None:
-    """Status 2, one line on stderr, nothing on stdout, nothing written."""
-    Path("text").write_text("no walk", encoding="utf-8")
-    Path("text.h5").write_text("no walk", encoding="utf-8")
-    before = sorted(Path().rglob("*"))
-    answer = command(*arguments.split())
-    assert (answer.status, answer.out) == (2, "")
-    assert answer.err.startswith(f"error: {REFUSED[arguments]}") and answer.err.count("\n") == 1
-    assert sorted(Path().rglob("*")) == before
-
-
-def test_a_refusal_of_several_lines_is_printed_as_several(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each of several problems has a line of its own."""
-
-    def refuse(*_: object) -> None:
-        raise InputError("links: 3 is odd;  give an even number", "samples: 0 is less than 1; give 1 or more")
-
-    monkeypatch.setattr(walk_commands, "_given_values", refuse)
-    answer = command("walk")
-    lines = ["error: links: 3 is odd; give an even number", "error: samples: 0 is less than 1; give 1 or more"]
-    assert answer.status == 2 and answer.err.splitlines() == lines

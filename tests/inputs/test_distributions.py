@@ -58,18 +58,6 @@ def test_draw_order() -> None:
     for name, quantity in Parameters.quantities().items():
         if quantity.sigma:
             assert getattr(drawn, name) == rng.normal(quantity.value, quantity.sigma), name
-    assert [name for name, quantity in Parameters.quantities().items() if quantity.sigma] == [
-        "link_length",
-        "sprocket_radius",
-        "inner_mass",
-        "outer_mass",
-        "inner_inertia",
-        "outer_inertia",
-        "viscous_friction",
-        "coulomb_friction",
-        "floor_restitution",
-        "floor_friction",
-    ]
 
 
 def test_hopeless_draw_is_an_error() -> None:
@@ -92,5 +80,5 @@ def test_samples_depend_on_their_name_only() -> None:
 @pytest.mark.parametrize("name", [(-1,), (2**128,), (True,), (0, -1), (0, 2**32), (0, 0, -1)])
 def test_generator_refusals(name: tuple[Any, ...]) -> None:
     """A seed or index that would not name one stream is refused by its name."""
-    with pytest.raises(InputError, match=r"^(seed|cell|sample): .* is no whole number from 0 to"):
+    with pytest.raises(InputError, match=r"^(seed|cell|sample): Input should be "):
         random_generator(*name)

@@ -33,12 +33,6 @@ def test_words_mean_methods_that_the_device_has() -> None:
     assert Options(device="cuda") == Options(method="explicit", device="cuda")
 
 
-def test_hybrid_alone_has_the_tolerance_that_it_is_made_for() -> None:
-    """1e-4 for its bursts of order 3, unless one says otherwise; other integrators 1e-6."""
-    assert (Options(method="hybrid").tolerance, Options(method="os32").tolerance) == (1e-4, 1e-6)
-    assert Options(method="hybrid", tolerance=1e-5).tolerance == 1e-5
-
-
 @pytest.mark.parametrize("word", ["standard", "explicit"])
 def test_a_tolerance_given_beside_a_word_is_that_of_soft_joints_too(word: str) -> None:
     """Unless theirs is given as well."""

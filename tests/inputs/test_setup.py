@@ -6,12 +6,11 @@ import pytest
 
 import warpchain
 from tests.support.setups import setup_walk
-from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import PRESETS, Parameters, preset
-from warpchain.inputs.scene import Scene
+from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.sections import NAME_OF_SYMBOL, SECTION_OF, SYMBOL_OF
-from warpchain.inputs.setup import Setup, read_setup, resolve
+from warpchain.inputs.setup import resolve
 from warpchain.inputs.validation import InputError
+from warpchain.sweeps.sweep_file import read_walk_file
 
 SYMBOLS = {
     "links": "n", "frequency": "nu", "link_length": "ell", "sprocket_radius": "R", "inner_mass": "m_inner",
@@ -30,13 +29,6 @@ def written(folder: Path, text: str) -> Path:
     return path
 
 
-def test_values_are_completed() -> None:
-    """Values that are not given come from the preset and from the defaults."""
-    setup = resolve("soft", scene={"links": 80}, options={"method": "dp5"}, parameters={"gravity": 1.62})
-    parameters = PRESETS["soft"].with_values({"gravity": 1.62})
-    assert setup == Setup("soft", parameters, Scene(links=80), Options(method="dp5"))
-
-
 def test_a_file_gives_the_setup_of_its_values(tmp_path: Path) -> None:
     """Sections without values, or no section at all, leave the defaults."""
     text = """
@@ -48,14 +40,14 @@ def test_a_file_gives_the_setup_of_its_values(tmp_path: Path) -> None:
       self_contact: no
     parameters:
     """
-    name, sections = read_setup(written(tmp_path, text))
+    name, sections = read_walk_file(written(tmp_path, text))
     assert resolve(name, **sections) == resolve(
         "paper",
         scene={"links": 80, "frequency": 20.0, "start": "ellipse"},
         options={"tolerance": 1e-7, "step_limit": 1_000_000, "self_contact": False},
         parameters={},
     )
-    assert read_setup(written(tmp_path, "scene: {n: 8}")) == (
+    assert read_walk_file(written(tmp_path, "scene: {n: 8}")) == (
         None, {"scene": {"links": 8}, "options": {}, "parameters": {}}
     )  # fmt: skip
 
@@ -76,14 +68,14 @@ def test_symbols_stand_for_names(tmp_path: Path, name: str) -> None:
         assert setup_walk("soft", {symbol: value}, None) == expected
         assert preset("soft").with_values({symbol: value}) == expected.parameters
         path = written(tmp_path, f"preset: soft\nparameters: {{{symbol}: {value!r}}}")
-        assert read_setup(path)[1]["parameters"] == {name: value}
+        assert read_walk_file(path)[1]["parameters"] == {name: value}
 
 
 def test_a_value_is_given_once(tmp_path: Path) -> None:
     """A value by name and by symbol is refused."""
     path = written(tmp_path, "preset: soft\nparameters: {mu_fc: 0.3, floor_friction: 0.3}")
     with pytest.raises(InputError, match=r"^parameters\.floor_friction: given twice, also as 'mu_fc'; leave one out$"):
-        read_setup(path)
+        read_walk_file(path)
     for call in (warpchain.walk, lambda **both: preset("soft").with_values(both)):
         with pytest.raises(InputError, match=r"^(parameters\.)?gravity: given twice, also as 'g'; leave one out$"):
             call(gravity=9.0, g=9.0)

@@ -67,35 +67,13 @@ def test_a_heap_comes_to_rest() -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "names"),
-    [
-        ({"velocity": np.zeros((2, LINKS, 2))}, "velocity"),
-        ({"position": np.full((2, LINKS, 3), np.nan)}, "position"),
-        ({"parameters": [SOFT]}, "parameters: 1 of 2 chains"),
-        ({"parameters": "soft"}, "parameters"),
-        ({"floor": [[-1, 0], [1, 0]]}, "floor"),
-        ({"soften_drive": True}, "soften_drive"),
-    ],
-)
-def test_wrong_input_is_one_line(changes: dict, names: str) -> None:
-    """What does not fit is refused by its name."""
-    position, velocity = loops(2)
-    given = {"parameters": [SOFT, SOFT], "position": position, "velocity": velocity} | changes
-    with pytest.raises(warpchain.InputError, match=names):
-        warpchain.Chains(**given)
-
-
-@pytest.mark.parametrize(
     ("call", "problem"),
     [
-        (lambda chains: chains.run(1e-4), "until: .* at least 0.0002"),
-        (lambda chains: chains.run(float("nan")), "until"),
-        (lambda chains: chains.run("soon"), "until"),
-        (lambda chains: chains.run(1.0, [2]), "chains: .* 0 to 1"),
-        (lambda chains: chains.motions([-1]), "chains: .* 0 to 1"),
-        (lambda chains: chains.set_velocity([7], np.zeros((1, LINKS, 3))), "chains: .* 0 to 1"),
+        (lambda chains: chains.run(1e-4), "until: .* 0.0002"),
+        (lambda chains: chains.run("soon"), "until: "),
+        (lambda chains: chains.run(1.0, [2]), r"chains\[0\]: .* less than 2"),
+        (lambda chains: chains.motions([-1]), r"chains\[0\]: "),
         (lambda chains: chains.set_velocity([0], np.zeros((2, LINKS, 3))), r"velocity: .* \(1, 12, 3\)"),
-        (lambda chains: chains.set_velocity([0], "fast"), "velocity"),
     ],
 )
 def test_what_chains_cannot_do_is_refused(call: Callable[[warpchain.Chains], object], problem: str) -> None:

@@ -7,9 +7,6 @@ from tests.oracle_model.circular_loop import circular_loop
 from tests.support.setups import setup_walk
 from warpchain.inputs.scene import OF_LINKS
 from warpchain.inputs.sections import SECTION_OF
-from warpchain.sweeps.plan import load_sweep
-
-PLAIN = {"version": 1, "name": "grid", "seed": 3, "preset": "soft", "samples": 2}
 
 
 def of_numpy(value):
@@ -29,35 +26,6 @@ def test_every_setting_takes_a_numpy_value():
     for model in (again.parameters, again.scene, again.options):
         for name, value in model:
             assert type(value) is type(given[name]), name
-
-
-def test_a_sweep_of_arrays_is_that_of_lists():
-    """Grids, scenes, distributions and records: one digest."""
-    arrays = load_sweep(
-        {
-            **PLAIN,
-            "seed": np.int64(3),
-            "samples": np.uint16(2),
-            "grid": {"links": np.arange(30, 60, 10), "frequency": np.linspace(5, 30, 6), "gravity": (9.0, 9.5)},
-            "scene": {"clearance": np.float64(0.02)},
-            "options": {"self_contact": np.bool_(False)},
-            "distributions": {"floor_friction": {"uniform": np.array([0.1, 0.2])}},
-            "record": {"series": {"samples": range(2)}},
-            "same_samples_along": ("links",),
-        }
-    )
-    lists = load_sweep(
-        {
-            **PLAIN,
-            "grid": {"links": [30, 40, 50], "frequency": [5.0, 10.0, 15.0, 20.0, 25.0, 30.0], "gravity": [9.0, 9.5]},
-            "scene": {"clearance": 0.02},
-            "options": {"self_contact": False},
-            "distributions": {"floor_friction": {"uniform": [0.1, 0.2]}},
-            "record": {"series": {"samples": [0, 1]}},
-            "same_samples_along": ["links"],
-        }
-    )
-    assert arrays.digest() == lists.digest() and arrays.canonical() == lists.canonical()
 
 
 def test_a_walk_and_a_trajectory_of_numpy_numbers():

@@ -1,6 +1,7 @@
-"""What `simulate` and `walk` refuse: one line that begins with the field's name, before anything is computed."""
+"""What `simulate`, `walk` and `Chains` refuse: one line that begins with the field's name, before anything runs."""
 
 import re
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,15 +9,14 @@ import pytest
 import warpchain
 from tests.oracle_model.circular_loop import circular_loop
 from tests.support.setups import setup_walk
-from warpchain import InputError
+from warpchain import Chains, InputError, simulate, walk
 from warpchain.engine.batch import Batch
-from warpchain.inputs.methods import METHODS, METHODS_BY_NEED
-from warpchain.inputs.parameters import preset
 
-SOFT = preset("soft")
+SOFT = warpchain.preset("soft")
 SETUP = setup_walk("soft", {}, None)
 POSITION, VELOCITY = circular_loop(8, SOFT, 1.0)
 POSITION[:, 1] += 0.1
+PAIR = {"parameters": [SOFT, SOFT], "position": np.array([POSITION] * 2), "velocity": np.array([VELOCITY] * 2)}
 
 
 class ComputedError(Exception):
@@ -24,241 +24,130 @@ class ComputedError(Exception):
 
 
 @pytest.fixture(autouse=True)
-def nothing_runs(monkeypatch):
+def nothing_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     """Compiling or launching a kernel ends the test."""
 
-    def refuse(*arguments, **keywords):
+    def refuse(*_: object, **__: object) -> None:
         raise ComputedError
 
     for name in ("compile", "launch", "run"):
         monkeypatch.setattr(Batch, name, refuse)
 
 
-def refused(call, *arguments, **keywords):
-    """The message with which a call refuses its arguments: one line, of a `ValueError`."""
-    with pytest.raises(InputError) as caught:
-        call(*arguments, **keywords)
-    message = str(caught.value)
-    assert isinstance(caught.value, ValueError)
-    assert "\n" not in message
-    return message
+def changed(value: complex) -> Any:
+    """Positions with another number among them."""
+    array = POSITION.astype(type(value))
+    array[3, 1] = value
+    return array
 
 
-def brief(value):
-    """A short name of a test's argument."""
-    return repr(value)[:30]
-
-
-def with_value(array, value):
-    """A copy of a state with one value replaced."""
-    changed = array.astype(np.result_type(array, type(value)))
-    changed[3, 1] = value
-    return changed
-
-
-# --- simulate ---
-
-
-def test_good_input_is_computed():
-    """Arrays, lists and numbers of NumPy are accepted: the tests below fail for no other reason."""
-    for position in (
-        POSITION,
-        POSITION.tolist(),
-        POSITION.astype(np.float32),
-        [[0, 0.1, angle] for angle in (0, 3, 0, 3)],
-    ):
-        velocity = np.zeros_like(position, dtype=float)
-        for duration in (0, 0.0, 1, 1.5, np.float32(1), np.int64(1)):
+def test_good_input_is_computed() -> None:
+    """Arrays, lists and numbers of NumPy, and walks of each start: the tests below fail for no other reason."""
+    for position in (POSITION, POSITION.tolist(), POSITION.astype(np.float32)):
+        for duration in (0, 0.0, 1.5, np.float32(1), np.int64(1)):
             with pytest.raises(ComputedError):
-                warpchain.simulate("soft", position, velocity, duration)
-    for times in ([0.0], [1.0], (0.0, 1.0), np.linspace(0, 1, 5), None):
+                simulate("soft", position, np.zeros((8, 3)), duration, times=(0.0,))
+    for settings in ({}, {"start": "spinning"}, {"start": "ellipse", "seed": 3}, {"setup": SETUP}):
         with pytest.raises(ComputedError):
-            warpchain.simulate(SOFT, POSITION, VELOCITY, 1.0, times=times)
+            walk(**settings)
+    with pytest.raises(ComputedError):
+        Chains(**PAIR)
 
 
 @pytest.mark.parametrize(
-    ("settings", "message"),
+    ("given", "line"),
     [
-        (
-            {"method": "rk4"},
-            rf"options\.method: 'rk4' is unknown; give one of {', '.join((*METHODS_BY_NEED, *METHODS))}",
-        ),
-        ({"tolerance": 0.0}, r"options\.tolerance: .*"),
-        ({"tolerance": 1.0}, r"options\.tolerance: .*"),
-        ({"device": "gpu"}, r"options\.device: 'gpu' is no device; .*"),
-        ({"self_contact": "yes"}, r"options\.self_contact: .*"),
-        ({"controller": "pid"}, r"options\.controller: .*"),
-        ({"smallest_step": 1e-3}, r"options\.smallest_step: 0.001 is not smaller than contact_step 2e-05 s; .*"),
-        ({"toleranze": 1e-3}, r"options\.toleranze: .*"),
-        ({"links": 8}, r"options\.links: .*"),
+        ({"method": "rk4"}, r"options\.method: 'rk4' is unknown; give one of standard, .*"),
+        ({"toleranze": 1e-3}, r"options\.toleranze: unknown name; did you mean options\.tolerance\?"),
+        ({"links": 8}, r"options\.links: not possible here; give it in scene"),
         ({"skin": -1.0, "tolerance": 1.0}, r"options\.\w+: .* \(and 1 more\)"),
+        ({"soften_pile": True}, r"options\.soften_pile: only a walk has phases .*"),
+        ({"parameters": {"link_length": 1.0}}, r"preset: .* is unknown; presets are paper, soft"),
+        ({"position": "abc"}, r"position: not an array of numbers; give one of shape \(n, 3\)"),
+        ({"position": None}, r"position: its shape is \(\); give \(n, 3\)"),
+        ({"position": changed(np.nan)}, "position: holds a number that is not finite; .*"),
+        ({"position": changed(1j)}, r"position: not an array of numbers; .*"),
+        ({"position": np.zeros((3, 3)), "velocity": np.zeros((3, 3))}, "position: 3 links; a closed chain has .*"),
+        ({"position": np.zeros((5, 3)), "velocity": np.zeros((5, 3))}, "position: 5 is odd; inner and outer .*"),
+        ({"velocity": [[0.0, 1.0, 2.0], [0.0, 1.0]]}, r"velocity: not an array of numbers; .*"),
+        ({"velocity": VELOCITY[:6]}, r"velocity: its shape is \(6, 3\); give \(8, 3\)"),
+        ({"duration": "1"}, "duration: Input should be a valid number, in s; given '1'"),
+        ({"duration": True}, "duration: Input should be a valid number, in s; given True"),
+        ({"duration": -1}, "duration: Input should be greater than or equal to 0, in s; given -1"),
+        ({"duration": np.inf}, "duration: Input should be a finite number, in s; given inf"),
+        ({"duration": 10**400}, "duration: .*; given a whole number of 1329 bits"),
+        ({"times": 0.5}, r"times: its shape is \(\); give \(t,\)"),
+        ({"times": []}, "times: give rising instants between 0 and the duration of 1.0 s"),
+        ({"times": [0.0, 1.5]}, "times: give rising instants .*"),
+        ({"times": [-0.1, 0.5]}, "times: give rising instants .*"),
+        ({"times": [0.5, 0.5]}, "times: give rising instants .*"),
+        ({"floor": "no"}, r"floor: Input should be 'flat'; given 'no'"),
+        ({"gravity": 0.0}, "gravity: Input should be a valid boolean; given 0.0"),
     ],
-    ids=brief,
+    ids=lambda value: repr(value)[:40],
 )
-def test_simulate_refuses_options(settings, message):
-    """An option that is unknown or out of bounds is refused by its name."""
-    assert re.fullmatch(message, refused(warpchain.simulate, "soft", POSITION, VELOCITY, 1.0, **settings))
-
-
-@pytest.mark.parametrize("parameters", ["hard", None, 3, {"link_length": 1.0}, ["soft"]])
-def test_simulate_refuses_unknown_parameters(parameters):
-    """Parameters are a set of them or the name of a preset, and nothing else."""
-    message = refused(warpchain.simulate, parameters, POSITION, VELOCITY, 1.0)
-    assert re.fullmatch(r"preset: .* is unknown; presets are paper, soft", message)
-
-
-@pytest.mark.parametrize("name", ["position", "velocity"])
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ("abc", "not an array of numbers; .*"),
-        ([[0.0, 1.0, 2.0], [0.0, 1.0]], "not an array of numbers; .*"),
-        (None, r"its shape is \(\); give \(n, 3\), one row x, y, θ per link"),
-        (POSITION.ravel(), r"its shape is \(24,\); .*"),
-        (with_value(POSITION, np.nan), "holds a number that is not finite; .*"),
-        (with_value(POSITION, 1j), ".+; give .*"),
-    ],
-    ids=brief,
-)
-def test_simulate_refuses_states(name, given, message):
-    """A state that is no finite real array of shape (n, 3) is refused by its name."""
-    state = {"position": POSITION, "velocity": VELOCITY} | {name: given}
-    told = refused(warpchain.simulate, "soft", state["position"], state["velocity"], 1.0)
-    assert re.fullmatch(f"{name}: {message}", told)
-
-
-@pytest.mark.parametrize("links", [0, 2, 3, 5, 7])
-def test_simulate_refuses_chains_that_cannot_be(links):
-    """A chain has at least 4 links, and an even number if they are of two kinds."""
-    told = refused(warpchain.simulate, "soft", np.zeros((links, 3)), np.zeros((links, 3)), 1.0)
-    problem = f"{links} links; a closed chain has at least 4" if links < 4 else f"{links} is odd; inner and outer"
-    assert told.startswith(f"position: {problem}")
-
-
-def test_simulate_refuses_states_of_different_length():
-    """Position and velocity have one row per link each."""
-    told = refused(warpchain.simulate, "soft", POSITION, VELOCITY[:6], 1.0)
-    assert told == "velocity: 6 rows, but position has 8; give one row per link each"
+def test_simulate_refuses(given: dict[str, Any], line: str) -> None:
+    """States, times, options and switches."""
+    good = {"parameters": "soft", "position": POSITION, "velocity": VELOCITY, "duration": 1.0}
+    with pytest.raises(InputError) as caught:
+        simulate(**good | given)
+    assert re.fullmatch(line, str(caught.value))
 
 
 @pytest.mark.parametrize(
-    ("duration", "message"),
-    [
-        ("1", "'1' is not a number; give seconds"),
-        (None, "None is not a number; give seconds"),
-        (True, "True is not a number; give seconds"),
-        (-1, "-1 is not a time; give a number of seconds, at least 0"),
-        (float("nan"), "nan is not a time; .*"),
-        (float("inf"), "inf is not a time; .*"),
-        (1j, ".+; give .*"),
-        (10**400, ".+; give .*"),
-    ],
-    ids=brief,
-)
-def test_simulate_refuses_durations(duration, message):
-    """A duration that is no finite number of seconds from 0 on is refused."""
-    told = refused(warpchain.simulate, "soft", POSITION, VELOCITY, duration)
-    assert re.fullmatch(f"duration: {message}", told)
-
-
-@pytest.mark.parametrize(
-    ("times", "message"),
-    [
-        ("abc", "not an array of numbers; give rising instants in s"),
-        ([1j], "not an array of numbers; .*"),
-        (0.5, r"its shape is \(\); give a row of at least one instant"),
-        ([], r"its shape is \(0,\); .*"),
-        ([0.0, 1.5], r"give rising instants between 0 and the duration of 1.0 s"),
-        ([-0.1, 0.5], "give rising instants .*"),
-        ([0.5, 0.5], "give rising instants .*"),
-        ([float("nan")], "give rising instants .*"),
-    ],
-    ids=brief,
-)
-def test_simulate_refuses_times(times, message):
-    """Instants that do not rise within the duration are refused."""
-    told = refused(warpchain.simulate, "soft", POSITION, VELOCITY, 1.0, times=times)
-    assert re.fullmatch(f"times: {message}", told)
-
-
-@pytest.mark.parametrize("name", ["floor", "gravity"])
-@pytest.mark.parametrize("value", ["no", 0.0, []])
-def test_simulate_refuses_switches_that_are_no_truth_values(name, value):
-    """Like `self_contact`, `floor` and `gravity` are true or false: `floor="no"` does not mean a floor."""
-    assert refused(warpchain.simulate, "soft", POSITION, VELOCITY, 1.0, **{name: value}).startswith(f"{name}: ")
-
-
-# --- walk ---
-
-
-def test_good_walk_is_computed():
-    """Walks of each start are computed: the tests below fail for no other reason."""
-    for settings in (
-        {},
-        {"start": "spinning"},
-        {"start": "ellipse"},
-        {"seed": 3},
-        {"frame_interval": None},
-        {"setup": SETUP},
-    ):
-        with pytest.raises(ComputedError):
-            warpchain.walk(**settings)
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
+    ("given", "line"),
     [
         ({"links": 28}, r"scene\.links: 28 links of 0.01268 m do not reach round .*; give at least 30"),
         ({"frequency": 900}, r"scene\.frequency: 900 Hz is far above what a loop holds, .*, give 15"),
         ({"clearance_of": "hanging", "start": "spinning"}, r"scene\.clearance_of: 'hanging' needs .*; give .*"),
-        (
-            {"sprocket_radius": 3e-3, "sprocket_radius_is": "pitch"},
-            r"parameters\.sprocket_radius: 0.003 is not greater than the circle radius 0.0042, .*; .*",
-        ),
-        # names and seeds
+        ({"sprocket_radius": 3e-3, "sprocket_radius_is": "pitch"}, r"parameters\.sprocket_radius: 0.003 is not .*; .*"),
         ({"clearence": 0.1}, r"'clearence': unknown name; did you mean scene\.clearance\?"),
-        ({"parameters": {}}, r"'parameters': unknown name; give one of .*"),
-        ({"seed": -1}, r"seed: -1 is no whole number from 0 to 2\*\*128 - 1; .*"),
-        ({"seed": True}, r"seed: True is no whole number .*; .*"),
-        # setups of other walks
+        ({"seed": -1}, r"seed: Input should be greater than or equal to 0; given -1"),
+        ({"seed": True}, r"seed: Input should be a valid integer; given True"),
         ({"setup": SETUP, "links": 60}, r"links: given together with setup, which is complete; leave one out"),
-        ({"setup": SETUP, "preset": "paper", "gravity": 9.0}, r"preset, gravity: given together with setup, .*; .*"),
         ({"setup": {"links": 60}}, r"setup: \{'links': 60\} is none of a walk; give setup of a WalkResult, .*"),
-        ({"setup": SETUP, "seed": -1}, r"seed: -1 is no whole number from 0 .*; .*"),
-        # frames
-        ({"frame_interval": 0}, r"frame_interval: 0 is no positive time in s; give one"),
-        ({"frame_interval": float("nan")}, r"frame_interval: nan is no positive time in s; .*"),
+        ({"setup": SETUP, "seed": -1}, r"seed: Input should be greater than or equal to 0; given -1"),
+        ({"frame_interval": 0}, r"frame_interval: .*"),
         ({"frame_interval": "2 ms"}, r"frame_interval: .*"),
-        ({"frame_interval": True}, r"frame_interval: .*"),
-        # the number of samples per frame must fit into 64 bits: 2⁶⁴ and its multiples would be 0
-        ({"frame_interval": 1e300}, r"frame_interval: .*"),
+        ({"frame_interval": 1e300}, r"frame_interval: .*"),  # its number of samples must fit into 64 bits
+        ({"frame_interval": 9e-7}, r"frame_interval: .*"),
         ({"record_interval": 1e-300}, r"(options\.record_interval|frame_interval): .*"),
-        # the closest that samples can be
-        ({"frame_interval": 9e-7}, r"frame_interval: 9e-07 is not between 1e-06 s and 1000.0 s; .*"),
+        ({"record_loads": 1}, r"record_loads: Input should be a valid boolean; given 1"),
+        ({"start": "ellipse", "ellipse_aspect": 1e6}, r"scene\.ellipse_aspect: .*"),
     ],
-    ids=brief,
+    ids=lambda value: repr(value)[:40],
 )
-def test_walk_refuses(settings, message):
+def test_walk_refuses(given: dict[str, Any], line: str) -> None:
     """What a walk can't use is refused by its name, with a remedy."""
-    assert re.fullmatch(message, refused(warpchain.walk, **settings))
+    with pytest.raises(InputError) as caught:
+        walk(**given)
+    assert re.fullmatch(line, str(caught.value))
 
 
-@pytest.mark.parametrize(("aspect", "links"), [(1e6, 6), (1e12, 60), (1e-12, 180), (1e300, 60)])
-def test_walk_refuses_ellipses_that_no_chain_can_follow(aspect, links):
-    """An ellipse that is too flat for its links is refused by its aspect."""
-    told = refused(warpchain.walk, start="ellipse", ellipse_aspect=aspect, links=links)
-    assert "ellipse_aspect" in told
+@pytest.mark.parametrize(
+    ("given", "line"),
+    [
+        ({"velocity": np.zeros((2, 8, 2))}, r"velocity: its shape is \(2, 8, 2\); give \(2, 8, 3\)"),
+        ({"position": np.full((2, 8, 3), np.nan)}, "position: holds a number that is not finite; .*"),
+        ({"parameters": [SOFT]}, "parameters: .* are not Parameters of 2 chains; .*"),
+        ({"parameters": "so"}, "parameters: .* are not Parameters of 2 chains; .*"),
+        ({"floor": [[-1, 0], [1, 0]]}, "floor: Input should be a valid boolean; .*"),
+        ({"soften_drive": True}, r"options\.soften_drive: .*"),
+    ],
+    ids=lambda value: repr(value)[:40],
+)
+def test_chains_refuse(given: dict[str, Any], line: str) -> None:
+    """What does not fit is refused by its name."""
+    with pytest.raises(InputError) as caught:
+        Chains(**PAIR | given)
+    assert re.fullmatch(line, str(caught.value))
 
 
-def test_seed_that_draws_an_impossible_chain_is_refused():
+def test_seed_that_draws_an_impossible_chain_is_refused() -> None:
     """A sample whose sprocket is too large for the chain is refused like any other set of values."""
     told = set()
     for seed in range(60):
-        try:
-            warpchain.walk(links=30, seed=seed)
-        except ComputedError:
-            told.add("computed")
-        except InputError as error:
-            told.add("refused")
-            assert re.fullmatch(r"scene\.links: 30 links of .* do not reach round .*; give at least 32", str(error))
-    assert told == {"computed", "refused"}
+        with pytest.raises((ComputedError, InputError)) as caught:
+            walk(links=30, seed=seed)
+        told.add(re.sub(r".*round.*", "refused", str(caught.value)))
+    assert told == {"", "refused"}

@@ -4,7 +4,6 @@ import inspect
 import io
 import re
 import sys
-import types
 
 import numpy as np
 import pandas
@@ -12,7 +11,7 @@ import pytest
 
 import warpchain
 from warpchain.inputs.validation import InputError
-from warpchain.run.sweep_keywords import sweep_of_keywords
+from warpchain.run.sweep_run import sweep_of_keywords
 from warpchain.sweeps.plan import load_sweep
 
 SHORT = {"start": "ellipse", "walk_limit": 0.02}
@@ -116,17 +115,6 @@ def test_parameter_sets(tmp_path):
     assert lines[0].startswith("sweep.points.sprocket_radius: 1 values, but floor_friction has 2;")
 
 
-def test_a_planned_end_is_no_failure(tmp_path):
-    """A walk that goes on when its time is over is finished, without Δx, and in the means of what it has."""
-    result = warpchain.sweep(
-        links=30, start="ellipse", walk_until=0.02, preset="soft", samples=2, out=tmp_path / "until", progress=False
-    )
-    assert result.summary() == {"at_rest": 0, "finished": 2, "missing": 0} and np.isnan(result.dx).all()
-    times = result.statistics("walk_time")
-    assert (times.mean, times.count, times.failed) == (pytest.approx(0.02), 2, 0)
-    assert result.statistics("dx").absent == 2
-
-
 def test_a_sweep_runs_from_keywords(tmp_path, capfd):
     """It goes on where it was, the preset may be an axis, and nothing is printed without a terminal."""
     keywords = {"grid": {"preset": ["soft"], "links": range(30, 34, 2)}, "samples": 1, "scene": SHORT}
@@ -174,9 +162,12 @@ def test_all_errors_are_told_at_once(tmp_path):
         ({"samples": 1, "grid": {"links": [28]}}, "sweep.grid.links[0]: 28 links of 0.01268 m do not reach round"),
         ({"samples": 1, "same_samples_along": ["links"]}, "sweep.same_samples_along: 'links' is no axis"),
         ({"preset": "soft", "links": 60, "source": {"version": 1}}, "preset, links: given together with a source"),
-        ({"samples": 1, "floor": [[-1, 0], [1, 0]]}, "floor: a list of its own"),
-        ({"samples": 1, "link_masses": np.full(60, 3e-3)}, "link_masses: a list of its own"),
-        ({"samples": 1, "start": ...}, "start: sweeps go on from no state"),
+        ({"samples": 1, "floor": [[-1, 0], [1, 0]]}, "sweep.grid.floor: not possible here; give it in scene"),
+        (
+            {"samples": 1, "link_masses": np.full(60, 3e-3)},
+            "sweep.grid.link_masses: not possible here",
+        ),
+        ({"samples": 1, "start": ...}, "sweep.scene.start: Input should be"),
         ({"samples": 1, "part": "3/2"}, "part: '3/2' is no part; give k/N"),
         ({"samples": 1, "grid": {"device": ["cpu", "cuda"]}, "device": "cpu"}, "sweep.grid: method is "),
     ],
@@ -200,22 +191,16 @@ def test_a_terminal_shows_a_bar(tmp_path, monkeypatch):
     assert "1 of 1 walks" in text and "1 time_limit" in text
 
 
-def test_a_notebook_shows_a_bar(tmp_path, monkeypatch):
-    """One output of the cell, which is updated until all walks are done."""
-    shown = []
-
-    class Handle:
-        def update(self, content, raw):
-            shown.append(content)
-
-    def display(content, raw, display_id):
-        shown.append(content)
-        return Handle()
-
-    kernel = types.SimpleNamespace(config={"IPKernelApp": {}})
-    monkeypatch.setitem(sys.modules, "IPython", types.SimpleNamespace(get_ipython=lambda: kernel))
-    monkeypatch.setitem(sys.modules, "IPython.display", types.SimpleNamespace(display=display))
+def test_a_notebook_shows_a_line(tmp_path, monkeypatch):
+    """In the output of the cell, of sweeps and of walks, which are silent in a terminal."""
+    screen = type("OutStream", (io.StringIO,), {"__module__": "ipykernel.iostream"})()
+    monkeypatch.setattr(sys, "stdout", screen)
     warpchain.sweep(grid={"links": [30]}, samples=1, scene=SHORT, preset="soft", out=tmp_path / "shown")
-    assert shown[0]["text/plain"].startswith("compiling kernels")
-    assert shown[-1]["text/plain"].startswith("1 of 1 walks") and shown[-1]["text/plain"].endswith("1 time_limit")
-    assert '<progress value="1" max="1">' in shown[-1]["text/html"]
+    lines = screen.getvalue().split("\r")
+    assert "compiling kernels" in lines[1] and "[##########] 1 of 1 walks" in lines[-1] and "1 time_limit" in lines[-1]
+    warpchain.walk(links=30, preset="soft", **SHORT)
+    assert "compiling kernels" in screen.getvalue().splitlines()[1]
+    monkeypatch.setattr(sys, "stdout", Terminal())
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    warpchain.walk(links=30, preset="soft", **SHORT)
+    assert sys.stdout.getvalue() == sys.stderr.getvalue() == ""

@@ -1,14 +1,15 @@
 """Sweeps as they are run: on slots, threads, processes and a Dask cluster, killed and resumed."""
 
 import concurrent.futures
+import contextlib
 import gc
 import multiprocessing
 import os
-import random
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -150,42 +151,6 @@ def test_a_failing_walk_stops_the_sweep_and_keeps_what_is_done(tmp_path, monkeyp
 
 
 @pytest.mark.slow
-def test_killed_at_any_moment_a_sweep_goes_on(tmp_path, uninterrupted):
-    """SIGKILL at 20 random moments, resumed each time: the data are those of a run never interrupted, to the byte."""
-    folder, generator = tmp_path / "sweep", random.Random(20)
-    context = multiprocessing.get_context("forkserver")  # whose processes need not import anything
-    context.set_forkserver_preload(["warpchain.run.sweep_run"])
-
-    def begun() -> multiprocessing.process.BaseProcess:
-        process = context.Process(target=sweep, args=(TINY, folder), kwargs={"workers": 2})
-        process.start()
-        return process
-
-    begun().join()  # starts the server, too
-    for shard in (folder / "shards").glob("[0-9]*.h5"):
-        shard.unlink()
-    began = time.monotonic()
-    begun().join()
-    whole = time.monotonic() - began
-    assert data_of(folder) == uninterrupted
-    for shard in (folder / "shards").glob("[0-9]*.h5"):
-        shard.unlink()
-    killed = 0
-    while killed < 20:
-        process = begun()
-        time.sleep(generator.uniform(0.0, 1.0) * whole)
-        process.kill()
-        process.join()
-        killed += 1
-        if len(data_of(folder)) == len(uninterrupted):  # it was complete: begin again
-            assert data_of(folder) == uninterrupted
-            for shard in sorted((folder / "shards").glob("[0-9]*.h5"))[::2]:
-                shard.unlink()
-    begun().join()
-    assert data_of(folder) == uninterrupted
-
-
-@pytest.mark.slow
 def test_a_dask_worker_may_be_killed(tmp_path, uninterrupted):
     """With a worker of a Dask cluster killed in the middle, nothing is lost and the bytes are the same."""
     distributed = pytest.importorskip("distributed")
@@ -212,28 +177,43 @@ def test_a_dask_worker_may_be_killed(tmp_path, uninterrupted):
     np.testing.assert_array_equal(indices, np.arange(80))
 
 
-@pytest.mark.slow
-def test_a_dask_cluster_of_separate_processes(tmp_path, uninterrupted):
-    """`--scheduler` on a scheduler and two workers that were started by themselves: the bytes are the same."""
-    pytest.importorskip("distributed")
-    source, where = tmp_path / "tiny.yaml", tmp_path / "scheduler.json"
-    source.write_text(yaml.safe_dump(TINY, sort_keys=False))
-    dask = [sys.executable, "-m", "dask"]
+@contextlib.contextmanager
+def dask_cluster(folder: Path, workers: int) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+    """Address of a scheduler that was started by itself, with so many workers, and its process."""
+    from distributed import Client
+
+    where, dask = folder / "scheduler.json", [sys.executable, "-m", "dask"]
     commands = [["scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"]]
-    commands += [["worker", "--no-nanny", "--nthreads", "1", "--no-dashboard", "--local-directory", str(tmp_path)]] * 2
-    processes = []
-    with (tmp_path / "dask.log").open("wb") as log:
+    commands += [["worker", "--no-nanny", "--nthreads", "1", "--no-dashboard", "--local-directory", folder]] * workers
+    processes: list[subprocess.Popen[bytes]] = []
+    with (folder / "dask.log").open("wb") as log:
         try:
             for command in commands:
-                command = [*dask, *command, "--scheduler-file", str(where)]
+                command = [*dask, *command, "--scheduler-file", where]
                 processes.append(subprocess.Popen(command, stdout=log, stderr=log))
-            address = wait_for_workers(where, 2)
-            command = [sys.executable, "-m", "warpchain", "sweep", str(source), "-o", str(tmp_path / "sweep")]
-            done = subprocess.run([*command, "--scheduler", address], capture_output=True, encoding="utf-8")
+            until = time.monotonic() + 60
+            while not (where.exists() and where.read_text()):
+                assert time.monotonic() < until, "no scheduler"
+                time.sleep(0.1)
+            with Client(scheduler_file=str(where)) as client:
+                client.wait_for_workers(workers, timeout=60)
+                address = str(client.scheduler.address)
+            yield address, processes[0]
         finally:
             for process in reversed(processes):
                 process.kill()
                 process.wait()
+
+
+@pytest.mark.slow
+def test_a_dask_cluster_of_separate_processes(tmp_path, uninterrupted):
+    """`--scheduler` on a scheduler and two workers that were started by themselves: the bytes are the same."""
+    pytest.importorskip("distributed")
+    source = tmp_path / "tiny.yaml"
+    source.write_text(yaml.safe_dump(TINY, sort_keys=False))
+    with dask_cluster(tmp_path, 2) as (address, _):
+        command = [sys.executable, "-m", "warpchain", "sweep", source, "-o", tmp_path / "sweep", "--scheduler", address]
+        done = subprocess.run(command, capture_output=True, encoding="utf-8")
     assert "80 time_limit" in done.stdout, done.stderr
     assert data_of(tmp_path / "sweep") == uninterrupted
 
@@ -255,55 +235,14 @@ def test_a_scheduler_that_cannot_be_reached_is_refused(tmp_path, capsys, address
 def test_a_scheduler_may_be_closed_midway(tmp_path):
     """The command ends in one line with status 1, and the shards that were written are kept."""
     pytest.importorskip("distributed")
-    source, where, folder = tmp_path / "tiny.yaml", tmp_path / "scheduler.json", tmp_path / "sweep"
+    source, folder = tmp_path / "tiny.yaml", tmp_path / "sweep"
     source.write_text(yaml.safe_dump(TINY | {"samples": 400}, sort_keys=False))
-    dask = [sys.executable, "-m", "dask"]
-    commands = [["scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"]]
-    commands += [["worker", "--no-nanny", "--nthreads", "1", "--no-dashboard", "--local-directory", str(tmp_path)]]
-    processes = []
-    with (tmp_path / "dask.log").open("wb") as log:
-        try:
-            for command in commands:
-                command = [*dask, *command, "--scheduler-file", str(where)]
-                processes.append(subprocess.Popen(command, stdout=log, stderr=log))
-            address = wait_for_workers(where, 1)
-            command = [sys.executable, "-m", "warpchain", "sweep", str(source), "-o", str(folder)]
-            run = subprocess.Popen([*command, "--scheduler", address], stderr=subprocess.PIPE, encoding="utf-8")
-            while run.poll() is None and len(list((folder / "shards").glob("[0-9]*.h5"))) < 5:
-                time.sleep(0.05)
-            processes[0].kill()
-            _, said = run.communicate(timeout=60)
-        finally:
-            for process in reversed(processes):
-                process.kill()
-                process.wait()
+    with dask_cluster(tmp_path, 1) as (address, scheduler):
+        command = [sys.executable, "-m", "warpchain", "sweep", source, "-o", folder, "--scheduler", address]
+        run = subprocess.Popen(command, stderr=subprocess.PIPE, encoding="utf-8")
+        while run.poll() is None and len(list((folder / "shards").glob("[0-9]*.h5"))) < 5:
+            time.sleep(0.05)
+        scheduler.kill()
+        _, said = run.communicate(timeout=60)
     assert run.returncode == 1 and said.startswith("error: the workers ended") and said.count("\n") == 1
     assert len(data_of(folder)) >= 5
-
-
-def wait_for_workers(where: Path, count: int) -> str:
-    """Address of the scheduler whose file is there, or soon will be, once it has so many workers."""
-    from distributed import Client
-
-    until = time.monotonic() + 60
-    while not (where.exists() and where.read_text()):
-        assert time.monotonic() < until, "no scheduler"
-        time.sleep(0.1)
-    with Client(scheduler_file=str(where)) as client:
-        client.wait_for_workers(count, timeout=60)
-        return str(client.scheduler.address)
-
-
-def test_sweep_refuses_what_it_cannot_do(tmp_path):
-    """Bad arguments are refused in one line, and no folder is made."""
-    for arguments, message in (
-        ((TINY | {"samples": 0}, tmp_path / "a"), "samples"),
-        ((tmp_path / "none.yaml", tmp_path / "a"), "none.yaml"),
-    ):
-        with pytest.raises((warpchain.InputError, OSError), match=message):
-            sweep(*arguments)
-    with pytest.raises(warpchain.InputError, match="workers: 0 is not a number of workers"):
-        sweep(TINY, tmp_path / "a", workers=0)
-    with pytest.raises(warpchain.InputError, match=r"options\.device: 'gpu' is no device"):
-        sweep(TINY, tmp_path / "a", device="gpu")
-    assert not (tmp_path / "a").exists()

@@ -1,7 +1,6 @@
 """Threads of one process: they take turns on a GPU, and one at a time starts Warp and makes kernels."""
 
 import concurrent.futures
-import gc
 import subprocess
 import sys
 import threading
@@ -12,12 +11,10 @@ import pytest
 
 import warpchain
 import warpchain.run.sweep_run as runner
-import warpchain.walks.scheduler as scheduler
 from tests.run.test_sweep_run import TINY
 from warpchain.engine.devices import gpu_turn, has_gpu_turn
 from warpchain.run.sweep_run import run_shards, sweep
-from warpchain.store.manifest import Manifest, read_manifest
-from warpchain.store.shards import stamp
+from warpchain.store.manifest import Manifest
 from warpchain.sweeps.plan import load_sweep
 
 
@@ -73,30 +70,6 @@ def test_a_sweep_on_a_gpu_is_refused_within_a_walk_there(tmp_path: Path) -> None
     assert not (tmp_path / "sweep").exists()
     with gpu_turn(["cuda"]):
         assert sweep(TINY | {"samples": 1}, tmp_path / "sweep").summary()["missing"] == 0
-
-
-def test_a_task_frees_what_it_made_on_a_device(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """When a task ends, so do its batches, in its thread and without garbage collection: its turn on a GPU is over."""
-    made, freed = [], []
-
-    class Watched(scheduler.Batch):
-        def __init__(self, *given: object, **named: object) -> None:
-            made.append(threading.get_ident())
-            super().__init__(*given, **named)
-
-        def __del__(self) -> None:
-            freed.append(threading.get_ident())
-
-    monkeypatch.setattr(scheduler, "Batch", Watched)
-    sweep(TINY, tmp_path / "sweep", workers=1)
-    planned = load_sweep(TINY)
-    gc.disable()
-    try:
-        shards = read_manifest(tmp_path / "sweep").shards
-        run_shards(planned, str(tmp_path / "sweep"), stamp(tmp_path / "sweep"), [shards[0], shards[-1]])
-        assert made == freed and made.count(threading.get_ident()) > 0
-    finally:
-        gc.enable()
 
 
 def test_threads_start_a_device_once() -> None:

@@ -39,13 +39,10 @@ def test_shipped_sweeps(name: str, shapes: dict[str, tuple[int, ...]]) -> None:
     sweep = load_sweep(SWEEPS / f"{name}.yaml")
     assert sweep.name == name
     assert {block.name: block.shape for block in sweep.blocks} == shapes
-    walks = sum(math.prod(shape) for shape in shapes.values())
-    assert sweep.walk_count == walks
-    for block in sweep.blocks:
-        preset = "paper" if name in ("figure6", "quickstart", "tilt") else "soft"
-        walks = math.prod(block.shape)
-        for index in {0, walks // 2, walks - 1}:
-            assert sweep.planned(block.indices.flat[index]).setup.preset == preset
+    assert sweep.walk_count == sum(math.prod(shape) for shape in shapes.values())
+    preset = "paper" if name in ("figure6", "quickstart", "tilt") else "soft"
+    for index in sweep.indices[[0, sweep.walk_count // 2, -1]].tolist():
+        assert sweep.planned(index).setup.preset == preset
 
 
 def test_shipped_sweeps_have_bare_names() -> None:
@@ -74,13 +71,3 @@ def test_the_examples_of_a_new_sweep_are_possible(tmp_path: Path) -> None:
         assert load_sweep(changed).digest() != load_sweep(path).digest(), key
         keys.add(key)
     assert keys == set(SweepFile.model_fields)
-
-
-def test_tolerance_repeats_the_same_samples() -> None:
-    """In `tolerance` walks that differ in the tolerance alone share everything else."""
-    sweep = load_sweep(SWEEPS / "tolerance.yaml")
-    for cell in range(4):
-        for sample in (0, 11):
-            loose, tight = (sweep.planned(sweep.indices[24 * cell + 12 * place + sample]).setup for place in (0, 1))
-            assert (loose.options.tolerance, tight.options.tolerance) == (1e-6, 1e-9)
-            assert (loose.scene, loose.parameters) == (tight.scene, tight.parameters)

@@ -39,13 +39,9 @@ def test_values_and_layout() -> None:
         assert tuple(walk.drawn) == block.drawn
         for name, value in walk.drawn.items():
             assert getattr(setup.parameters if name in TABLE_1 else setup.scene, name) == value
-
-
-@pytest.mark.parametrize("index", [-1, 12, 10**9])
-def test_no_such_walk(index: int) -> None:
-    """A number outside the sweep is an IndexError, negative ones included."""
-    with pytest.raises(IndexError):
-        load_sweep(content()).planned(index)
+    for beyond in (-1, 12, 10**9):
+        with pytest.raises(IndexError):
+            sweep.planned(beyond)
 
 
 def test_blocks_inherit_and_override() -> None:
@@ -130,73 +126,52 @@ LONG = {"from": 1e-3, "to": 1e-2, "count": 10_000}
     ("changes", "path"),
     [
         ({"version": 2}, "version"),
-        ({"name": "a\nb"}, "name"),
-        ({"seed": 2**128}, "seed"),
         ({"preset": None}, "preset"),
         ({"samples": None}, "samples"),
-        ({"sample": 12}, "sample"),
         ({"scene": {"frequncy": 5}}, "scene.frequncy"),
-        ({"scene": {"clearance": "1 cm"}}, "scene.clearance"),
         ({"options": {"device": "cuda"}, "grid": {"method": ["os32", "hybrid"]}}, "grid.method[1]"),
         ({"parameters": {"mu_fc": 0.3, "floor_friction": 0.3}}, "parameters.floor_friction"),
         ({"grid": {"lniks": [60]}}, "grid.lniks"),
         ({"grid": {"links": []}}, "grid.links"),
         ({"grid": {"floor": ["flat", [[-1, 0], [1, 0]]]}}, "grid.floor"),
-        ({"grid": {"release": [None, [[0.1, 0, -0.01, 5]]]}}, "grid.release"),
-        ({"points": {"link_masses": [[3e-3] * 60, [4e-3] * 60]}, "grid": None}, "points.link_masses"),
         ({"grid": {"links": [60, 20]}}, "grid.links[1]"),
         ({"grid": {"links": [60, 1026]}, "options": {"device": "cuda"}}, "grid.links[1]"),
-        ({"grid": {"mu_fc": [0.3, 30]}}, "grid.floor_friction[1]"),
         ({"grid": {"frequency": [5, 5.0]}}, "grid.frequency"),
-        ({"grid": {"nu": [5]}, "scene": {"frequency": 5}}, "grid.frequency"),
         ({"grid": {"preset": ["soft"]}}, "grid.preset"),
-        ({"grid": {"preset": ["soft", "firm"]}, "preset": None}, "grid.preset[1]"),
         ({"grid": {"method": ["standard", "reference"]}}, "grid"),
         ({"grid": {"device": ["cpu", "cuda"]}, "options": {}}, "grid"),
         ({"grid": {"links": {"from": 60, "to": 90, "step": 10, "count": 4}}}, "grid.links.step"),
-        ({"grid": {"links": {"from": 90, "to": 60, "step": 10}}}, "grid.links.to"),
         ({"grid": {"links": {"from": 60, "to": 90, "step": 20}}}, "grid.links.to"),
         ({"grid": {"links": {"from": 60, "to": 90, "step": 7.5}}}, "grid.links[1]"),
-        ({"grid": {"frequency": {"from": 5, "to": 10, "step": 0}}}, "grid.frequency.step"),
         ({"grid": {"frequency": {"from": 5, "to": 10, "step": 1e-300}}}, "grid.frequency.step"),
-        ({"grid": {"start": {"from": 1, "to": 2, "step": 1}}}, "grid.start[0]"),
         ({"grid": {"start": ["rest", "spinning"]}, "scene": {"clearance_of": "hanging"}}, "scene.clearance_of"),
         ({"grid": {"link_length": [0.012, 0.008]}}, "parameters.circle_radius"),
         ({"distributions": {"links": "fixed"}}, "distributions.links"),
         ({"distributions": {"gravity": "table"}}, "distributions.gravity"),
         ({"distributions": {"floor_friction": {"uniform": [0.3, 0.2]}}}, "distributions.floor_friction.uniform[1]"),
         ({"distributions": {"floor_friction": {"uniform": [-0.1, 0.2]}}}, "distributions.floor_friction.uniform[0]"),
-        ({"distributions": {"phase": {"uniform": [0, 1.5]}}}, "distributions.phase.uniform[1]"),
         ({"distributions": {"g": {"gaussian": {"mean": -1, "sigma": 1}}}}, "distributions.gravity.gaussian.mean"),
         ({"distributions": {"e_fc": {"gaussian": {"sigma": 50}}}}, "distributions.floor_restitution"),
-        ({"distributions": {"mu_fc": UNIFORM}, "parameters": {"mu_fc": 0.3}}, "distributions.floor_friction"),
         ({"distributions": {"mu_fc": UNIFORM}, "grid": {"mu_fc": [0.3]}}, "distributions.floor_friction"),
         ({"distributions": {"sprocket_radius": {"uniform": [0.5, 0.6]}}, "grid": None}, "distributions"),
         ({"distributions": {"all": "fixed"}}, "samples"),
         ({"distributions": {"all": "fixed"}, "sampler": "saltelli"}, "sampler"),
         ({"samples": 12, "sampler": "sobol"}, "samples"),
-        ({"same_samples_along": "links"}, "same_samples_along"),
         ({"same_samples_along": ["tolerance"]}, "same_samples_along"),
-        ({"record": {"series": {"interval": 1e300}}}, "record.series.interval"),
         ({"record": {"series": {"interval": 1.5e-3}}}, "record.series.interval"),
-        ({"record": {"series": {"samples": [0, -1]}}}, "record.series.samples[1]"),
         ({"record": {"series": {"samples": [1, 1]}}}, "record.series.samples"),
         ({"record": {"series": {"samples": [0, 3]}}}, "record.series.samples"),
         ({"record": {"frames": True}}, "record.frames"),
         ({"record": {"series": {"samples": [0]}, "frames": {"samples": [0, 1]}}}, "record.frames"),
-        ({"record": {"series": True, "frames": {"before": 1e300}}}, "record.frames.before"),
         ({"points": {"mu_fc": [0.1, 0.2], "e_fc": [0.1]}}, "points.floor_restitution"),
-        ({"points": {"links": [60, 20]}, "grid": None}, "points.links[1]"),
         ({"points": {"nu": [5]}}, "points.frequency"),
         ({"blocks": [{"name": "b"}]}, "grid"),
         ({"blocks": [{"name": "a/b"}], "grid": None}, "blocks[0].name"),
         ({"blocks": [{"name": "b"}, {"name": "b"}], "grid": None}, "blocks[1].name"),
-        ({"blocks": [{"name": "b", "seed": 3}], "grid": None}, "blocks[0].seed"),
         ({"blocks": [{"name": "b", "grid": {"nu": [5, -5]}}], "grid": None}, "blocks[0].grid.frequency[1]"),
         # sizes
         ({"samples": 2**30}, "samples"),
         ({"samples": 2**21, "sampler": "sobol"}, "samples"),
-        ({"samples": 2**19, "sampler": "saltelli"}, "samples"),
         ({"grid": dict.fromkeys(list(Parameters.model_fields)[:12], LONG)}, "grid"),
         ({"grid": FULL | {"gravity": {"from": 1, "to": 11, "step": 1}}}, "grid"),
         ({"blocks": [{"name": f"b{number}", "grid": FULL} for number in range(5000)], "grid": None}, "blocks["),
@@ -209,15 +184,6 @@ def test_refusals(changes: dict[str, Any], path: str) -> None:
         load_sweep(content(**changes))
     assert time.process_time() - begun < 2
     assert caught.value.args[0].startswith(f"sweep.{path}" if path.endswith("[") else f"sweep.{path}: ")
-
-
-def test_every_problem_has_its_line() -> None:
-    """What is wrong with each value is told at once."""
-    with pytest.raises(InputError) as caught:
-        load_sweep(content(samples=0, scene={"clearance": -1, "start": "up"}, grid={"nu": [5, -5]}))
-    assert sorted(line.partition(":")[0] for line in caught.value.args) == [
-        "sweep.grid.frequency[1]", "sweep.samples", "sweep.scene.clearance", "sweep.scene.start"
-    ]  # fmt: skip
 
 
 def test_values_are_judged_in_their_cells() -> None:

@@ -51,12 +51,6 @@ def test_an_index_stays_when_samples_are_added() -> None:
     assert len(set(many.indices.tolist())) == many.walk_count
 
 
-def test_more_blocks_change_nothing_before() -> None:
-    """A sample stays what it is when its cell gets more samples and when blocks are added behind."""
-    few, many = load_sweep(blocks({})), load_sweep(blocks({"samples": 50}, {}))
-    assert (drawn(few, 3) == drawn(many, 3)).all()
-
-
 def test_first_sample_is_that_of_a_single_walk() -> None:
     """Sample 0 of cell 0 is what a single walk draws from the same seed; the others follow the same rule."""
     settings = {"links": 90, "frequency": 12.0, "floor_friction": 0.1}
@@ -130,16 +124,6 @@ def test_values_on_an_axis_are_exact_unless_scatter_is_asked_for(name: str, othe
         len({getattr(scattered.planned(index).setup.parameters, name) for index in scattered.indices[:40].tolist()})
         == 40
     )
-
-
-def test_a_grid_from_zero_simulates_zero() -> None:
-    """About 0 and 0.01 negative draws were repeated, so means were 0.016 and 0.019; `table` still asks for that."""
-    given = content(samples=200, grid={"floor_friction": [0, 0.01]})
-    for distributions, means in (({}, [0.0, 0.01]), ({"floor_friction": "table"}, [0.016, 0.019])):
-        sweep = load_sweep(given | {"distributions": distributions})
-        values = [sweep.planned(index).setup.parameters.floor_friction for index in sweep.indices[:400].tolist()]
-        tolerance = 0.0 if not distributions else 0.0015
-        assert np.mean(np.reshape(values, (2, 200)), axis=1) == pytest.approx(means, rel=1e-12, abs=tolerance)
 
 
 @pytest.mark.parametrize(

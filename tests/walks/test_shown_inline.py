@@ -3,14 +3,12 @@
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-import warpchain
 from tests.support.made_sweeps import FIGURE_6, make_sweep
 from tests.support.made_walks import make_walk
 from warpchain.status import Status
@@ -72,18 +70,3 @@ def test_energies_go_into_axes_of_the_caller() -> None:
     pairs = {name: np.empty((0, 2)) for name in ("center", "center_velocity")}
     with pytest.raises(ValueError, match="it has no time series"):
         make_walk(**empty, **pairs, status=Status.NOT_STEADY).plot("energy")
-
-
-def test_a_notebook_shows_that_a_walk_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One line in the output of the cell, which is updated until the walk is over."""
-    shown: list[str] = []
-
-    def update(content: dict[str, str], raw: bool, **_: bool) -> SimpleNamespace:
-        shown.append(content["text/plain"])
-        return SimpleNamespace(update=update)
-
-    kernel = SimpleNamespace(config={"IPKernelApp": {}})
-    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: kernel))
-    monkeypatch.setitem(sys.modules, "IPython.display", SimpleNamespace(display=update))
-    warpchain.walk(links=20, frequency=5.0, preset="soft", method="dp5", start="ellipse", walk_limit=0.02)
-    assert shown[0] == "compiling kernels" and shown[-1].startswith("walk: 0.02 s, ")

@@ -227,7 +227,7 @@ RING = outline(12, PAPER.link_length)
         (outline(11, PAPER.link_length), "joints: 11 is odd"),
         (RING[:3], "joints: 3 links"),
         (RING[:, :1], r"joints: its shape is \(12, 1\)"),
-        (RING * np.nan, "joints: they or their rates hold a number that is not finite"),
+        (RING * np.nan, "joints: holds a number that is not finite"),
         ("ring", "joints: not an array"),
     ],
 )

@@ -6,8 +6,6 @@ from typing import Annotated, Any, Final
 
 from warpchain.cli.words import argument, option, output
 
-WIDE: Final = 180
-"""Columns of the table where there is no terminal to ask."""
 _NAMES: Final = "Names or symbols, such as floor_friction, mu_fc or scene.phase, or a section. Default: all."
 
 
@@ -16,9 +14,7 @@ def parameters(
     preset: Annotated[str, option("NAME", "Whose values: paper, Table 1 of the paper, or soft.")] = "paper",
 ) -> None:
     """List what can be set: parameters, scene and options, with symbols, units, values, bounds and meanings."""
-    from rich.console import Console
-    from rich.table import Table
-
+    from warpchain.cli.terminal import print_table
     from warpchain.inputs.options import Options
     from warpchain.inputs.parameters import preset as parameter_preset
     from warpchain.inputs.scene import Scene
@@ -28,12 +24,7 @@ def parameters(
     wanted = {name if name in SECTIONS else dotted_name(name, shown(name)) for name in names or SECTIONS}
     models = (parameter_preset(preset), Scene(), Options())
     values = {name: value for model in models for name, value in vars(model).items()} | {"method": "standard"}
-    console = Console(highlight=False, markup=False)
-    if not console.is_terminal:
-        console.width = WIDE
-    table = Table(box=None, padding=(0, 1, 0, 0), header_style="")
-    for heading in ("name", "symbol", "value", "unit", "bounds", "meaning"):
-        table.add_column(heading, justify="right" if heading == "value" else "left", no_wrap=heading != "meaning")
+    rows = []
     for name, field in FIELDS.items():
         if not wanted & {name, SECTION_OF[name]}:
             continue
@@ -43,8 +34,9 @@ def parameters(
             upper = f"{_written(limits['le'])}]" if "le" in limits else f"{_written(limits.get('lt', '∞'))})"
             bounds = f"{lower}, {upper}"
         unit = field_unit(field).removeprefix("1")
-        table.add_row(name, SYMBOL_OF.get(name, ""), _written(values[name]), unit, bounds, str(field.description))
-    console.print(table)
+        rows.append((name, SYMBOL_OF.get(name, ""), _written(values[name]), unit, bounds, str(field.description)))
+    headings = ("name", "symbol", "value", "unit", "bounds", "meaning")
+    print_table(headings, rows, left=set(headings) - {"value"})
 
 
 def schema(

@@ -1,13 +1,7 @@
-"""Ctrl-C ends a command at any moment, also where Python loses the exception that it makes.
+"""Ctrl-C ends a command, also where a library makes an error of its own of the exception."""
 
-Python drops a KeyboardInterrupt that is raised in a callback of its own, such as that of a weak reference or a
-`__del__`: it prints "Exception ignored in" and goes on. Libraries may also turn it into an error of theirs.
-"""
-
-import _thread
 import contextlib
 import signal
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from types import FrameType
@@ -16,45 +10,25 @@ from typing import Final
 INTERRUPTED: Final = 130
 """Exit status of a command that Ctrl-C ended."""
 
-AGAIN: Final = 0.05
-"""Time [s] until an interrupt that was lost is raised once more."""
-
 
 @contextlib.contextmanager
 def interrupts_heard() -> Iterator[Callable[[], bool]]:
-    """Raise `KeyboardInterrupt` until it is not lost; yield a function that tells whether there was an interrupt.
-
-    Outside of the main thread, and where somebody else handles or ignores the signal, nothing is changed.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield lambda: False
-        return
-    usual_handler, usual_hook = signal.getsignal(signal.SIGINT), sys.unraisablehook
-    if usual_handler is not signal.default_int_handler:
-        yield lambda: False
-        return
-    heard = False
+    """Yield a function that tells whether there was an interrupt; others than Python's own handler stay in charge."""
+    heard = threading.Event()
+    usual = signal.getsignal(signal.SIGINT)
 
     def handle(number: int, frame: FrameType | None) -> None:
-        nonlocal heard
-        heard = True
+        heard.set()
         raise KeyboardInterrupt
 
-    def hook(lost: "sys.UnraisableHookArgs", /) -> None:
-        if not issubclass(lost.exc_type, KeyboardInterrupt):
-            usual_hook(lost)
-            return
-        again = threading.Timer(AGAIN, _thread.interrupt_main)  # not in here, where it would be lost again
-        again.daemon = True
-        again.start()
-
-    sys.unraisablehook = hook
+    if threading.current_thread() is not threading.main_thread() or usual is not signal.default_int_handler:
+        yield heard.is_set
+        return
     signal.signal(signal.SIGINT, handle)
     try:
-        yield lambda: heard
+        yield heard.is_set
     finally:
-        signal.signal(signal.SIGINT, usual_handler)
-        sys.unraisablehook = usual_hook
+        signal.signal(signal.SIGINT, usual)
 
 
 def ignore_interrupts() -> None:

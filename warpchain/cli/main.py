@@ -8,7 +8,6 @@ them, so that help is quick.
 
 import contextlib
 import io
-import os
 import sys
 import warnings
 from collections.abc import Iterator, Sequence
@@ -21,7 +20,7 @@ from warpchain.cli.input_commands import parameters, schema
 from warpchain.cli.interrupts import INTERRUPTED, interrupts_heard
 from warpchain.cli.sweep_commands import info, merge, plot, report, sweep
 from warpchain.cli.walk_commands import FAILED, animate, walk
-from warpchain.files import DISK_FAILURES, is_possible
+from warpchain.files import DISK_FAILURES
 from warpchain.version import VERSION
 
 REFUSED: Final = 2
@@ -38,9 +37,6 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal without Δ gets a question mark
-    for word in sys.argv[1:] if arguments is None else arguments:
-        if not is_possible(word):
-            _refuse([f"{ascii(word)[:100]}: has a NUL or a lone surrogate; leave it out"])
     with interrupts_heard() as heard:
         try:
             with _warnings_on_one_line():
@@ -66,23 +62,12 @@ def _refuse_for(error: Exception) -> None:
         context = getattr(error, "ctx", None)
         command = context.command_path if context is not None else "warpchain"
         _refuse([f"{error.format_message().rstrip('.')}; see {command} --help"], error.exit_code)
-    if isinstance(error, FileNotFoundError) and not _is_somewhere():
-        _refuse(["working directory: it was deleted; change to another one"])
     if isinstance(error, OSError):
         _refuse([str(error)], FAILED if error.errno in DISK_FAILURES else REFUSED)
     if isinstance(error, InputError):
         _refuse(error.args, FAILED if isinstance(error, DamagedFileError) else REFUSED)
     if isinstance(error, LostWorkersError):
         _refuse([str(error)], FAILED)
-
-
-def _is_somewhere() -> bool:
-    """Whether the working directory of this process is still there."""
-    try:
-        os.getcwd()
-    except FileNotFoundError:
-        return False
-    return True
 
 
 @contextlib.contextmanager

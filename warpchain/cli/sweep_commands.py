@@ -14,7 +14,6 @@ from warpchain.cli.walk_commands import FAILED
 from warpchain.cli.words import JSON, argument, option, output, output_path
 
 if TYPE_CHECKING:
-    from warpchain.run.workers import DaskClient, Executor
     from warpchain.store.sweep_result import SweepResult
 
 _FILE: Final = "The sweep, or the bare name of one that comes with warpchain, such as figure6."
@@ -133,25 +132,20 @@ def plot(
     a walk: film_strip.png, height_and_speed.png, loop.png, energy.png and, if the plane tilts, tilt.png; a line says
     what is left out and why.
     """
-    from warpchain.cli.walk_files import draw_figures, record_of, try_folder
+    from warpchain.cli.walk_files import draw_figures, saved, try_folder
     from warpchain.files import make_folder
-    from warpchain.hdf5_files import kind_of_hdf5
     from warpchain.inputs.validation import InputError, printable
     from warpchain.pictures.walk_shape import kinds_of
     from warpchain.reports.sweep_figures import figures
-    from warpchain.store.sweep_result import KIND, load
-    from warpchain.walks.walk_result import WalkResult, load_walk
+    from warpchain.walks.walk_result import WalkResult
 
-    path, wanted = record_of(path), "give the folder of a sweep, a merged file, or the file of a saved walk"
-    is_file = os.path.isfile(path)
-    is_missing = path.suffix == ".h5" and not os.path.exists(path)
-    is_walk = is_missing or (is_file and kind_of_hdf5(path, wanted) != KIND)
+    found = saved(path, "give the folder of a sweep, a merged file, or the file of a saved walk")
+    is_walk = isinstance(found, WalkResult)
     if is_walk and quantity is not None:
         raise InputError("--quantity: a saved walk has no columns; leave it out, or give the folder of a sweep")
     if kind is not None and not is_walk:
         raise InputError("--kind: a sweep has none; leave it out, or give the file of a saved walk")
-    found = load_walk(path) if is_walk else load(path)
-    folder = folder or (path.parent if is_file else path)
+    folder = folder or (path.parent if os.path.isfile(path) else path)
     try_folder(folder)
     make_folder(folder)
     drawn = (
@@ -225,12 +219,8 @@ def _print_estimate(source: Path, **given: Any) -> None:
 
 
 @contextlib.contextmanager
-def _executor(gpus: int | None, scheduler: str | None) -> "Iterator[Executor | DaskClient | None]":
-    """Workers on GPUs, or the client of a Dask cluster; None if neither is asked for.
-
-    Raises:
-        InputError: there are not so many GPUs, Dask is not installed, or the scheduler does not answer.
-    """
+def _executor(gpus: int | None, scheduler: str | None) -> Iterator[Any]:
+    """Workers on GPUs, or the client of a Dask cluster; None if neither is asked for."""
     from warpchain.engine.devices import gpu_count
     from warpchain.inputs.validation import InputError
     from warpchain.run.gpu_workers import gpu_workers, visible_gpus

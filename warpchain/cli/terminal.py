@@ -1,47 +1,40 @@
-"""What the command line shows: progress and tables."""
+"""What the command line shows: tables."""
 
 import itertools
 import json
 import math
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Container, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from warpchain.engine.tallies import LOST
 from warpchain.inputs.validation import json_value, printable
-from warpchain.run.progress_bar import COMPILING, duration_text
+from warpchain.run.progress_bar import duration_text
 from warpchain.walks.rows import fault_remedies
 from warpchain.walks.walk_result import WalkResult
 
 if TYPE_CHECKING:
     from warpchain.store.sweep_result import SweepResult
-    from warpchain.walks.one_walk import Progress
 
 _MOST_CELLS: Final = 1000
 """Most cells of a sweep that a table lists; one of 100,000 would take minutes to lay out."""
+_WIDE: Final = 180
+"""Columns of a table where there is no terminal to ask."""
 
 
-@contextmanager
-def status_line() -> Iterator[Callable[[str], None]]:
-    """Yield a function that shows a changing line on a terminal; without one it shows nothing."""
-    if not sys.stderr.isatty():
-        yield lambda text: None
-        return
+def print_table(headings: Iterable[str], rows: Iterable[Sequence[str]], left: Container[str] = ()) -> None:
+    """Print columns of text on standard output, to the right but for those whose headings are `left`; NaN is empty."""
     from rich.console import Console
+    from rich.table import Table
 
-    with Console(stderr=True).status("starting") as line:
-        yield line.update
-
-
-def progress_text(progress: "Progress") -> str:
-    """Where a walk is, in columns."""
-    if progress.phase == "compile":
-        return COMPILING
-    where, speed = f"{progress.phase:8}{progress.time:8.3f} s", f"{progress.speed:9.3f} m/s"
-    return f"{where}{speed}{progress.attempts:14,} steps"
+    table = Table(box=None, pad_edge=False, header_style="")
+    for heading in headings:
+        table.add_column(heading, justify="left" if heading in left else "right", no_wrap=heading != "meaning")
+    for row in rows:
+        table.add_row(*("" if text.startswith("nan") else text for text in row))
+    Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else _WIDE).print(table)
 
 
 def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None) -> None:
@@ -66,35 +59,30 @@ def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None)
         whole |= {"inaccurate": result.inaccurate_count, "rate": rate, "time_left": time_left, "blocks": blocks}
         print(json.dumps(json_value(whole), indent=2, allow_nan=False))
         return
-    from rich.console import Console
-    from rich.table import Table
-
-    console = Console(highlight=False, markup=False)
     counts = ", ".join(f"{count:,} {label}" for label, count in summary.items() if count or label == "at_rest")
-    console.print(f"{printable(result.name)}: {result.walk_count:,} walks, {counts}")
+    print(f"{printable(result.name)}: {result.walk_count:,} walks, {counts}")
     for remedy_of_fault, number in fault_remedies(block.faults for block in result.blocks.values()).items():
-        console.print(f"{number:,} inaccurate: {remedy_of_fault}")
+        print(f"{number:,} inaccurate: {remedy_of_fault}")
     if rate is not None:
         left = "" if time_left is None else f", {duration_text(time_left)} left"
-        console.print(f"running: {rate:.2f} walks a second{left}")
+        print(f"running: {rate:.2f} walks a second{left}")
     room = _MOST_CELLS
     for name, cells in statistics.items():
-        title = printable(name) if len(statistics) > 1 else None
-        table = Table(box=None, pad_edge=False, title=title, title_justify="left")
         numbers = {"at rest": cells.count} | ({"no Δx": cells.absent} if cells.absent.any() else {})
         numbers |= {"failed": cells.failed, "missing": cells.missing}
-        for heading in (*map(printable, cells.axes), "mean Δx / m", "s.d. / m", *numbers):
-            table.add_column(heading, justify="right")
+        rows = []
         for place in itertools.islice(np.ndindex(*cells.mean.shape), room):
             at = (values[index] for values, index in zip(cells.axes.values(), place, strict=True))
             texts = ["null" if value is None else printable(str(value)) for value in at]
             lengths = [f"{array[place]:.4f}" for array in (cells.mean, cells.sd)]
-            table.add_row(*texts, *lengths, *(str(array[place]) for array in numbers.values()))
-        if table.rows:
-            console.print(table)
-        room -= len(table.rows)
+            rows.append([*texts, *lengths, *(str(array[place]) for array in numbers.values())])
+        if rows and len(statistics) > 1:
+            print(printable(name))
+        if rows:
+            print_table([*map(printable, cells.axes), "mean Δx / m", "s.d. / m", *numbers], rows)
+        room -= len(rows)
     if more := sum(cells.mean.size for cells in statistics.values()) - _MOST_CELLS + room:
-        console.print(f"… and {more:,} more cells, which --json lists")
+        print(f"… and {more:,} more cells, which --json lists")
 
 
 def print_walk(result: WalkResult) -> None:

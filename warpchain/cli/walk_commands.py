@@ -78,49 +78,51 @@ def walk(
     as_json: Annotated[bool, JSON] = False,
 ) -> None:
     """Spin up one chain, drop it, and follow it until it rests."""
-    from warpchain.cli.terminal import print_walk, progress_text, status_line
+    from warpchain.cli.terminal import print_walk
     from warpchain.cli.walk_files import try_walk_folder, write_walk
-    from warpchain.inputs.distributions import LARGEST_SEED
+    from warpchain.inputs.distributions import Seed
     from warpchain.inputs.options import replaced_by
     from warpchain.inputs.sections import SECTIONS
-    from warpchain.inputs.setup import DEFAULT_PRESET, continued, read_setup
-    from warpchain.inputs.validation import InputError, checked_whole, printable
+    from warpchain.inputs.setup import DEFAULT_PRESET, continued, resolve
+    from warpchain.inputs.validation import InputError, checked, printable
     from warpchain.inputs.yaml_files import parse_yaml
-    from warpchain.run.single_walk import complete_setup
+    from warpchain.run.progress_bar import changing_line, walk_progress_text
+    from warpchain.sweeps.sweep_file import read_walk_file
     from warpchain.walks.one_walk import run_walk
 
     named = {"links": links, "frequency": frequency, "start": start}
     given = _given_values(named | {"method": method, "tolerance": tolerance, "device": device}, assignments or [])
-    own: Mapping[str, Any] = {}
-    number = None if seed is None else checked_whole(parse_yaml(seed, "seed"), "seed", 0, LARGEST_SEED)
+    own: Mapping[str, Mapping[str, Any]] = {}
+    number = None if seed is None else checked(parse_yaml(seed, "seed"), "seed", Seed)
     if like is not None:
         for name, value in (("--config", config), ("--preset", preset), ("--seed", seed)):
             if value is not None:
                 raise InputError(f"{name}: given together with --like, and a saved walk has its own; leave one out")
-        saved, number = _saved(like, index)
+        base, number = _saved(like, index)
         replaced = replaced_by(given["options"])
-        preset, own = saved.preset, {name: getattr(saved, name).model_dump(exclude=replaced) for name in SECTIONS}
+        preset, own = base.preset, {name: getattr(base, name).model_dump(exclude=replaced) for name in SECTIONS}
     elif config is not None:
-        file_preset, own = read_setup(config)
+        file_preset, own = read_walk_file(config)
         preset = preset or file_preset
         if preset is None:
             raise InputError("preset: missing; name the parameters to start from, such as preset: paper")
     elif index is not None:
         raise InputError("--index: names a walk of a sweep, but --like is missing; give --like DIR, the sweep")
-    if like is not None and saved.start is not None:
-        setup = continued(saved.start, given)
+    if like is not None and base.start is not None:
+        setup = continued(base.start, given)
     else:
-        setup = complete_setup(preset or DEFAULT_PRESET, _over(own, given), number, record_loads)
+        sections = {name: {**own.get(name, {}), **values} for name, values in given.items()}
+        setup = resolve(preset or DEFAULT_PRESET, **sections, seed=number, records_loads=record_loads)
     interval = _frame_interval(folder, animation, frame_interval, record_loads)
     if folder is not None:
         try_walk_folder(folder, animation)
-    with status_line() as show:
+    with changing_line() as show:
         result = run_walk(
             setup,
             seed=number,
             frame_interval=interval,
             record_loads=record_loads,
-            on_progress=lambda progress: show(progress_text(progress)),
+            on_progress=show and (lambda progress: show(walk_progress_text(progress))),
         )
     if as_json:
         print(json.dumps(result.to_dict(), indent=2, allow_nan=False))
@@ -142,11 +144,11 @@ def animate(
     slow: Annotated[float, option("NUMBER", "Playing time per simulated time. Default: 4.")] = 4.0,
 ) -> None:
     """Write a film of a saved walk: GIF, MP4 or HTML with a player."""
-    from warpchain.cli.walk_files import record_of
+    from warpchain.cli.walk_files import RECORD
     from warpchain.inputs.validation import InputError, printable
     from warpchain.walks.walk_result import load_walk
 
-    record = record_of(walk)
+    record = walk / RECORD if walk.is_dir() else walk
     result, path = load_walk(record), path or record.with_suffix(".gif")
     try:
         result.animate(path, fps=fps, slow=slow)
@@ -156,11 +158,7 @@ def animate(
 
 
 def _given_values(named: Mapping[str, str | None], assignments: Sequence[str]) -> dict[str, dict[str, object]]:
-    """Values of the command line by section; named options and `NAME=VALUE` are on a par.
-
-    Raises:
-        InputError: an assignment is not of that form, its name is unknown, or a name is given twice.
-    """
+    """Values of the command line by section; named options and `NAME=VALUE` are on a par."""
     from warpchain.inputs.sections import SECTION_OF, by_section, dotted_name
     from warpchain.inputs.validation import InputError, shown
     from warpchain.inputs.yaml_files import parse_yaml
@@ -181,44 +179,24 @@ def _given_values(named: Mapping[str, str | None], assignments: Sequence[str]) -
     return by_section(values)
 
 
-def _over(own: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
-    """Values of the command line over those of a file or a saved walk, by section."""
-    sections = {section: own.get(section, {}) for section in given}
-    # what is no mapping is refused by `complete_setup`
-    return {name: {**own, **given[name]} if isinstance(own, Mapping) else own for name, own in sections.items()}
-
-
 def _saved(path: Path, index: str | None) -> tuple["Setup", int | None]:
-    """Setup and seed of a saved walk, or of the walk with a number of a sweep.
-
-    Raises:
-        InputError: there is no such walk, or the number is missing.
-        OSError: the file or folder cannot be read.
-    """
-    from warpchain.cli.walk_files import record_of
-    from warpchain.hdf5_files import kind_of_hdf5
+    """Setup and seed of a saved walk, or of the walk with a number of a sweep."""
+    from warpchain.cli.walk_files import saved
     from warpchain.inputs.validation import InputError
     from warpchain.inputs.yaml_files import parse_yaml
-    from warpchain.store.sweep_result import KIND, load
-    from warpchain.walks.walk_result import load_walk
+    from warpchain.walks.walk_result import WalkResult
 
-    wanted = "give a saved walk, or the folder or merged file of a sweep and --index"
-    record = record_of(path)
-    if index is None and not record.is_dir() and kind_of_hdf5(record, wanted) != KIND:
-        walk = load_walk(record)
-        return walk.setup, walk.seed
+    found = saved(path, "give a saved walk, or the folder or merged file of a sweep and --index")
+    if isinstance(found, WalkResult):
+        return found.setup, found.seed
     if index is None:
         raise InputError(f"--like: {path} has many walks; give --index, the number of one, as well")
-    block, place = load(path).located(parse_yaml(index, "--index"))
+    block, place = found.located(parse_yaml(index, "--index"))
     return block.setup_at(place), block.sweep_at(place).seed
 
 
 def _frame_interval(folder: Path | None, animation: str | None, text: str | None, records_loads: bool) -> Any:
-    """Time between two frames [s], which the walk checks; None without a folder to write them to.
-
-    Raises:
-        InputError: an option needs a folder, or MP4 cannot be written.
-    """
+    """Time between two frames [s], which the walk checks; None without a folder to write them to."""
     from importlib.util import find_spec
 
     from warpchain.inputs.validation import InputError

@@ -12,14 +12,30 @@ from warpchain.inputs.validation import InputError, one_line
 from warpchain.pictures.walk_shape import Kind
 
 if TYPE_CHECKING:
+    from warpchain.store.sweep_result import SweepResult
     from warpchain.walks.walk_result import WalkResult
 
 RECORD: Final = "walk.h5"
 
 
-def record_of(path: Path) -> Path:
-    """The record in the folder of a walk, if the path is one, or else the path itself."""
-    return path / RECORD if os.path.isfile(path / RECORD) else path
+def saved(path: Path, wanted: str) -> "WalkResult | SweepResult":
+    """The walk or the sweep of a file or a folder.
+
+    Args:
+        path: of it.
+        wanted: what to give in place of another file.
+
+    Raises:
+        InputError: it is neither.
+        OSError: it cannot be read.
+    """
+    from warpchain.hdf5_files import kind_of_hdf5
+    from warpchain.store.sweep_result import KIND, load
+    from warpchain.walks.walk_result import load_walk
+
+    record = path / RECORD if os.path.isfile(path / RECORD) else path
+    is_sweep = record.is_dir() or (record.suffix != ".h5" and not record.exists())
+    return load(record) if is_sweep or kind_of_hdf5(record, wanted) == KIND else load_walk(record)
 
 
 def try_walk_folder(folder: Path, animation: str | None) -> None:

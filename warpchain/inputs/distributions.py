@@ -11,15 +11,16 @@ import math
 from collections.abc import Container, Mapping
 from dataclasses import dataclass, replace
 from statistics import NormalDist
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
+from pydantic import Field
 
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene
 from warpchain.inputs.sections import SECTION_OF
-from warpchain.inputs.setup import Setup
-from warpchain.inputs.validation import Bounds, InputError, checked_whole, field_bounds
+from warpchain.inputs.state import Setup
+from warpchain.inputs.validation import Bounds, InputError, Whole, checked, field_bounds
 
 CLEARANCE_RANGE: Final = (0.005, 0.015)
 """Interval of the release height that a sample draws from, in m."""
@@ -28,8 +29,9 @@ DRAW_LIMIT: Final = 1000
 """Draws of one quantity before giving up; a mean inside the bounds needs two on average at worst."""
 
 LARGEST_SEED: Final = 2**128 - 1
-_LARGEST: Final = 2**32 - 1
-"""Greatest cell or sample. A greater number, or seed, could repeat the stream of another sample."""
+Seed = Annotated[Whole, Field(ge=0, le=LARGEST_SEED)]
+_Index = Annotated[Whole, Field(ge=0, le=2**32 - 1)]
+"""Of a cell or sample. A greater number, or seed, could repeat the stream of another sample."""
 
 DRAWABLE: Final = (
     *Parameters.model_fields,
@@ -214,8 +216,8 @@ def random_generator(seed: int, cell: int = 0, sample: int = 0) -> np.random.Gen
     Raises:
         InputError: a number is no integer or out of range.
     """
-    given = (("seed", seed, LARGEST_SEED), ("cell", cell, _LARGEST), ("sample", sample, _LARGEST))
-    entropy, *key = (checked_whole(number, name, 0, largest) for name, number, largest in given)
+    entropy = checked(seed, "seed", Seed)
+    key = [checked(number, name, _Index) for name, number in (("cell", cell), ("sample", sample))]
     return np.random.default_rng(np.random.SeedSequence(entropy, spawn_key=key))
 
 

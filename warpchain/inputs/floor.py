@@ -5,15 +5,15 @@ Points are joined by straight lines; beyond the first and the last point these g
 
 import itertools
 import math
-from typing import Any, Final
+from typing import Annotated, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import AfterValidator, Field, Strict
 
-from warpchain.inputs.validation import InputError, shown
+from warpchain.inputs.validation import InputError
 
 Array = NDArray[np.float64]
-Points = tuple[tuple[float, float], ...]
 
 MOST_POINTS: Final = 256
 """Most points of a profile; each takes time where a chain is near it."""
@@ -25,28 +25,10 @@ EXACT: Final = 1e-11
 """Clearances are met to this [m]."""
 
 
-def checked_profile(given: Any) -> Any:
-    """A profile as a tuple of points x, y [m]; `flat` stays as it is.
-
-    Raises:
-        ValueError: it is neither that nor a list of points that make a floor.
-    """
-    if given == "flat":
-        return given
-    if not isinstance(given, list | tuple):
-        raise ValueError(f"{shown(given)} is no floor; give flat, or points [[x, y], …] in m")
-    points: list[tuple[float, float]] = []
-    for number, point in enumerate(given):
-        pair = list(point) if isinstance(point, list | tuple) else []
-        if len(pair) != 2 or not all(isinstance(each, int | float) and not isinstance(each, bool) for each in pair):
-            raise ValueError(f"point {number}, {shown(point)}, is no pair of numbers; give [x, y] in m")
-        if not all(abs(each) <= FARTHEST for each in pair):
-            raise ValueError(f"point {number}, {shown(point)}, is not within {FARTHEST:g} m; give a nearer one")
-        points.append((float(pair[0]), float(pair[1])))
-    if not 2 <= len(points) <= MOST_POINTS:
-        raise ValueError(
-            f"{len(points)} points; give 2 to {MOST_POINTS}, such as [[0, 0], [1, 0], [1, -0.1], [2, -0.1]]"
-        )
+def _without_overhang(points: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+    """The points of a profile, if they make a floor."""
+    if len(points) < 2:
+        raise ValueError("a profile has 2 points at least; give more, such as [[0, 0], [1, 0], [1, -0.1], [2, -0.1]]")
     for number, ((x, y), (next_x, next_y)) in enumerate(itertools.pairwise(points), start=1):
         if next_x < x:
             raise ValueError(f"point {number} lies behind the one before it; let x rise from point to point")
@@ -56,7 +38,18 @@ def checked_profile(given: Any) -> Any:
             raise ValueError("the first and the last face go on without end; let x rise along them")
         if number > 1 and points[number - 2][0] == next_x:
             raise ValueError(f"point {number} is the third above one another; leave the middle one out")
-    return tuple(points)
+    return points
+
+
+_Coordinate = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
+_Point = Annotated[tuple[_Coordinate, _Coordinate], Strict(False)]
+Points = Annotated[
+    tuple[_Point, ...],
+    Strict(False),
+    Field(max_length=MOST_POINTS),
+    AfterValidator(_without_overhang),
+]
+"""A profile: points x, y [m]."""
 
 
 def slope_points(degrees: float) -> Array:

@@ -6,7 +6,7 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from warpchain.inputs.methods import BURST_TOLERANCE, FORMER_METHODS, METHODS, METHODS_BY_NEED
+from warpchain.inputs.methods import BURST_TOLERANCE, METHODS, METHODS_BY_NEED
 from warpchain.inputs.validation import InputError, Section, Whole, number_field, shown, suggestion
 from warpchain.kernels.methods.explicit_tableaus import HYBRID
 from warpchain.kernels.methods.method import find_method, method_names
@@ -38,8 +38,6 @@ def replaced_by(options: Mapping[str, object]) -> set[str]:
 
 def _known_method(method: str) -> str:
     """The word or integrator, if there is one of this name."""
-    if method in FORMER_METHODS:
-        raise ValueError(f"{shown(method)} was removed; give {FORMER_METHODS[method]}")
     known = (*METHODS_BY_NEED, *method_names())
     if method not in known:
         raise ValueError(f"{shown(method)} is unknown; {suggestion(method, known)}")
@@ -145,22 +143,14 @@ class Options(Section):
         return {**defaults, **{name: value for name, value in values.items() if name != "method"}}
 
     @model_validator(mode="after")
-    def _method_runs_on_device(self) -> Self:
+    def _goes_together(self) -> Self:
         if on_gpu(self.device) and not find_method(self.method).runs_on_gpus:
             raise InputError(f"method: {shown(self.method)} runs on a CPU only; give explicit, or device: cpu")
-        return self
-
-    @model_validator(mode="after")
-    def _steps_ordered(self) -> Self:
         if self.smallest_step >= self.contact_step:
             raise InputError(
                 f"smallest_step: {self.smallest_step} is not smaller than contact_step {self.contact_step} s; "
                 "give a smaller step"
             )
-        return self
-
-    @model_validator(mode="after")
-    def _stiffens_in_small_steps(self) -> Self:
         if self.soften_drive and self.record_interval > LONGEST_DRIVE_INTERVAL:
             raise InputError(
                 f"soften_drive: joints stiffen at each record_interval, and {self.record_interval} s is too long for "

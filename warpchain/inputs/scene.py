@@ -1,17 +1,17 @@
 """What happens in a walk: how long the chain is, how fast it is spun, from which height it is released."""
 
 import math
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 import numpy as np
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import Discriminator, Field, Strict, Tag, model_validator
 
-from warpchain.inputs.floor import Array, Points, checked_profile, slope_points
+from warpchain.inputs.floor import Array, Points, slope_points
 from warpchain.inputs.link_values import LinkValues, alternating
 from warpchain.inputs.options import on_gpu
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.sprocket_motion import Motion, checked_motion
-from warpchain.inputs.validation import InputError, Section, Whole, number_field, shown
+from warpchain.inputs.sprocket_motion import Rows
+from warpchain.inputs.validation import InputError, Section, Whole, number_field
 
 MOST_LINKS: Final = 100_000
 """A chain of so many links takes 0.4 GB, and kernels of its own."""
@@ -45,16 +45,7 @@ TAP: Final = ("lateral_speed", "tilt", "tilt_rate", "yaw_rate")
 upright, so that a scene with a tilting plane alone is the paper's."""
 
 
-def _as_tuple(given: Any) -> Any:
-    if given is not None and not isinstance(given, list | tuple):
-        raise ValueError(f"{shown(given)} is no list; give a number for each link, or null")
-    return None if given is None else tuple(given)
-
-
-_Numbers = Annotated[
-    tuple[Annotated[float, Field(ge=0, le=1e12)], ...] | None,
-    BeforeValidator(_as_tuple),
-]
+_Numbers = Annotated[tuple[Annotated[float, Field(ge=0, le=1e12)], ...], Strict(False)] | None
 """A number for each link or joint; null: what the parameters say."""
 
 
@@ -136,29 +127,21 @@ class Scene(Section):
     walk_limit: float = number_field(
         20.0, "s", "longest time from the release to rest; then the walk ends as time_limit", gt=0, le=LONGEST
     )
-    release: Annotated[Motion | None, BeforeValidator(checked_motion)] = Field(
+    release: Rows | None = Field(
         default=None,
         description="motion of the sprocket after the release: rows [time in s, x and y in m from its place, "
         "frequency in Hz]; it vanishes after the last, or at once (null); "
         "what sinks too deep presses the chain into the floor",
     )
-    floor: Annotated[Literal["flat"] | Points, BeforeValidator(checked_profile)] = Field(
-        default="flat",
-        description="flat, or a profile [[x, y], …] in m, whose ends go on straight",
-    )
+    floor: Annotated[
+        Annotated[Literal["flat"], Tag("(flat)")] | Annotated[Points, Tag("(points)")],
+        Discriminator(lambda given: "(flat)" if isinstance(given, str) else "(points)"),
+    ] = Field(default="flat", description="flat, or a profile [[x, y], …] in m, whose ends go on straight")
     slope: float = number_field(
-        0.0,
-        "°",
-        "of an endless floor; positive: it falls the way the chain walks",
-        ge=-STEEPEST,
-        le=STEEPEST,
+        0.0, "°", "of an endless floor; positive: it falls the way the chain walks", ge=-STEEPEST, le=STEEPEST
     )
     distance_limit: float | None = number_field(
-        None,
-        "m",
-        "distance along the floor at which a walk ends as distance_limit; null: none",
-        gt=0,
-        le=HIGHEST,
+        None, "m", "distance along the floor at which a walk ends as distance_limit; null: none", gt=0, le=HIGHEST
     )
     walk_until: float | None = number_field(
         None,
@@ -201,11 +184,7 @@ class Scene(Section):
         0.0, "kg m²", "moment of inertia of the charm about that centre, added likewise", ge=0, le=1e12
     )
     stiff_joint: int = number_field(
-        0,
-        "1",
-        "joint that is stiff: the one at the end of this link",
-        ge=0,
-        le=MOST_LINKS - 1,
+        0, "1", "joint that is stiff: the one at the end of this link", ge=0, le=MOST_LINKS - 1
     )
     stiff_joint_factor: float = number_field(
         1.0, "1", "by which viscous and Coulomb friction of stiff_joint are multiplied", ge=0, le=1e6
@@ -223,7 +202,7 @@ class Scene(Section):
     coulomb_frictions: _Numbers = number_field(None, "N m", "coulomb_friction of each joint; null: the same for all")
 
     @model_validator(mode="after")
-    def _links_are_there(self) -> Self:
+    def _goes_together(self) -> Self:
         for name in ("charm_link", "stiff_joint"):
             if getattr(self, name) >= self.links:
                 raise InputError(
@@ -235,34 +214,17 @@ class Scene(Section):
                 raise InputError(f"{name}: {len(values)} numbers for {self.links} links; give one for each")
             if values is not None and name.startswith("link") and min(values) == 0:
                 raise InputError(f"{name}[{values.index(0)}]: 0 is no {name[5:-2]}; give more")
-        return self
-
-    @model_validator(mode="after")
-    def _one_floor(self) -> Self:
         if self.slope != 0 and self.floor != "flat":
             raise InputError(f"slope: {self.slope} of a floor that is a profile; give slope: 0, or floor: flat")
         if self.plane == "tilting" and floor_points(self) is not None:
             raise InputError("plane: 'tilting' needs a flat floor; give plane: fixed, or floor: flat and slope: 0")
-        return self
-
-    @model_validator(mode="after")
-    def _tap_needs_tilting_plane(self) -> Self:
-        for name in TAP:
-            if getattr(self, name) != 0 and self.plane == "fixed":
-                raise InputError(
-                    f"{name}: {getattr(self, name)} moves the plane of the chain, which is fixed; give plane: tilting"
-                )
-        return self
-
-    @model_validator(mode="after")
-    def _motion_needs_sprocket(self) -> Self:
+        if self.plane == "fixed" and (name := next((name for name in TAP if getattr(self, name) != 0), "")):
+            raise InputError(
+                f"{name}: {getattr(self, name)} moves the plane of the chain, which is fixed; give plane: tilting"
+            )
         if self.release is not None and (self.start == "ellipse" or self.plane == "tilting"):
             word = "start: ellipse" if self.start == "ellipse" else "plane: tilting"
             raise InputError(f"release: a motion of the sprocket, which {word} does not go with; leave one out")
-        return self
-
-    @model_validator(mode="after")
-    def _hanging_needs_rest(self) -> Self:
         if self.clearance_of == "hanging" and self.start != "rest":
             raise InputError(
                 f"clearance_of: 'hanging' needs a chain that hangs, but start is {self.start!r}; "

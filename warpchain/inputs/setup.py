@@ -1,26 +1,23 @@
 """The one door through which a user's values come in: scene, options and parameters of a walk, checked together.
 
-Keyword arguments, the command line and YAML files (`read_setup`) all go through `resolve`. Both raise only
-`InputError`.
+Keyword arguments, the command line and YAML files all go through `resolve`, which raises only `InputError`.
 """
 
-import os
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
+from warpchain.inputs.distributions import random_generator, sampled
 from warpchain.inputs.floor import check_above
 from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL, Options, replaced_by
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.parameters import preset as parameter_preset
 from warpchain.inputs.scene import OF_LINKS, Scene, check_links_on_gpu, check_parity, check_scene, floor_points
-from warpchain.inputs.sections import SECTIONS
 from warpchain.inputs.state import DEFAULT_PRESET, Setup, State
-from warpchain.inputs.validation import InputError, by_name, path_of, shown, suggestion, validated
-from warpchain.inputs.yaml_files import read_yaml
+from warpchain.inputs.validation import InputError, shown, validated
 from warpchain.kernels.methods.method import find_method
 
-__all__ = ["DEFAULT_PRESET", "Setup", "combined", "continued", "options_beside", "read_setup", "resolve"]
+__all__ = ["DEFAULT_PRESET", "Setup", "combined", "continued", "options_beside", "resolve"]
 
 OF_THE_WALK: Final = (
     *("walk_limit", "walk_until", "distance_limit", "floor", "slope"),
@@ -35,26 +32,29 @@ def resolve(
     scene: Mapping[str, object],
     options: Mapping[str, object],
     parameters: Mapping[str, object],
+    seed: int | None = None,
     records_loads: bool = False,
 ) -> Setup:
-    """Check a user's values and complete them.
+    """Check a user's values, complete them, and draw the sample of a seed.
+
+    From the seed's generator come first the parameters, then phase and clearance, of what is not given, as in the first
+    walk of a sweep.
 
     Args:
         preset: name of the parameter preset to start from.
         scene: fields of `Scene` that differ from their defaults.
         options: fields of `Options` that differ from their defaults.
         parameters: fields of `Parameters` that differ from the preset.
+        seed: of the sample; None: nothing is drawn.
         records_loads: whether joint forces of the walk will be recorded.
 
     Raises:
         InputError: anything is wrong; one line with the field's path and the remedy.
     """
-    for path, values in (("scene", scene), ("options", options), ("parameters", parameters)):
-        if not isinstance(values, Mapping):
-            raise InputError(f"{path}: {shown(values)} is not a mapping; give names with values")
     checked = validated(Scene, scene, "scene")
     changed = parameter_preset(preset).with_values(parameters)
-    return combined(preset, changed, checked, options_beside(checked.plane, options, records_loads))
+    setup = combined(preset, changed, checked, options_beside(checked.plane, options, records_loads))
+    return setup if seed is None else sampled(setup, random_generator(seed), kept={*scene, *parameters})
 
 
 def options_beside(plane: str, options: Mapping[str, object], records_loads: bool = False) -> Options:
@@ -114,27 +114,6 @@ def check_has_joint_forces(options: Options) -> None:
             f"options.method: {shown(options.method)} makes joints rigid between impulses, without forces that "
             "record_loads could keep; give explicit or an integrator other than hybrid"
         )
-
-
-def read_setup(path: str | os.PathLike[str]) -> tuple[Any, dict[str, Any]]:
-    """Preset (None if there is none) and sections of a YAML file by full names, not yet checked by `resolve`.
-
-    Raises:
-        InputError: the file cannot be read, is not YAML, gives a value twice, or has other keys.
-    """
-    content = read_yaml(path)
-    if not isinstance(content, dict):
-        raise InputError(f"{path}: no mapping at the top; give the keys preset, {', '.join(SECTIONS)}")
-    for key in content:
-        if key != "preset" and key not in SECTIONS:
-            raise InputError(f"{path_of('', key)}: unknown key; {suggestion(key, ('preset', *SECTIONS))}")
-    sections: dict[str, Any] = {}
-    for section in SECTIONS:
-        values = content.get(section)
-        if isinstance(values, Mapping):
-            values = by_name(values, section)
-        sections[section] = {} if values is None else values  # what has nothing under it changes nothing
-    return content.get("preset"), sections
 
 
 def continued(state: State, sections: Mapping[str, Mapping[str, object]]) -> Setup:

@@ -15,31 +15,16 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class CurvePoints:
-    """Points of a family of closed curves P(s, size), clockwise in s.
-
-    Attributes:
-        point: P, shape (2, m) [m].
-        along: ∂P/∂s, shape (2, m).
-        growth: ∂P/∂size at fixed s, shape (2, m).
-    """
-
-    point: Array
-    along: Array
-    growth: Array
-
-
-@dataclass(frozen=True)
 class Curve:
-    """A family of closed curves.
+    """A family of closed curves P(s, size), clockwise in s.
 
     Attributes:
-        points: Maps (s, size) to points; s of shape (m,).
+        points: Maps s, of shape (m,), and a size to P [m], ∂P/∂s, and ∂P/∂size at fixed s, each of shape (2, m).
         period: Period of s as a function of size, and its derivative.
         first_size: Starting value of size for Newton's method, given the chain's length [m].
     """
 
-    points: Callable[[Array, float], CurvePoints]
+    points: Callable[[Array, float], tuple[Array, Array, Array]]
     period: Callable[[float], tuple[float, float]]
     first_size: Callable[[float], float]
 
@@ -54,7 +39,7 @@ def stadium(radius: float) -> Curve:
     """
     quarter = np.pi * radius / 2
 
-    def points(s: Array, size: float) -> CurvePoints:
+    def points(s: Array, size: float) -> tuple[Array, Array, Array]:
         turn = 4 * quarter + 2 * size
         laps, s = np.divmod(s, turn)
         down = np.minimum(np.maximum(s - quarter, 0.0), size)  # distances along the two straights
@@ -68,7 +53,7 @@ def stadium(radius: float) -> Curve:
         growth = -(down_growth + up_growth + 2 * laps) * along  # every lap before grows as well
         growth[1] += up_growth - down_growth
         point = np.array([radius * sine, radius * cosine - down + up])
-        return CurvePoints(point=point, along=along, growth=growth)
+        return point, along, growth
 
     return Curve(
         points=points,
@@ -87,11 +72,11 @@ def ellipse(aspect: float) -> Curve:
     """
     wide, high = 1 / np.sqrt(aspect), np.sqrt(aspect)
 
-    def points(s: Array, size: float) -> CurvePoints:
+    def points(s: Array, size: float) -> tuple[Array, Array, Array]:
         sine, cosine = np.sin(s), np.cos(s)
         unit = np.array([wide * sine, high * cosine])
         along = np.array([wide * cosine, -high * sine])
-        return CurvePoints(point=size * unit, along=size * along, growth=unit)
+        return size * unit, size * along, unit
 
     angles = np.linspace(0, 2 * np.pi, 4096, endpoint=False)
     unit_length = float(np.mean(np.hypot(wide * np.cos(angles), high * np.sin(angles))) * 2 * np.pi)
@@ -124,12 +109,12 @@ def lay_chain(
     for _ in range(50):
         period, period_growth = curve.period(size)
         s[0] = phase * period
-        ends = curve.points(np.concatenate([s, [s[0] + period]]), size)
-        chord = ends.point[:, 1:] - ends.point[:, :-1]
+        ends, along, growth = curve.points(np.concatenate([s, [s[0] + period]]), size)
+        chord = ends[:, 1:] - ends[:, :-1]
         residual = np.sum(chord**2, axis=0) - link_length**2
-        to_here = -2 * np.sum(chord * ends.along[:, :-1], axis=0)
-        to_following = 2 * np.sum(chord * ends.along[:, 1:], axis=0)
-        to_size = 2 * np.sum(chord * (ends.growth[:, 1:] - ends.growth[:, :-1]), axis=0)
+        to_here = -2 * np.sum(chord * along[:, :-1], axis=0)
+        to_following = 2 * np.sum(chord * along[:, 1:], axis=0)
+        to_size = 2 * np.sum(chord * (growth[:, 1:] - growth[:, :-1]), axis=0)
         # The first joint moves with the period; the last chord ends on it one period later.
         to_size[0] += to_here[0] * phase * period_growth
         to_size[-1] += to_following[-1] * (1 + phase) * period_growth
@@ -141,8 +126,8 @@ def lay_chain(
             break
         s[1:] += change[:-1]
         size = max(size + float(change[-1]), 0.0)
-    joints = curve.points(s, size)
-    closed = np.hypot(*(joints.point - np.roll(joints.point, 1, axis=1)))
+    joints, along, growth = curve.points(s, size)
+    closed = np.hypot(*(joints - np.roll(joints, 1, axis=1)))
     if not np.allclose(closed, link_length, rtol=1e-9, atol=0.0):
         raise ValueError(f"a closed chain of {links} links of {link_length} m does not fit this curve")
     # Rigid motion along the curve: s[0] moves at unit rate, the chords keep their lengths.
@@ -151,9 +136,9 @@ def lay_chain(
     drive[-1] -= to_following[-1]
     rates = _solve_loop(to_here, to_following, to_size, drive)
     first_rate = 1.0 + phase * period_growth * rates[-1]
-    joint_rate = np.append(first_rate, rates[:-1]) * joints.along + rates[-1] * joints.growth
+    joint_rate = np.append(first_rate, rates[:-1]) * along + rates[-1] * growth
     joint_rate *= speed / np.mean(np.sqrt(np.sum(joint_rate**2, axis=0)))
-    return links_between(joints.point.T, joint_rate.T)
+    return links_between(joints.T, joint_rate.T)
 
 
 def _solve_loop(to_here: Array, to_following: Array, to_size: Array, right: Array) -> Array:
@@ -192,7 +177,7 @@ def links_between(joints: Array, joint_rate: Array) -> tuple[Array, Array]:
 def _spread_evenly(curve: Curve, size: float, s: Array) -> Array:
     """Parameters at equal arc lengths, starting at s[0]."""
     fine = s[0] + np.linspace(0.0, curve.period(size)[0], 1024)
-    speed = np.sqrt(np.sum(curve.points(fine, size).along ** 2, axis=0))
+    speed = np.sqrt(np.sum(curve.points(fine, size)[1] ** 2, axis=0))
     arc = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(fine))])
     spread: Array = np.interp(arc[-1] * np.arange(len(s)) / len(s), arc, fine)
     return spread

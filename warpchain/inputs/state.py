@@ -124,12 +124,7 @@ class State:
         if self.setup.scene.plane == "tilting":
             shapes |= {"origin": (3,), "axes": (2, 3), "plane_rates": (3,)}
         for name, shape in shapes.items():
-            array = real_array(name, getattr(self, name), f"shape {shape}")
-            if array.shape != shape:
-                raise InputError(f"{name}: its shape is {array.shape}; give {shape}")
-            if not np.all(np.isfinite(array)):
-                raise InputError(f"{name}: holds a number that is not finite; give finite numbers")
-            object.__setattr__(self, name, array)
+            object.__setattr__(self, name, checked_array(getattr(self, name), name, *shape))
         if self.axes is not None and not np.allclose(self.axes @ self.axes.T, np.eye(2), atol=1e-9):
             raise InputError("axes: not two directions at right angles; give unit vectors")
         self._check_closed()
@@ -152,12 +147,9 @@ class State:
         Raises:
             InputError: as of the class; or the number of links is refused.
         """
-        given = (("position", position), ("velocity", velocity))
-        places, rates = (_rows(name, array, 3, "x, y, θ per link") for name, array in given)
-        links = len(places)
-        if len(rates) != links:
-            raise InputError(f"velocity: {len(rates)} rows, but position has {links}; give one row per link each")
-        return cls(position=places, velocity=rates, setup=_setup(links, parameters, "position"))
+        places = checked_array(position, "position", "n", 3)
+        rates = checked_array(velocity, "velocity", len(places), 3)
+        return cls(position=places, velocity=rates, setup=_setup(len(places), parameters, "position"))
 
     @classmethod
     def of_joints(
@@ -175,12 +167,8 @@ class State:
             InputError: two neighbours are not about a link length apart: the loop is not closed, or lengths are in
                 another unit; or an array or the number of links is refused.
         """
-        places = _rows("joints", joints, 2, "x, y per joint")
-        rates = np.zeros_like(places) if velocity is None else real_array("velocity", velocity, "shape (n, 2)")
-        if rates.shape != places.shape:
-            raise InputError(f"velocity: its shape is {rates.shape}; give {places.shape}, one row per joint")
-        if not (np.all(np.isfinite(places)) and np.all(np.isfinite(rates))):
-            raise InputError("joints: they or their rates hold a number that is not finite; give finite numbers")
+        places = checked_array(joints, "joints", "n", 2)
+        rates = np.zeros_like(places) if velocity is None else checked_array(velocity, "velocity", *places.shape)
         setup = _setup(len(places), parameters, "joints")
         position, rate = links_between(*_fitted(places, rates, setup.parameters.link_length))
         return cls(position=position, velocity=rate, setup=setup)
@@ -225,22 +213,30 @@ class State:
             )
 
 
-def _rows(name: str, given: object, columns: int, row: str) -> Array:
-    """What is given as a float64 array of shape (n, columns), or an `InputError`."""
-    array = real_array(name, given, f"shape (n, {columns})")
-    if array.ndim != 2 or array.shape[1] != columns:
-        raise InputError(f"{name}: its shape is {array.shape}; give (n, {columns}), one row {row}")
-    return array
+def checked_array(given: object, path: str, *shape: int | str) -> Array:
+    """Anything like an array of finite real numbers as a new float64 array of this shape.
 
+    Args:
+        given: of the user.
+        path: its name, for errors.
+        shape: a letter stands for any number.
 
-def real_array(name: str, given: object, remedy: str) -> Array:
-    """Anything like an array of real numbers as a new float64 array, or an `InputError`."""
+    Raises:
+        InputError: it is another thing; the message begins with `path`.
+    """
+    wanted = f"({', '.join(map(str, shape))}{',' * (len(shape) == 1)})"
     try:
         if np.array(given).dtype.kind in "cSU":  # complex numbers and text would be converted without a word
             raise TypeError
-        return np.array(given, dtype=np.float64)
+        array = np.array(given, dtype=np.float64)
     except (TypeError, ValueError):
-        raise InputError(f"{name}: not an array of numbers; give {remedy}") from None
+        raise InputError(f"{path}: not an array of numbers; give one of shape {wanted}") from None
+    sizes = zip(array.shape, shape, strict=False)
+    if array.ndim != len(shape) or any(size != each for size, each in sizes if isinstance(each, int)):
+        raise InputError(f"{path}: its shape is {array.shape}; give {wanted}")
+    if not np.isfinite(array).all():
+        raise InputError(f"{path}: holds a number that is not finite; give finite numbers")
+    return array
 
 
 def _setup(links: int, parameters: Parameters | str, field_name: str) -> Setup:
@@ -279,15 +275,8 @@ def _fitted(joints: Array, rates: Array, length: float) -> tuple[Array, Array]:
 def _pull(span: Array, change: Array) -> Array:
     """The least motion of the joints, (n, 2), that changes half the squares of the spans by so much, (n,)."""
     n = len(span)
-    along = np.arange(n)
-    before = np.roll(along, 1)
-    matrix = np.zeros((n, n))
-    matrix[along, along] = 2 * np.sum(span**2, axis=1)
-    product = -np.sum(span * np.roll(span, 1, axis=0), axis=1)
-    matrix[along, before] += product
-    matrix[before, along] += product
-    try:
-        pulls = np.linalg.solve(matrix, change)[:, None] * span
-    except np.linalg.LinAlgError:
-        raise InputError("joints: all of them lie on one line; give a loop") from None
-    return pulls - np.roll(pulls, -1, axis=0)
+    rates = np.zeros((n, n, 2))  # of each half square by each joint
+    rates[np.arange(n), np.arange(n)] = span
+    rates[np.arange(n), np.arange(n) - 1] -= span
+    least = np.linalg.lstsq(rates.reshape(n, 2 * n), change)[0]
+    return np.asarray(least, dtype=np.float64).reshape(n, 2)

@@ -5,6 +5,7 @@ of a field, or a `ValueError` about their own field; `refusals` makes lines of t
 """
 
 import difflib
+import functools
 import math
 import os
 import re
@@ -17,7 +18,7 @@ from pathlib import Path
 from typing import Annotated, Any, Final, TypeVar, get_args
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import to_jsonable_python
 
@@ -32,8 +33,6 @@ LONGEST_NAME: Final = 255
 """Most characters of a name that a user gives to something; a folder's name has no more."""
 _LONGEST_VALUE: Final = 60
 """Most characters of a value in a message."""
-_LONGEST_PATH: Final = 120
-"""Most characters of a path with which a line begins that is too long; one can go to a path only if it is whole."""
 _LONGEST_CHOICE: Final = 125
 """Most characters of a list of possible words in a message."""
 MOST_PROBLEMS: Final = 20
@@ -196,7 +195,9 @@ def by_name(values: Mapping[Any, T], path: str = "") -> dict[Any, T]:
 
 
 def suggested_name(written: object, keys: Iterable[str] = ()) -> str:
-    """The remedy for an unknown name of a field, or for one of these keys."""
+    """The remedy for an unknown name of a field, or for one of these keys, or for a field in a wrong place."""
+    if written in SECTION_OF:
+        return f"give it in {SECTION_OF[str(written)]}"
     fields = {name: f"{section}.{name}" for name, section in SECTION_OF.items()}
     symbols = {symbol: f"{SECTION_OF[name]}.{symbol}" for symbol, name in NAME_OF_SYMBOL.items()}
     return suggestion(written, {key: key for key in keys} | fields | symbols)
@@ -227,13 +228,14 @@ def validated(model: type[ModelT], values: Mapping[str, object], path: str) -> M
 _OWN: Final = frozenset((float, int, str, bool, type(None)))
 
 
-def refusals(error: ValidationError, path: str, keys: Iterable[str] = ()) -> list[str]:
+def refusals(error: ValidationError, path: str, keys: Iterable[str] = (), unit: str = DIMENSIONLESS) -> list[str]:
     """A line for each of pydantic's errors, `MOST_PROBLEMS` at most: the field's path, the problem, and what was given.
 
     Args:
         error: pydantic's.
         path: of the value that was validated.
         keys: that may be meant by an unknown one, beside names of fields.
+        unit: of what is no field.
     """
     lines = []
     for problem in error.errors(include_url=False)[:MOST_PROBLEMS]:
@@ -244,15 +246,17 @@ def refusals(error: ValidationError, path: str, keys: Iterable[str] = ()) -> lis
         if isinstance(cause, InputError):
             lines.append(f"{where}.{cause}".removeprefix("."))
         elif problem["type"] == "extra_forbidden":
-            lines.append(f"{where}: unknown name; {suggested_name(problem['loc'][-1], keys)}")
+            unknown = "not possible here" if problem["loc"][-1] in SECTION_OF else "unknown name"
+            lines.append(f"{where}: {unknown}; {suggested_name(problem['loc'][-1], keys)}")
         elif problem["type"] == "model_type":
             lines.append(f"{where}: {shown(problem['input'])} is no mapping; give names with values")
         elif cause is not None or problem["type"] == "missing":
-            lines.append(f"{where}: {cause or problem['msg']}")
+            lines.append(f"{where}: {cause or 'missing; give a value'}")
         else:
-            unit = next((field_unit(FIELDS[name]) for name in problem["loc"] if name in FIELDS), DIMENSIONLESS)
-            in_unit = "" if unit == DIMENSIONLESS else f", in {unit}"
-            lines.append(f"{where}: {problem['msg']}{in_unit}; given {shown(problem['input'])}")
+            its_unit = next((field_unit(FIELDS[name]) for name in problem["loc"] if name in FIELDS), unit)
+            in_unit = "" if its_unit == DIMENSIONLESS else f", in {its_unit}"
+            said = problem["msg"].replace("tuple", "list").replace("Tuple", "List").replace(" after validation", "")
+            lines.append(f"{where}: {said}{in_unit}; given {shown(problem['input'])}")
     if error.error_count() > len(lines):
         lines.append(f"{error.error_count() - len(lines)} more problems; correct these first")
     return lines
@@ -300,17 +304,27 @@ _OF_KIND: Final[Mapping[str, Any]] = {"b": bool, "i": int, "u": int, "c": comple
 """Kind of NumPy's types → Python's; what is in none of them becomes a text."""
 
 
-def checked_whole(value: object, path: str, least: int, most: int) -> int:
-    """The value, if it is a whole number in [least, most].
+@functools.lru_cache
+def _adapter(kind: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(kind, config=ConfigDict(strict=True, allow_inf_nan=False))
+
+
+def checked(value: object, path: str, kind: Any, unit: str = DIMENSIONLESS) -> Any:
+    """A value that is no field, such as an argument of a function, in Python's own types.
+
+    Args:
+        value: of the user.
+        path: its name, for errors.
+        kind: an annotation that pydantic can check, such as `bool` or `Annotated[float, Field(gt=0)]`.
+        unit: of a number.
 
     Raises:
-        InputError: it is not; the message begins with `path`.
+        InputError: it is of another kind; the message begins with `path`.
     """
-    value = int(value) if isinstance(value, float) and value.is_integer() else value
-    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-        limit = f"2**{most.bit_length()} - 1" if most > 2**64 else str(most)
-        raise InputError(f"{path}: {shown(value)} is no whole number from {least} to {limit}; give one")
-    return value
+    try:
+        return _adapter(kind).validate_python(plain(value, path))
+    except ValidationError as error:
+        raise InputError(refusals(error, path, unit=unit)[0]) from None
 
 
 def checked_positive(value: object, path: str, kind: str = "number") -> float:
@@ -343,8 +357,7 @@ def suggestion(given: object, known: Mapping[str, str] | Iterable[str]) -> str:
         given: the name.
         known: names that may be given; a mapping says how each is shown.
     """
-    named = known if isinstance(known, Mapping) else {name: name for name in known}
-    names = {name: shown_as for name, shown_as in named.items() if shown_as != given}  # known, but not here
+    names = known if isinstance(known, Mapping) else {name: name for name in known if name != given}
     close = difflib.get_close_matches(str(given)[:_LONGEST_VALUE], names, n=1) if isinstance(given, str) else []
     if close:
         return f"did you mean {names[close[0]]}?"
@@ -369,23 +382,16 @@ def printable(text: str) -> str:
 
 
 def one_line(text: str, kind: str = "") -> str:
-    """A message as one printable line of at most `LONGEST_LINE` characters.
-
-    What is too long lacks its end, and the middle of a path of more than `_LONGEST_PATH` characters at its beginning.
+    """A message as one printable line of at most `LONGEST_LINE` characters, without the middle of a longer one.
 
     Args:
         text: the message.
         kind: what stands before it, such as `error: `.
     """
-    if len(text) > 10 * LONGEST_LINE:  # a short way for long texts, of which no more is shown
-        text = text[: 5 * LONGEST_LINE] + text[-5 * LONGEST_LINE :]
-    text, room = printable(" ".join(text.split())), LONGEST_LINE - len(kind)
-    where, colon, rest = text.partition(": ")
-    longest = max(_LONGEST_PATH, room - len(colon + rest))
-    if len(text) > room and len(where) > longest:
-        first = longest // 3
-        text = f"{where[:first]}...{where[first + 3 - longest :]}{colon}{rest}"
-    return kind + (text if len(text) <= room else f"{text[: room - 3]}...")
+    ends = text if len(text) < 10 * LONGEST_LINE else text[: 5 * LONGEST_LINE] + text[-5 * LONGEST_LINE :]
+    text, room = printable(" ".join(ends.split())), LONGEST_LINE - len(kind)
+    head = 4 * room // 5
+    return kind + (text if len(text) <= room else f"{text[:head]}...{text[3 + head - room :]}")
 
 
 def json_value(value: Any) -> Any:
@@ -411,18 +417,11 @@ def shown(value: object) -> str:
 class _Brief(reprlib.Repr):
     """The first characters of a value as Python writes it."""
 
-    def __init__(self) -> None:
-        super().__init__()
-        self.maxlevel, self.maxstring, self.maxother = 3, _LONGEST_VALUE, 2 * _LONGEST_VALUE
-        self.maxlist = self.maxtuple = self.maxdict = 20
-
     def repr_int(self, value: int, level: int) -> str:
         """A whole number; Python refuses to write very long ones."""
         return str(value) if value.bit_length() < 1000 else f"a whole number of {value.bit_length()} bits"
 
-    def repr_ndarray(self, value: Any, level: int) -> str:
-        """An array, of any size and content."""
-        return f"array of shape {value.shape}"
-
 
 _BRIEF: Final = _Brief()
+_BRIEF.maxlevel, _BRIEF.maxstring, _BRIEF.maxother = 3, _LONGEST_VALUE, 2 * _LONGEST_VALUE
+_BRIEF.maxlist = _BRIEF.maxtuple = _BRIEF.maxdict = 20

@@ -57,7 +57,7 @@ def estimate_sweep(
     planned = load_sweep(source, **replaced)
     planned = planned if device is None else on_device(planned, device)
     indices = planned.indices
-    walks = len(indices) if part is None else -(-len(indices) // checked_part(part)[1])
+    walks = -(-len(indices) // checked_part(part)[1])
     uses_gpu = any(on_gpu(walk.setup.options.device) for walk in planned.undrawn(indices[:1].tolist()))
     at_once = 1 if uses_gpu else workers or processors()
     count = min(len(indices), GPU_PILOTS if uses_gpu else max(PILOTS, 2 * at_once))
@@ -76,7 +76,7 @@ def estimate_sweep(
 def _tried(planned: Sweep, pilots: Sequence[PlannedWalk]) -> tuple[float, float, float]:
     """Time [s] of some walks, and bytes of their series and of their frames, as if all of them were kept."""
     choices = planned.recording.choices.values()
-    first = next((choice.samples[0] for choice in choices if choice.samples is not None), 0)
+    first = next((choice.samples[0] for choice in choices if choice.samples != "all"), 0)
     keeps = [planned.keep(replace(walk, sample=first)) for walk in pilots]
     sizes = {"t": 0, "f": 0}
     setups = [walk.setup for walk in pilots]

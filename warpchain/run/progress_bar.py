@@ -1,14 +1,14 @@
 """The progress of a sweep, shown where somebody looks: in a terminal or in a notebook."""
 
 import contextlib
-import html
-import importlib
+import shutil
 import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
+
+from warpchain.walks.one_walk import Progress
 
 LINE_EVERY = 60.0
 """Time [s] between two lines of progress where there is neither a terminal nor a notebook."""
@@ -59,15 +59,45 @@ def counts_text(progress: SweepProgress) -> str:
 
 
 @contextlib.contextmanager
+def changing_line(in_terminals: bool = True) -> Iterator[Callable[[str], None] | None]:
+    """Yield a function that shows a text in the place of the one before; None without a terminal and a notebook."""
+    in_notebook = type(sys.stdout).__module__.startswith("ipykernel")
+    if not in_notebook and not (in_terminals and sys.stderr.isatty()):
+        yield None
+        return
+    stream, shown = sys.stdout if in_notebook else sys.stderr, False
+
+    def show(text: str) -> None:
+        nonlocal shown
+        room = shutil.get_terminal_size((120, 24)).columns - 1
+        print(f"\r{text[:room]:{room}}", end="", file=stream, flush=True)
+        shown = True
+
+    try:
+        yield show
+    finally:
+        if shown:
+            print(file=stream)
+
+
+@contextlib.contextmanager
 def progress_bar() -> Iterator[OnProgress]:
     """Yield a function that shows progress as a bar; without a terminal and a notebook it prints a line a minute."""
-    if _in_notebook():
-        yield _notebook_bar()
-    elif sys.stderr.isatty():
-        with _terminal_bar() as show:
-            yield show
-    else:
-        yield _lines()
+    last = time.monotonic()
+
+    def log(progress: SweepProgress) -> None:
+        nonlocal last
+        if time.monotonic() - last >= LINE_EVERY:
+            print(progress_text(progress), file=sys.stderr, flush=True)
+            last = time.monotonic()
+
+    with changing_line() as show:
+        if show is None:
+            yield log
+        else:
+            yield lambda progress: show(
+                f"[{'#' * (10 * progress.done // progress.walks):10}] {progress_text(progress)}"
+            )
 
 
 def progress_text(progress: SweepProgress) -> str:
@@ -79,82 +109,16 @@ def progress_text(progress: SweepProgress) -> str:
     return f"{progress.done:,} of {progress.walks:,} walks   {rate}   {counts_text(progress)}"
 
 
+def walk_progress_text(progress: Progress) -> str:
+    """Where a walk is, in columns."""
+    if progress.phase == "compile":
+        return COMPILING
+    where, speed = f"{progress.phase:8}{progress.time:8.3f} s", f"{progress.speed:9.3f} m/s"
+    return f"{where}{speed}{progress.attempts:14,} steps"
+
+
 def duration_text(seconds: float) -> str:
     """Hours, minutes and seconds, as far as needed."""
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours} h {minutes:02} min" if hours else f"{minutes} min {rest:02} s" if minutes else f"{rest} s"
-
-
-def _lines() -> OnProgress:
-    """A line on standard error now and then, for the logs of schedulers."""
-    last = time.monotonic()
-
-    def show(progress: SweepProgress) -> None:
-        nonlocal last
-        if time.monotonic() - last >= LINE_EVERY:
-            print(progress_text(progress), file=sys.stderr, flush=True)
-            last = time.monotonic()
-
-    return show
-
-
-def _in_notebook() -> bool:
-    """Whether this process is the kernel of a notebook."""
-    if "IPython" not in sys.modules:
-        return False
-    return "IPKernelApp" in getattr(importlib.import_module("IPython").get_ipython(), "config", {})
-
-
-def walk_in_notebook() -> Callable[[Any], None] | None:
-    """What shows the progress of a walk as a line in the output of a cell; None where there is no notebook."""
-    if not _in_notebook():
-        return None
-    show = _cell_output()
-
-    def report(progress: Any) -> None:
-        text = f"{progress.phase}: {progress.time:.2f} s, {progress.attempts:,} steps"
-        show({"text/plain": "compiling kernels" if progress.phase == "compile" else text})
-
-    return report
-
-
-@contextlib.contextmanager
-def _terminal_bar() -> Iterator[OnProgress]:
-    """A bar on standard error."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn
-
-    with Progress(BarColumn(), TextColumn("{task.fields[text]}"), console=Console(stderr=True)) as bar:
-        task = bar.add_task("", total=None, text="")
-
-        def show(progress: SweepProgress) -> None:
-            bar.update(task, total=progress.walks, completed=progress.done, text=progress_text(progress))
-
-        yield show
-
-
-def _notebook_bar() -> OnProgress:
-    """A bar in the output of a cell, which needs no widgets."""
-    show = _cell_output()
-
-    def report(progress: SweepProgress) -> None:
-        text = progress_text(progress)
-        bar = f'<progress value="{progress.done}" max="{progress.walks}"></progress> {html.escape(text)}'
-        show({"text/plain": text, "text/html": bar})
-
-    return report
-
-
-def _cell_output() -> Callable[[dict[str, str]], None]:
-    """What shows a content in the output of a cell, in the place of the one before."""
-    handle: Any = None
-
-    def show(content: dict[str, str]) -> None:
-        nonlocal handle
-        if handle is None:
-            handle = importlib.import_module("IPython.display").display(content, raw=True, display_id=True)
-        else:
-            handle.update(content, raw=True)
-
-    return show

@@ -1,10 +1,11 @@
 """The motion of any given chain: what tests and analysts use."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import gpu_turn
@@ -14,8 +15,8 @@ from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene, check_links_on_gpu, floor_points, link_values
 from warpchain.inputs.sections import takes_fields
-from warpchain.inputs.state import State, real_array
-from warpchain.inputs.validation import InputError, plain, shown, validated
+from warpchain.inputs.state import State, checked_array
+from warpchain.inputs.validation import InputError, checked, plain, shown, validated
 from warpchain.status import Status
 from warpchain.walks.trajectory import Trajectory
 
@@ -73,14 +74,12 @@ def simulate(
     chosen: dict[str, object] = {"method": method, "device": device, "self_contact": self_contact}
     if tolerance is not None:
         chosen["tolerance"] = tolerance
-    floor, gravity = plain(floor, "floor"), plain(gravity, "gravity")
-    end: float = plain(duration, "duration")
+    floor, gravity = plain(floor, "floor"), checked(gravity, "gravity", bool)
+    end: float = checked(duration, "duration", Annotated[float, Field(ge=0, lt=LONGEST)], "s")
     options = validated(Options, {**_UNSOFTENED, **settings, **chosen}, "options")
     for name in _UNSOFTENED:
         if getattr(options, name):
             raise InputError(f"options.{name}: only a walk has phases in which joints soften; leave it out")
-    if not isinstance(gravity, bool):
-        raise InputError(f"gravity: {shown(gravity)} is not a truth value; give True or False")
     state = _checked_state(parameters, position, velocity)
     points = None
     if not isinstance(floor, bool):
@@ -155,21 +154,13 @@ class Chains:
         options = validated(Options, {"soften_drive": False, **settings, "method": method, "device": device}, "options")
         if options.soften_drive:
             raise InputError("options.soften_drive: there is no sprocket; leave it out")
-        if not isinstance(floor := plain(floor, "floor"), bool):
+        floor = checked(floor, "floor", bool)
+        position = checked_array(position, "position", "W", "n", 3)
+        velocity, (worlds, links, _) = checked_array(velocity, "velocity", *position.shape), position.shape
+        if len(parameters) != worlds or not all(isinstance(each, Parameters) for each in parameters):
             raise InputError(
-                f"floor: {shown(floor)} is not a truth value; give True or False (simulate takes profiles)"
+                f"parameters: {shown(parameters)} are not Parameters of {worlds} chains; give those of each"
             )
-        if not all(isinstance(each, Parameters) for each in parameters):
-            raise InputError(f"parameters: {shown(parameters)} are not a row of Parameters; give those of each chain")
-        if np.ndim(position) == 3 and len(parameters) != len(position):
-            raise InputError(
-                f"parameters: {len(parameters)} of {len(position)} chains in position; give those of each chain"
-            )
-        shape = (len(parameters), *np.shape(position)[1:2], 3)
-        for name, given in (("position", position), ("velocity", velocity)):
-            if np.shape(given) != shape or len(shape) != 3 or not np.all(np.isfinite(given)):
-                raise InputError(f"{name}: its shape is {np.shape(given)}; give finite numbers of shape (W, n, 3)")
-        worlds, links, _ = shape
         if worlds < 1 or links < 4 or links % 2:
             raise InputError(f"position: {worlds} chains of {links} links; give chains of an even number of at least 4")
         check_links_on_gpu(links, options.device, "position")
@@ -193,9 +184,8 @@ class Chains:
 
     def set_velocity(self, chains: Sequence[int] | NDArray[np.integer[Any]], velocity: Array) -> None:
         """Give some chains, by their numbers, other velocities, (chains, n, 3); an `InputError` if they do not fit."""
-        numbers, rates = self._numbers(chains), real_array("velocity", velocity, "shape (chains, n, 3)")
-        if rates.shape != (shape := (len(numbers), self._links, 3)) or not np.all(np.isfinite(rates)):
-            raise InputError(f"velocity: its shape is {rates.shape}; give finite numbers of shape {shape}")
+        numbers = self._numbers(chains)
+        rates = checked_array(velocity, "velocity", len(numbers), self._links, 3)
         if numbers:
             self._batch.set_velocities(numbers, rates)
 
@@ -219,11 +209,7 @@ class Chains:
         status = self.status
         going = [world for world in self._numbers(chains) if status[world] == Status.FINISHED]
         now = max((self._batch.time(world) for world in going), default=0.0)
-        until = plain(until, "until")
-        if isinstance(until, bool) or not isinstance(until, int | float) or not now <= until < LONGEST:
-            raise InputError(
-                f"until: {shown(until)} is no time from now on; give a number of seconds, at least {now:g}"
-            )
+        until = checked(until, "until", Annotated[float, Field(ge=now, lt=LONGEST)], "s")
         if going:
             with gpu_turn([self._batch.options.device]):
                 self._batch.resume(going, until, Status.TIME_LIMIT if to_rest else Status.FINISHED)
@@ -233,13 +219,8 @@ class Chains:
     def _numbers(self, chains: Sequence[int] | NDArray[np.integer[Any]] | None) -> list[int]:
         """Numbers of chains, by default all, or an `InputError`."""
         count = len(self.status)
-        numbers = np.arange(count) if chains is None else np.asarray(chains)
-        if numbers.size == 0:
-            return []
-        if numbers.ndim != 1 or numbers.dtype.kind not in "iu" or numbers.min() < 0 or numbers.max() >= count:
-            raise InputError(f"chains: {shown(chains)} are not numbers of chains; give some of 0 to {count - 1}")
-        found: list[int] = numbers.tolist()
-        return found
+        numbers: list[int] = checked(chains, "chains", list[Annotated[int, Field(ge=0, lt=count)]] | None)
+        return list(range(count)) if numbers is None else numbers
 
 
 def _follow(
@@ -280,17 +261,11 @@ def _follow(
     )
 
 
-def _checked_times(duration: object, times: Sequence[float] | Array | None) -> Array:
+def _checked_times(duration: float, times: Sequence[float] | Array | None) -> Array:
     """Instants of a trajectory, which rise within the duration, or an `InputError`."""
-    if isinstance(duration, bool) or not isinstance(duration, int | float):
-        raise InputError(f"duration: {shown(duration)} is not a number; give seconds")
-    if not 0 <= duration < LONGEST:
-        raise InputError(f"duration: {shown(duration)} is not a time; give a number of seconds, at least 0")
     if times is None:
-        return np.linspace(0.0, float(duration), 101)
-    instants = real_array("times", times, "rising instants in s")
-    if instants.ndim != 1 or len(instants) == 0:
-        raise InputError(f"times: its shape is {instants.shape}; give a row of at least one instant")
-    if not np.all((instants >= 0) & (instants <= duration)) or np.any(np.diff(instants) <= 0):
+        return np.linspace(0.0, duration, 101)
+    instants = checked_array(times, "times", "t")
+    if not len(instants) or instants[0] < 0 or instants[-1] > duration or np.any(np.diff(instants) <= 0):
         raise InputError(f"times: give rising instants between 0 and the duration of {duration} s")
     return instants

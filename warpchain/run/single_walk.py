@@ -3,12 +3,12 @@
 from collections.abc import Mapping
 from typing import Any, Literal
 
-from warpchain.inputs.distributions import LARGEST_SEED, random_generator, sampled
+from warpchain.inputs.distributions import Seed
 from warpchain.inputs.sections import by_section, takes_fields
 from warpchain.inputs.setup import DEFAULT_PRESET, Setup, continued, resolve
 from warpchain.inputs.state import State
-from warpchain.inputs.validation import InputError, checked_whole, full_name, plain, shown
-from warpchain.run.progress_bar import walk_in_notebook
+from warpchain.inputs.validation import InputError, checked, full_name, shown
+from warpchain.run.progress_bar import changing_line, walk_progress_text
 from warpchain.walks.one_walk import OnProgress, run_walk
 from warpchain.walks.walk_result import WalkResult
 
@@ -77,7 +77,7 @@ def walk(
             raise InputError(f"{symbol}: an argument of its own has this value; give {name}=…")
     given: dict[str, object] = {name: value for name, value in named.items() if value is not None}
     given.update(settings)
-    loads = _truth(record_loads, "record_loads")
+    loads = checked(record_loads, "record_loads", bool)
     if isinstance(start, State) and setup is None:
         for name, value, reason in (
             ("preset", preset, "which has its parameters; give single ones instead"),
@@ -88,17 +88,19 @@ def walk(
         del given["start"]
         setup = continued(start, by_section(given))
     elif setup is None:
-        setup = complete_setup(DEFAULT_PRESET if preset is None else preset, by_section(given), seed, loads)
+        preset = DEFAULT_PRESET if preset is None else preset
+        setup = resolve(preset, **by_section(given), seed=seed, records_loads=loads)
     else:
         _check_repeated(setup, given if preset is None else {"preset": preset, **given}, seed)
-    return run_walk(
-        setup,
-        seed=seed,
-        frame_interval=frame_interval,
-        record_before=record_before,
-        record_loads=loads,
-        on_progress=on_progress or walk_in_notebook(),
-    )
+    with changing_line(in_terminals=False) as show:
+        return run_walk(
+            setup,
+            seed=seed,
+            frame_interval=frame_interval,
+            record_before=record_before,
+            record_loads=loads,
+            on_progress=on_progress or (show and (lambda progress: show(walk_progress_text(progress)))),
+        )
 
 
 def _check_repeated(setup: object, others: Mapping[str, object], seed: int | None) -> None:
@@ -109,29 +111,4 @@ def _check_repeated(setup: object, others: Mapping[str, object], seed: int | Non
         )
     if others:
         raise InputError(f"{', '.join(others)}: given together with setup, which is complete; leave one out")
-    if seed is not None:
-        checked_whole(plain(seed, "seed"), "seed", 0, LARGEST_SEED)
-
-
-def complete_setup(
-    preset: str, sections: Mapping[str, Mapping[str, object]], seed: int | None, records_loads: bool = False
-) -> Setup:
-    """Check values by section, complete them, and draw the sample of a seed.
-
-    From the seed's generator come first the parameters, then phase and clearance, of what is not set, as in the first
-    walk of a sweep. `records_loads` is as in :func:`resolve`.
-
-    Raises:
-        InputError: A name is unknown or a value is refused.
-    """
-    setup = resolve(preset, **sections, records_loads=records_loads)
-    kept = {*sections["scene"], *sections["parameters"]}
-    return setup if seed is None else sampled(setup, random_generator(plain(seed, "seed")), kept=kept)
-
-
-def _truth(value: object, name: str) -> bool:
-    """A truth value, NumPy's included, or an `InputError`."""
-    value = plain(value, name)
-    if not isinstance(value, bool):
-        raise InputError(f"{name}: {shown(value)} is not a truth value; give True or False")
-    return value
+    checked(seed, "seed", Seed | None)

@@ -9,31 +9,36 @@ import contextlib
 import os
 import re
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Final, TypeVar
 
 import numpy as np
+from pydantic import Field
 
 from warpchain.engine.devices import gpu_turn, has_gpu_turn, start_device
 from warpchain.engine.kernel_choice import shared_threads
 from warpchain.engine.processors import processors
 from warpchain.inputs.options import Options, on_gpu
-from warpchain.inputs.sections import takes_fields
-from warpchain.inputs.setup import Setup
-from warpchain.inputs.validation import InputError, checked_path, plain, shown, validated
+from warpchain.inputs.sections import SECTION_OF, by_section, takes_fields
+from warpchain.inputs.setup import DEFAULT_PRESET, Setup
+from warpchain.inputs.validation import InputError, Whole, by_name, checked, checked_path, plain, shown, validated
 from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text, progress_bar
-from warpchain.run.sweep_keywords import KEYS, sweep_of_keywords
-from warpchain.run.workers import DaskClient, Executor, Pulse, losses_named, pulsing_threads
+from warpchain.run.workers import Pulse, losses_named, pulsing_threads
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
 from warpchain.store.manifest import Shard
 from warpchain.store.shards import read_shard, write_shard
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import PlannedWalk, Sweep, load_sweep
+from warpchain.sweeps.sweep_file import VERSION, BlockKeys
 from warpchain.walks.rows import LENGTHS, MISSING, derived_columns, faults_of_columns, fill_row, missing_rows
 from warpchain.walks.scheduler import compile_kernels, run_setups
 
+T = TypeVar("T")
+
+KEYS: Final = (*BlockKeys.model_fields, "same_samples_along", "record", "name", "seed")
+"""Keys of a sweep file that are keywords."""
 SHARD_WALKS = 256
 """Most walks in a shard."""
 GPU_TASK_WALKS = 262144
@@ -54,7 +59,7 @@ def sweep(
     *,
     part: str | None = None,
     device: str | None = None,
-    executor: "Executor | DaskClient | None" = None,
+    executor: Any = None,
     workers: int | None = None,
     fresh: bool = False,
     progress: bool = True,
@@ -90,8 +95,8 @@ def sweep(
         part: ``"k/N"``: run only the k-th of N parts, in a folder of its own; ``warpchain merge`` puts them together.
         device: ``"cpu"``, ``"cuda"`` or ``"cuda:N"`` instead of what the sweep says. Method ``standard`` is then what
             it means there; the ``sweep.yaml`` of a folder names the method that was run, which stays.
-        executor: Where shards are run, an executor or a Dask client; its workers must see ``out``. Default: threads of
-            this process.
+        executor: Where shards are run: what has ``submit`` as the executors of ``concurrent.futures`` and
+            ``mpi4py.futures``, or a Dask client; its workers must see ``out``. Default: threads of this process.
         workers: Number of tasks at a time. Default: the processors of this machine; with a Dask client the threads of
             its workers. With an executor, at least the number of its workers. Without one, a GPU has one task.
         fresh: Delete what another sweep left in the folder.
@@ -104,9 +109,8 @@ def sweep(
         OSError: The folder cannot be read or written.
         LostWorkersError: Worker processes were killed, or the scheduler of a Dask client was closed.
     """
-    planned, folder, own = _checked_call(source, out, settings, device, workers, part)
-    count = plain(workers, "workers")
-    if isinstance(executor, DaskClient):
+    planned, folder, own, count = _checked_call(source, out, settings, device, workers, part)
+    if hasattr(executor, "get_executor"):
         count = count or sum(executor.nthreads().values())
         executor = executor.get_executor(pure=False)  # pure: a task that failed would fail again, unrun
     with contextlib.ExitStack() as shown:
@@ -123,39 +127,73 @@ def _checked_call(
     device: str | None,
     workers: int | None,
     part: str | None,
-) -> tuple[Sweep, Path, tuple[int, int]]:
-    """The sweep on its device, its folder, and its part.
+) -> tuple[Sweep, Path, tuple[int, int], int | None]:
+    """The sweep on its device, its folder, its part, and the number of workers.
 
     Raises:
         InputError: Something is refused; one line for each value.
     """
-    problems, planned, own = [], None, (1, 1)
+    problems: list[str] = []
+
+    def gathered(check: Callable[[], T]) -> T | None:
+        try:
+            return check()
+        except InputError as error:
+            problems.extend(error.args)
+            return None
+
+    def plan() -> Sweep:
+        found = sweep_of_keywords(settings, folder) if source is None else load_sweep(source, **replaced)
+        return found if device is None else on_device(found, device)
+
     settings = {name: value for name, value in settings.items() if value is not None or name not in KEYS}
     replaced = {name: plain(settings[name], name) for name in ("seed", "samples") if name in settings}
     if source is not None and (others := [name for name in settings if name not in replaced]):
         names = ", ".join(others)
         problems.append(f"{names}: given together with a source; leave one out, or write it into the source")
-    if out is None:
-        problems.append("out: missing; give the folder of the results")
-    else:
-        out = checked_path(out, "out")
-    count = plain(workers, "workers")
-    if count is not None and (isinstance(count, bool) or not isinstance(count, int) or count < 1):
-        problems.append(f"workers: {shown(count)} is not a number of workers; give a whole number from 1")
-    try:
-        own = own if part is None else checked_part(part)
-        planned = sweep_of_keywords(settings, out) if source is None else load_sweep(source, **replaced)
-        if device is not None:
-            planned = on_device(planned, device)
-    except InputError as error:
-        problems += error.args
-    if problems or planned is None or out is None:
+    folder = gathered(lambda: checked_path(out, "out"))
+    count = gathered(lambda: checked(workers, "workers", Annotated[Whole, Field(ge=1)] | None))
+    own, planned = gathered(lambda: checked_part(part)), gathered(plan)
+    if problems or planned is None or folder is None or own is None:
         raise InputError(*problems)
-    return planned, out, own
+    return planned, folder, own, count
+
+
+def sweep_of_keywords(given: Mapping[str, object], out: str | os.PathLike[str] | None) -> Sweep:
+    """The sweep that keyword arguments describe.
+
+    Args:
+        given: `KEYS`, and fields of a walk by name or symbol; a list or a range is an axis of the grid, behind those
+            given. Left out, the name is that of the folder, the seed 0, and the preset that of a walk, unless it is
+            an axis.
+        out: Folder of the results.
+
+    Raises:
+        InputError: Something is refused; one line for each value.
+    """
+    usual = {"name": (Path(out).absolute().name if out is not None else "") or "sweep", "seed": 0, "version": VERSION}
+    values = plain(given, "sweep")
+    content: dict[str, Any] = usual | {key: values.pop(key) for key in KEYS if key in values}
+    by_section(values)  # refuses unknown names
+    if isinstance(content.get("preset"), list):
+        values = {"preset": content.pop("preset"), **values}
+    for name, value in by_name(values).items():
+        key = "grid" if isinstance(value, list | dict) else SECTION_OF[name]
+        others = content.setdefault(key, {})
+        if isinstance(others, dict):  # the check of the content refuses anything else
+            if name in by_name(others):
+                raise InputError(f"{name}: given twice, also in {key}; leave one out")
+            content[key] = {**others, name: value}
+    grid = content.get("grid")
+    if not (isinstance(grid, Mapping) and "preset" in grid):
+        content.setdefault("preset", DEFAULT_PRESET)
+    return load_sweep(content)
 
 
 def checked_part(given: object) -> tuple[int, int]:
-    """Number of a part and number of parts of "k/N", or an `InputError`."""
+    """Number of a part and number of parts of "k/N", 1/1 of None, or an `InputError`."""
+    if given is None:
+        return 1, 1
     found = re.fullmatch(r"([1-9]\d{0,5})/([1-9]\d{0,5})", given) if isinstance(given, str) else None
     if found is None or int(found[1]) > int(found[2]):
         raise InputError(f"part: {shown(given)} is no part; give k/N with 1 ≤ k ≤ N, such as 3/8")
@@ -165,7 +203,7 @@ def checked_part(given: object) -> tuple[int, int]:
 def _run_in_folder(
     planned: Sweep,
     folder: Path,
-    executor: Executor | None,
+    executor: Any,
     workers: int | None,
     fresh: bool,
     part: tuple[int, int],
@@ -174,12 +212,12 @@ def _run_in_folder(
     """Run what is missing in a folder."""
     at_once = workers or processors()
     if executor is None:
-        devices = _devices(planned)
-        if has_gpu_turn() and any(map(on_gpu, devices)):
+        kinds = _Kinds(planned)
+        if has_gpu_turn() and any(map(on_gpu, kinds.devices)):
             raise InputError("device: this thread is in the middle of a walk on a GPU; begin a sweep when it is over")
-        for device in devices:
+        for device in kinds.devices:
             start_device(device)  # refuses one that is not there before anything is written
-        if _is_on_gpu(planned):
+        if kinds.on_gpu:
             at_once = 1  # the others would wait for it
     size = shard_size(planned.walk_count)
     with SweepFolder.open(folder, planned, fresh=fresh, shard_size=size, part=part) as store:
@@ -222,16 +260,6 @@ def on_device(planned: Sweep, device: str) -> Sweep:
     return load_sweep(canonical)
 
 
-def _devices(planned: Sweep) -> set[str]:
-    """Devices of all walks."""
-    return {setup.options.device for setup in one_of_each_kind(planned)}
-
-
-def _is_on_gpu(planned: Sweep) -> bool:
-    """Whether all walks go to a GPU."""
-    return all(map(on_gpu, _devices(planned)))
-
-
 def shard_size(walks: int) -> int:
     """Walks per shard; it depends on the sweep only, so that equal sweeps leave equal files."""
     return max(1, min(SHARD_WALKS, walks // SHARDS))
@@ -269,7 +297,8 @@ def run_shards(
 
     with gpu_turn((setup.options.device for setup in setups), stop):
         # all at once, and in this process: a walk that needs one would wait for it alone
-        compile_kernels(one_of_each_kind(planned) if _is_on_gpu(planned) else setups, threads)
+        kinds = _Kinds(planned)
+        compile_kernels(kinds.setups if kinds.on_gpu else setups, threads)
         for number, run in run_setups(setups, draw=draw, keeps=keeps, threads=threads, stop=stop):
             shard, row = places[number]
             if pulse is not None:
@@ -283,31 +312,32 @@ def run_shards(
 
 def prepare(planned: Sweep) -> None:
     """Load every kernel that the walks of a sweep need into this process, compiled if need be."""
-    compile_kernels(one_of_each_kind(planned), _shared_threads(planned))
+    kinds = _Kinds(planned)
+    compile_kernels(kinds.setups, kinds.threads)
 
 
-def one_of_each_kind(planned: Sweep) -> list[Setup]:
-    """Setups with all options, numbers of links and starts that walks of a sweep have, but not with all else."""
-    return [setup for block in planned.blocks for setup in block.fixed_in(block.cells_along(_KIND))]
+class _Kinds:
+    """Setups with all options, numbers of links and starts that walks of a sweep have, but not with all else.
 
+    Attributes:
+        setups: these.
+        devices: of all walks.
+        on_gpu: Whether all walks go to a GPU.
+        threads: Of every block if the sweep runs on a GPU with one method; None: as many as a chain needs.
+    """
 
-_KIND = frozenset((*Options.model_fields, "links", "start", "plane"))
-"""Axes along which kernels or their threads may differ."""
-
-
-def _shared_threads(planned: Sweep) -> int | None:
-    """Threads of every block if the sweep runs on a GPU with one method; None: as many as a chain needs."""
-    if not _is_on_gpu(planned):
-        return None
-    cells = one_of_each_kind(planned)
-    methods = {setup.options.method for setup in cells}
-    if len(methods) > 1:
-        return None
-    return shared_threads(methods.pop(), (setup.scene.links for setup in cells), planned.walk_count)
+    def __init__(self, planned: Sweep) -> None:
+        axes = (*Options.model_fields, "links", "start", "plane")
+        self.setups = [setup for block in planned.blocks for setup in block.fixed_in(block.cells_along(axes))]
+        self.devices = {setup.options.device for setup in self.setups}
+        self.on_gpu, methods = all(map(on_gpu, self.devices)), {setup.options.method for setup in self.setups}
+        links = (setup.scene.links for setup in self.setups)
+        alike = self.on_gpu and len(methods) == 1
+        self.threads = shared_threads(methods.pop(), links, planned.walk_count) if alike else None
 
 
 def _run(
-    executor: Executor,
+    executor: Any,
     pulse: Pulse | None,
     planned: Sweep,
     store: SweepFolder,
@@ -319,7 +349,7 @@ def _run(
     """Give each worker two tasks at a time, so that memory does not grow with the sweep."""
     report(progress)
     began, written_walks = time.perf_counter(), 0
-    threads = _shared_threads(planned)
+    threads = _Kinds(planned).threads
     waiting = _tasks(planned, missing, workers if pulse is None else 1)  # threads take turns on a GPU
     folder, stamp = store.directory / "shards", store.stamp
     pending: dict[concurrent.futures.Future[None], list[Shard]] = {}  # with the shards still to be counted

@@ -3,8 +3,7 @@
 import concurrent.futures
 import contextlib
 import threading
-from collections.abc import Callable, Iterator, Mapping
-from typing import Any, Protocol, runtime_checkable
+from collections.abc import Iterator
 
 
 class LostWorkersError(RuntimeError):
@@ -16,40 +15,16 @@ def losses_named() -> Iterator[None]:
     """Raise `LostWorkersError` for what an executor raises when its workers, or the way to them, are gone."""
     try:
         yield
-    except (concurrent.futures.BrokenExecutor, concurrent.futures.CancelledError) as error:
-        raise _lost(error) from error
     except Exception as error:
-        if type(error).__module__.partition(".")[0] != "distributed":  # Dask, which need not be installed
+        is_lost = isinstance(error, concurrent.futures.BrokenExecutor | concurrent.futures.CancelledError)
+        if (
+            not is_lost and type(error).__module__.partition(".")[0] != "distributed"
+        ):  # Dask, which need not be installed
             raise
-        raise _lost(error) from error
-
-
-def _lost(error: BaseException) -> LostWorkersError:
-    return LostWorkersError(
-        f"the workers ended before the sweep ({type(error).__name__}): killed, out of memory, or their scheduler was "
-        "closed; start again, shards written are kept"
-    )
-
-
-class Executor(Protocol):
-    """An executor such as those of ``concurrent.futures``, ``mpi4py.futures`` and Dask's ``get_executor()``."""
-
-    def submit(self, function: Callable[..., Any], /, *arguments: Any) -> "concurrent.futures.Future[Any]":
-        """Run ``function(*arguments)`` somewhere."""
-        ...
-
-
-@runtime_checkable
-class DaskClient(Protocol):
-    """What is used of ``distributed.Client``, which has no such method ``submit`` as executors have."""
-
-    def get_executor(self, *, pure: bool) -> Executor:
-        """An executor on the workers."""
-        ...
-
-    def nthreads(self) -> Mapping[str, int]:
-        """Number of threads of each worker."""
-        ...
+        raise LostWorkersError(
+            f"the workers ended before the sweep ({type(error).__name__}): killed, out of memory, or their scheduler "
+            "was closed; start again, shards written are kept"
+        ) from error
 
 
 class Pulse:
@@ -71,7 +46,7 @@ class Pulse:
 
 
 @contextlib.contextmanager
-def pulsing_threads(count: int) -> Iterator[tuple[Executor, Pulse]]:
+def pulsing_threads(count: int) -> Iterator[tuple[concurrent.futures.Executor, Pulse]]:
     """Threads of this process, and their pulse; launches run outside of Python's lock."""
     pulse = Pulse()
     with concurrent.futures.ThreadPoolExecutor(count) as threads:

@@ -165,7 +165,7 @@ class Sweep:
         """
         most = max(block.samples for block in self.blocks)
         for name, choice in self.recording.choices.items():
-            if choice.samples is not None and choice.samples[-1] >= most:
+            if choice.samples != "all" and choice.samples[-1] >= most:
                 raise InputError(
                     f"sweep.record.{name}.samples: {choice.samples[-1]} is no sample of any block; "
                     f"give numbers from 0 to {most - 1}"
@@ -190,11 +190,7 @@ class Sweep:
                 self._first_possible(block, cell, fixed, distributions, 0, designed=False)
 
     def _check_options(self, block: Block, first: Options, options: Options) -> None:
-        """Check the options of a cell beside those of the block's first cell.
-
-        Raises:
-            InputError: they are refused.
-        """
+        """Check the options of a cell beside those of the block's first cell; else an `InputError`."""
         for name in Options.model_fields:
             here, there = getattr(first, name), getattr(options, name)
             if here != there and name not in block.varied:
@@ -216,37 +212,27 @@ class Sweep:
         *,
         designed: bool,
     ) -> tuple[list[Point], list[Setup]]:
-        """The first candidate for sample `row` of a cell that makes possible walks only, and their setups.
+        """Points for the walks of sample `row` of a cell, the first that make possible walks only, and their setups.
 
-        Raises:
-            InputError: there is none.
+        The designed ones are tried first, then random ones; if all are impossible, an `InputError` says so.
         """
-        problem = ""
-        for points in self._candidates(block, cell, distributions, row, designed):
+        stream = self._stream(block, cell)
+        rng, problem = random_generator(self.seed, stream, row), ""
+        makers: list[Callable[[], Point]] = [lambda: draw(distributions, rng)] * DRAW_LIMIT
+        if designed:
+            matrix = design_points(block.sampler, self.seed, stream, block.samples_given, len(distributions))
+            fractions = iter(matrix[row].tolist())
+            makers = [lambda: {name: each.quantile(next(fractions)) for name, each in distributions.items()}, *makers]
+        for point in makers:
+            points = saltelli_points(point(), point()) if block.sampler == "saltelli" else [point()]
             try:
                 return points, [fixed.with_drawn(point) for point in points]
             except InputError as error:
                 problem = str(error)
         raise InputError(f"{block.path}.distributions: {DRAW_LIMIT} samples made no possible walk; the last: {problem}")
 
-    def _candidates(
-        self, block: Block, cell: tuple[int, ...], distributions: Mapping[str, Distribution], row: int, designed: bool
-    ) -> Iterator[list[Point]]:
-        """Candidates for sample `row` of a cell, a point for each of its walks: the designed one, then random ones."""
-        stream = self._stream(block, cell)
-        if designed:
-            matrix = design_points(block.sampler, self.seed, stream, block.samples_given, len(distributions))
-            fractions = iter(matrix[row].tolist())
-            yield _points(block, lambda: {name: each.quantile(next(fractions)) for name, each in distributions.items()})
-        rng = random_generator(self.seed, stream, row)
-        for _ in range(DRAW_LIMIT):
-            yield _points(block, lambda: draw(distributions, rng))
-
     def _stream(self, block: Block, cell: tuple[int, ...]) -> int:
-        """Number of a cell's random stream.
-
-        Cells are numbered through all blocks; axes in `same_samples_along` do not count.
-        """
+        """Number of a cell's random stream, through all blocks; axes in `same_samples_along` do not count."""
         number = 0
         for (name, values), place in zip(block.axes.items(), cell, strict=True):
             if name not in self.same_samples_along:
@@ -307,8 +293,3 @@ def load_sweep(source: "str | os.PathLike[str] | Mapping[str, object] | Sweep", 
     sweep = Sweep.of(source.canonical() if isinstance(source, Sweep) else source, **replaced)
     sweep.check()
     return sweep
-
-
-def _points(block: Block, point: Callable[[], Point]) -> list[Point]:
-    """The points of a sample's walks; `point` makes the next independent one."""
-    return saltelli_points(point(), point()) if block.sampler == "saltelli" else [point()]

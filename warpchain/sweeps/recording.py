@@ -2,7 +2,16 @@
 
 from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, field_serializer, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    Discriminator,
+    Field,
+    Strict,
+    Tag,
+    model_validator,
+)
 
 from warpchain.inputs.options import Options
 from warpchain.inputs.validation import STRICT, InputError, number_field
@@ -14,21 +23,24 @@ FRAME_INTERVAL: Final = 2e-3
 """Default time [s] between two frames."""
 
 
-def _rising(samples: tuple[int, ...] | None) -> tuple[int, ...] | None:
-    if samples is not None and len(set(samples)) < len(samples):
+def _rising(samples: tuple[int, ...]) -> tuple[int, ...]:
+    if len(set(samples)) < len(samples):
         raise ValueError("a number is given twice; leave one out")
-    return None if samples is None else tuple(sorted(samples))
+    return tuple(sorted(samples))
 
 
-_Sample = Annotated[int, Field(ge=0, le=2**30)]
-_Samples = Annotated[
-    Annotated[tuple[_Sample, ...], Field(min_length=1)] | None,
-    BeforeValidator(
-        lambda given: None if given == "all" else tuple(given) if isinstance(given, list) else given,
-        json_schema_input_type=Literal["all"] | list[_Sample],
-    ),
-    AfterValidator(_rising),
+_Numbers = Annotated[
+    tuple[Annotated[int, Field(ge=0, le=2**30)], ...], Strict(False), Field(min_length=1), AfterValidator(_rising)
 ]
+_Samples = Annotated[
+    Annotated[Literal["all"], Tag("(all)")] | Annotated[_Numbers, Tag("(numbers)")],
+    Discriminator(lambda given: "(numbers)" if isinstance(given, list | tuple) else "(all)"),
+]
+
+
+def _interval(default: float) -> Any:
+    text = "time between two, a whole multiple of `record_interval`"
+    return number_field(default, "s", text, gt=0, le=LONGEST_INTERVAL)
 
 
 class Series(BaseModel):
@@ -36,24 +48,16 @@ class Series(BaseModel):
 
     model_config = STRICT
 
-    interval: float = number_field(
-        SERIES_INTERVAL, "s", "time between two, a whole multiple of `record_interval`", gt=0, le=LONGEST_INTERVAL
-    )
+    interval: float = _interval(SERIES_INTERVAL)
     samples: _Samples = Field(
-        None, description="`all` or numbers of samples, such as `[0, 1]`, the same in each cell", validate_default=False
+        "all",
+        description="`all` or numbers of samples, such as `[0, 1]`, the same in each cell",
+        validate_default=False,
     )
-
-    @field_serializer("samples")
-    def _samples_in_words(self, samples: tuple[int, ...] | None) -> object:
-        return "all" if samples is None else list(samples)
 
     def includes(self, sample: int) -> bool:
         """Whether a sample is chosen."""
-        return self.samples is None or sample in self.samples
-
-    def covers(self, other: "Series") -> bool:
-        """Whether every sample of another choice is chosen."""
-        return self.samples is None or (other.samples is not None and set(other.samples) <= set(self.samples))
+        return self.samples == "all" or sample in self.samples
 
     def steps(self, options: Options, path: str) -> int:
         """The interval in units of `options.record_interval`.
@@ -70,17 +74,11 @@ class Series(BaseModel):
             )
         return steps
 
-    def canonical(self) -> dict[str, Any]:
-        """Its form in a sweep file."""
-        return {name: given for name, given in self.model_dump().items() if given is not None}
-
 
 class Frames(Series):
     """How often all joints are kept, and of which samples of each cell."""
 
-    interval: float = number_field(
-        FRAME_INTERVAL, "s", "time between two, a whole multiple of `record_interval`", gt=0, le=LONGEST_INTERVAL
-    )
+    interval: float = _interval(FRAME_INTERVAL)
     before: float | None = number_field(
         None,
         "s",
@@ -110,7 +108,8 @@ class Recording(BaseModel):
 
     @model_validator(mode="after")
     def _frames_beside_series(self) -> Self:
-        if self.frames is not None and not (self.series is not None and self.series.covers(self.frames)):
+        series, frames = self.series and self.series.samples, self.frames and self.frames.samples
+        if frames and series != "all" and (not series or frames == "all" or not set(frames) <= set(series)):
             raise InputError("frames: kept of samples without series; give them in series as well")
         return self
 
@@ -121,7 +120,7 @@ class Recording(BaseModel):
 
     def canonical(self) -> dict[str, Any]:
         """Its form in a sweep file."""
-        return {"series": False} | {name: choice.canonical() for name, choice in self.choices.items()}
+        return {"series": False} | self.model_dump(mode="json", exclude_none=True)
 
     @classmethod
     def of(cls, canonical: object) -> "Recording":

@@ -36,6 +36,7 @@ from warpchain.inputs.validation import (
     SYMBOL_OF,
     WHOLE,
     InputError,
+    ModelT,
     Whole,
     by_name,
     field_bounds,
@@ -176,16 +177,12 @@ def _printable(name: str) -> str:
     return name
 
 
-class BlockKeys(BaseModel):
-    """The keys that a block and the file itself may have; what has nothing behind it is not given."""
+class WalkKeys(BaseModel):
+    """The keys of the file of a walk, which a sweep file has, too; what has nothing behind it is not given."""
 
     model_config = STRICT
 
     preset: _Preset | None = Field(None, description="parameters to start from; may also be an axis of the grid")
-    samples: Annotated[int, Field(ge=1, le=2**30), WHOLE] | None = Field(
-        None, description="samples in each cell of the grid"
-    )
-    sampler: _Sampler | None = Field(None, description="how samples are drawn, see below; default: random")
     scene: Annotated[dict[str, Value], _section("scene")] = Field(
         {}, description="fields of the [scene](scene.md) that differ from their defaults"
     )
@@ -195,6 +192,20 @@ class BlockKeys(BaseModel):
     parameters: Annotated[dict[str, Value], _section("parameters")] = Field(
         {}, description="[parameters](parameters.md) that differ from the preset"
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_empty_keys(cls, values: Any) -> Any:
+        return {k: value for k, value in values.items() if value is not None} if isinstance(values, dict) else values
+
+
+class BlockKeys(WalkKeys):
+    """The keys that a block and the file itself may have."""
+
+    samples: Annotated[int, Field(ge=1, le=2**30), WHOLE] | None = Field(
+        None, description="samples in each cell of the grid"
+    )
+    sampler: _Sampler | None = Field(None, description="how samples are drawn, see below; default: random")
     distributions: Annotated[
         dict[str, Any], _mapping_of("distributions", {"all": _Word, **dict.fromkeys(DRAWABLE, _Drawn)})
     ] = Field({}, description="what samples draw, see below")
@@ -213,22 +224,6 @@ class BlockKeys(BaseModel):
         {},
         description="parameter sets: quantity → its value in each; one more axis, `point`; not in a file with blocks",
     )
-
-    @model_validator(mode="before")
-    @classmethod
-    def _without_lists_on_axes(cls, values: Any) -> Any:
-        for key in ("grid", "points"):
-            given = values.get(key) if isinstance(values, dict) else None
-            if isinstance(given, dict) and (name := next((name for name in LISTS if name in given), None)):
-                raise InputError(
-                    f"{key}.{name}: takes a list of its own and is no axis; give blocks, each with scene: {{{name}: …}}"
-                )
-        return values
-
-    @model_validator(mode="before")
-    @classmethod
-    def _without_empty_keys(cls, values: Any) -> Any:
-        return {k: value for k, value in values.items() if value is not None} if isinstance(values, dict) else values
 
     @model_validator(mode="after")
     def _axes_have_no_other_value(self) -> Self:
@@ -303,6 +298,26 @@ def sweep_schema() -> dict[str, Any]:
     return {"$schema": "http://json-schema.org/draft-07/schema#", **SweepFile.model_json_schema()}
 
 
+def _checked(model: type[ModelT], content: object, path: str, source: object) -> ModelT:
+    """Content of a file by its grammar; an `InputError` has a line for each problem."""
+    if not isinstance(content, dict):
+        raise InputError(f"{source}: no mapping at the top; give the keys {', '.join(model.model_fields)}")
+    try:
+        return model.model_validate(content, context={"expanded": 0})
+    except ValidationError as error:
+        raise InputError(*refusals(error, path, _KEYS if model is SweepFile else model.model_fields)) from None
+
+
+def read_walk_file(path: str | os.PathLike[str]) -> tuple[str | None, dict[str, dict[str, Any]]]:
+    """Preset, None if there is none, and values by section and full names, of the YAML file of a walk.
+
+    Raises:
+        InputError: the file cannot be read, or something in it is refused; a line for each problem.
+    """
+    file = _checked(WalkKeys, read_yaml(path), "", path)
+    return file.preset, {section: getattr(file, section) for section in SECTIONS}
+
+
 # From a file to blocks
 
 
@@ -323,15 +338,12 @@ def read_sweep(
         InputError: the file cannot be read, or something in it is refused.
     """
     content = plain(source, "sweep") if isinstance(source, Mapping) else read_yaml(sweep_path(source))
-    if not isinstance(content, dict):
-        raise InputError(f"{source}: no mapping at the top; give the keys {', '.join(SweepFile.model_fields)}")
-    if replaced.get("samples") is not None and content.get("samples") is None:
-        raise InputError("samples: each block of the sweep has its own; change the file")
-    content = content | {key: value for key, value in replaced.items() if value is not None}
-    try:
-        file = SweepFile.model_validate(content, context={"expanded": 0})
-    except ValidationError as error:
-        raise InputError(*refusals(error, "sweep", _KEYS)) from None
+    replaced = {key: value for key, value in replaced.items() if value is not None}
+    if isinstance(content, dict):
+        if "samples" in replaced and content.get("samples") is None:
+            raise InputError("samples: each block of the sweep has its own; change the file")
+        content |= replaced
+    file = _checked(SweepFile, content, "sweep", source)
     if file.blocks is None:
         blocks = [_block("main", "sweep", None, file)]
     else:
@@ -371,8 +383,7 @@ def _drawn(
 ) -> dict[str, Distribution]:
     """What a block draws, in the order of drawing.
 
-    Given values are exact, on an axis or not. A distribution of the quantity's own name is drawn about each of them,
-    and refused if it has a mean or ends of its own.
+    Given values are exact, unless their quantity has a distribution of its own name, without a mean and ends.
     """
     drawn: dict[str, Distribution] = {}
     for name in DRAWABLE:
@@ -398,11 +409,7 @@ def _same_samples_along(written: list[str], known: set[str]) -> tuple[str, ...]:
 
 
 def _numbered(blocks: list[Block], same_samples_along: tuple[str, ...]) -> Iterator[Block]:
-    """The blocks with their first walks and streams, numbered through all of them.
-
-    Raises:
-        InputError: there are too many cells or walks.
-    """
+    """The blocks, numbered through their cells and streams; an `InputError` if there are too many cells or walks."""
     walks = first_stream = cells = 0
     stride = sum(math.prod(block.shape[:-1]) for block in blocks)
     for block in blocks:

@@ -1,0 +1,181 @@
+"""What a step of each method takes, how far a flight by it ends from where it should, and walks a second.
+
+Identical chains fly for a millisecond, at whose end their error is taken, then on, while they are timed: so neither
+compilation nor the small steps after the start are measured. Methods take turns, several times over; medians count.
+"""
+
+import itertools
+import math
+import platform
+import statistics
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpchain.bench import numpy_model
+from warpchain.engine.batch import Batch
+from warpchain.engine.devices import gpu_turn, start_device, versions
+from warpchain.engine.processors import processors
+from warpchain.inputs.options import FIBERS, Options, on_gpu
+from warpchain.inputs.parameters import preset
+from warpchain.inputs.start_shapes import ellipse, lay_chain
+from warpchain.kernels.methods.method import find_method, method_names
+from warpchain.run.progress_bar import SweepProgress
+from warpchain.run.simulation import simulate
+from warpchain.run.sweep_run import sweep
+from warpchain.status import Status
+
+State = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""Position (n, 3) and velocity (n, 3) of a chain."""
+Row = dict[str, Any]
+Report = Callable[[str], None]
+"""Called with a line of progress."""
+
+PARAMETERS: Final = preset("paper")
+SCIPY: Final = "DOP853 (SciPy)"
+SCIPY_TOLERANCE: Final = 1e-6
+REFERENCE_TOLERANCE: Final = 1e-10
+"""Of SciPy's DOP853, whose error is below 1e-9 m/s then; at 1e-12 it follows rounding errors in tiny steps."""
+COMPARED_TIME: Final = 1e-3
+"""Simulated time [s] after which errors are taken; SciPy needs seconds for it."""
+TIMED: Final = 0.05
+"""Simulated time [s] at whose end the measurement of a step ends."""
+ROUNDS: Final = 5
+CHAINS_ON_GPU: Final = 4000
+WALKS: Final = {"cpu": 32, "gpu": 2000}
+WALK: Final[Row] = {"links": 60, "frequency": 15.0, "start": "spinning"}
+
+
+def step_costs(device: str, links: Sequence[int], report: Report) -> list[Row]:
+    """Cost and error of a step of all methods of a device, and of SciPy's DOP853, at default tolerances.
+
+    Args:
+        device: ``"cpu"``, ``"cuda"``, ``"cuda:N"`` or ``"fibers"``.
+        links: Numbers of links, even, at least 4.
+        report: Called with a line of progress.
+
+    Returns:
+        For each number of links and method: `links`, `method`, `tolerance`, `chains` that fly side by side,
+        `microseconds` of wall time that an attempted step of one chain takes, `step` [s], the mean accepted one (of
+        SciPy the attempted one), `rejected`, the share of attempts (NaN for SciPy, which does not tell),
+        `chain_seconds` simulated in a second, and the greatest `position_error` [m] and `velocity_error` [m/s] of a
+        link after `COMPARED_TIME`.
+
+    Raises:
+        InputError: There is no such device.
+        RuntimeError: A flight did not come to its end.
+    """
+    methods = [name for name in method_names() if find_method(name).runs_on_gpus or not on_gpu(device)]
+    starts, chains = {n: flying(n, device) for n in links}, CHAINS_ON_GPU if on_gpu(device) else 1
+    flights: dict[tuple[int, str], list[tuple[State, float, int, int]]] = {}
+    for turn, n, method in itertools.product(range(ROUNDS), links, methods):
+        report(f"round {turn + 1} of {ROUNDS}: {n} links, {method}; the first compiles kernels")
+        flights.setdefault((n, method), []).append(fly(starts[n], method, chains, device))
+    rows = []
+    for n, start in starts.items():
+        report(f"SciPy's DOP853, {n} links")
+        aim, *_ = numpy_model.fly(*start, COMPARED_TIME, PARAMETERS, REFERENCE_TOLERANCE)
+        for method in methods:
+            end, _, accepted, rejected = flights[n, method][0]
+            seconds = statistics.median(flight[1] for flight in flights[n, method])
+            options, attempts = Options.model_validate({"method": method}), accepted + rejected
+            tolerance = options.flight_tolerance if find_method(method).has_rigid_flight else options.tolerance
+            flown = TIMED - COMPARED_TIME
+            counts = attempts, flown / accepted, rejected / attempts
+            rows.append(_row(n, method, tolerance, chains, seconds, flown, counts, end, aim))
+        end, seconds, evaluated = numpy_model.fly(*start, COMPARED_TIME, PARAMETERS, SCIPY_TOLERANCE)
+        measured = evaluated, COMPARED_TIME / evaluated, math.nan
+        rows.append(_row(n, SCIPY, SCIPY_TOLERANCE, 1, seconds, COMPARED_TIME, measured, end, aim))
+    return rows
+
+
+def flying(links: int, device: str = "cpu") -> State:
+    """A circulating ellipse above the floor, whose joints have come to bear their loads."""
+    position, velocity = lay_chain(ellipse(1.5), links, PARAMETERS.link_length, speed=5.0)
+    position[:, 1] += 0.1 - position[:, 1].min()
+    ended = simulate(PARAMETERS, position, velocity, 2e-3, times=[2e-3], method="dp5", tolerance=1e-9, device=device)
+    return ended.position[-1], ended.velocity[-1]
+
+
+def fly(start: State, method: str, chains: int, device: str) -> tuple[State, float, int, int]:
+    """Carry identical chains of a batch through the air.
+
+    Returns:
+        State of a chain after `COMPARED_TIME`; from then on: wall time [s], accepted and rejected steps of a chain.
+
+    Raises:
+        InputError: There is no such device.
+        RuntimeError: A chain did not come to the end.
+    """
+    worlds, links = range(chains), len(start[0])
+    with gpu_turn([device]):
+        batch = Batch(chains, links, Options.model_validate({"method": method, "device": device}))
+        for world in worlds:
+            batch.set_chain(world, PARAMETERS, links)
+            batch.load(world, *start, stop_time=COMPARED_TIME, stop_status=Status.FINISHED)
+        features = batch.features(fixed_body="floor")
+        batch.run(worlds, features)
+        compared, before = (batch.position(0), batch.velocity(0)), batch.counts(0)
+        batch.resume(list(worlds), TIMED, Status.FINISHED)
+        began = time.perf_counter()
+        batch.run(worlds, features)
+        seconds, after = time.perf_counter() - began, batch.counts(0)
+        if (batch.statuses() != Status.FINISHED).any():
+            raise RuntimeError(f"{method}: {batch.status(0).sentence}")  # all chains are alike
+    return compared, seconds, after["accepted"] - before["accepted"], after["rejected"] - before["rejected"]
+
+
+def _row(
+    links: int,
+    method: str,
+    tolerance: float,
+    chains: int,
+    seconds: float,
+    flown: float,
+    counts: tuple[float, float, float],
+    end: State,
+    aim: State,
+) -> Row:
+    """A row of `step_costs`; counts: attempts, mean step [s], share rejected."""
+    attempts, step, rejected = counts
+    off = [float(np.hypot(*(end[k] - aim[k])[:, :2].T).max()) for k in (0, 1)]
+    return {
+        **{"links": links, "method": method, "tolerance": tolerance, "chains": chains},
+        **{"microseconds": 1e6 * seconds / (attempts * chains), "step": step, "rejected": rejected},
+        **{"chain_seconds": chains * flown / seconds, "position_error": off[0], "velocity_error": off[1]},
+    }
+
+
+def walk_rate(device: str, report: Report) -> Row:
+    """Method, tolerance, walks, those at rest, wall time [s] and walks a second of a sweep, kernels loaded before.
+
+    On a CPU all processors take part. Errors as of :func:`warpchain.sweep`.
+    """
+    options, walks = Options.model_validate({"device": device}), WALKS["gpu" if on_gpu(device) else "cpu"]
+    seen: list[SweepProgress] = []
+    with tempfile.TemporaryDirectory(prefix="warpchain-bench-") as folder:
+        report("walks of a sweep")
+        result = sweep(**WALK, samples=walks, device=device, out=f"{folder}/bench", on_progress=seen.append)
+    return {
+        **{"method": options.method, "tolerance": options.tolerance, "walks": walks},
+        **{"at_rest": result.summary()["at_rest"], "seconds": seen[-1].seconds, "walks_per_second": seen[-1].rate},
+    }
+
+
+def machine(device: str) -> dict[str, str]:
+    """Processor, operating system, GPU if the device is one, and versions; an `InputError` if it is not there."""
+    found, listing = start_device(device).warp, Path("/proc/cpuinfo")
+    lines = listing.read_text(encoding="utf-8").splitlines() if listing.exists() else []
+    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    processor = models[0] if models else platform.processor() or platform.machine()
+    about = {"processor": processor, "processors": str(processors()), "system": platform.system()}
+    if on_gpu(device) and device != FIBERS:
+        about |= {"GPU": found.name, "CUDA driver": ".".join(map(str, wp.get_cuda_driver_version()))}
+    return about | versions() | {"scipy": version("scipy")}
