@@ -1,7 +1,6 @@
 """How all figures look: colours, axes, resolution; and a figure with its caption."""
 
 import os
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
@@ -108,13 +107,3 @@ def panel_grid(
     for axes in grid[count - columns : count]:
         axes.tick_params(labelbottom=True)
     return grid[:count], grid[count:]
-
-
-def label_room(axes: "Axes", texts: Sequence[str]) -> tuple[float, float]:
-    """How many labels as wide as the widest text fit below a panel, and how many lines beside it.
-
-    The panel is measured before its layout, which changes its size little.
-    """
-    box, dpi = axes.get_window_extent(), axes.figure.dpi
-    character, line = 0.08, 0.16  # inches
-    return box.width / dpi / (character * (1 + max(map(len, texts)))), box.height / dpi / line
