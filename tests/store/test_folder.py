@@ -78,13 +78,13 @@ def test_a_sweep_is_written_and_read(tmp_path: Path) -> None:
         folder = opened.directory
         walks = np.concatenate([shard.walks for shard in opened.missing()])
         assert walks.tolist() == SWEEP.indices.tolist() and {len(shard) for shard in opened.missing()} == {20}
-        assert len(read_rows(folder, opened.manifest)) == 0
+        assert len(read_rows(folder, opened.manifest)[1]) == 0
         for shard in reversed(opened.missing()):
             write(opened, shard, synthetic_rows(SWEEP, shard))
         assert opened.missing() == []
         opened.log("ended")
         expected = np.concatenate([synthetic_rows(SWEEP, shard) for shard in SHARDS])
-        assert read_rows(folder, opened.manifest).tobytes() == expected.tobytes()
+        assert read_rows(folder, opened.manifest)[1].tobytes() == expected.tobytes()
     assert sorted(os.listdir(folder)) == ["lock", "log.txt", "shards", "sweep.json", "sweep.yaml"]
     assert len(os.listdir(folder / "shards")) == 8
     assert yaml.safe_load((folder / "sweep.yaml").read_text()) == SWEEP.canonical()
@@ -190,7 +190,7 @@ def test_workers_may_write_the_same_shard(tmp_path: Path) -> None:
         shards = opened.missing()[:2] * 20
         list(threads.map(lambda shard: write(opened, shard, synthetic_rows(SWEEP, shard)), shards))
     assert content(tmp_path / "race") == content(tmp_path / "threads")
-    assert len(read_rows(tmp_path / "race", read_manifest(tmp_path / "race"))) == 40
+    assert len(read_rows(tmp_path / "race", read_manifest(tmp_path / "race"))[1]) == 40
 
 
 # Refusals
@@ -216,7 +216,7 @@ def test_other_numerics_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(folder, "NUMERICS_VERSION", 99)
     with refused(InputError, tmp_path, f"numerics {NUMERICS_VERSION}, but this warpchain has 99", "start anew"):
         open_folder(tmp_path)
-    assert len(read_rows(tmp_path, read_manifest(tmp_path))) == 160
+    assert len(read_rows(tmp_path, read_manifest(tmp_path))[1]) == 160
 
 
 @pytest.mark.parametrize("fresh", [False, True])

@@ -16,7 +16,7 @@ from warpchain.cli.main import main
 from warpchain.inputs.validation import InputError
 from warpchain.store import sweep_result
 from warpchain.store.folder import SweepFolder
-from warpchain.store.manifest import Manifest, read_manifest
+from warpchain.store.manifest import Manifest, Shard, read_manifest
 from warpchain.store.merged_file import merge
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.designs import EXTENSIBLE, SAMPLERS
@@ -175,7 +175,7 @@ def test_a_reader_meets_a_sweep_that_begins_anew(tmp_path: Path, monkeypatch: py
     make_sweep(tmp_path, content(samples=2), drawn_distance)
     read = sweep_result.read_rows
 
-    def late(directory: Path, manifest: Manifest) -> Rows:
+    def late(directory: Path, manifest: Manifest) -> tuple[list[Shard], Rows]:
         monkeypatch.undo()
         other = load_sweep(content(samples=2, seed=8))
         SweepFolder.open(tmp_path, other, fresh=True, shard_size=8).close()

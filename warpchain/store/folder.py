@@ -163,15 +163,16 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
             write_whole(description, _YAML_HEAD + "".join(comments) + text)
 
 
-def read_rows(directory: Folder, manifest: Manifest) -> Rows:
-    """Rows of all walks that are in a folder, shape (walks,); needs no lock, at any moment.
+def read_rows(directory: Folder, manifest: Manifest) -> tuple[list[Shard], Rows]:
+    """The shards that are in a folder, and the rows of all their walks, shape (walks,); needs no lock, at any moment.
 
     Raises:
         OSError: the folder or a shard cannot be read.
         InputError: a shard is damaged or foreign.
     """
     shards = present_shards(directory, manifest)
-    return np.concatenate([np.empty(0, manifest.row_type), *(read_shard(directory, shard) for shard in shards)])
+    rows = [np.empty(0, manifest.row_type), *(read_shard(directory, shard) for shard in shards)]
+    return shards, np.concatenate(rows)
 
 
 def running_rate(directory: Folder) -> float | None:
