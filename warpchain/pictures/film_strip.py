@@ -5,7 +5,7 @@ would take a third of the time that this figure takes, and every walk has one.
 """
 
 from dataclasses import dataclass
-from itertools import pairwise, product
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -56,7 +56,7 @@ _CLOSE_UP_LINKS, _CLOSE_UP_ASPECT = 9, 1.5
 _HALO: Final = (withStroke(linewidth=2.5, foreground="white"),)
 
 
-def film_strip(walk: "WalkResult", *, count: int | None = None, figure: Figure | None = None) -> Figure:
+def film_strip(walk: "WalkResult", figure: Figure | None = None) -> Figure:
     """The chain along its walk, drawn to scale, and close-ups of up to four moments.
 
     In the strip the centre of mass moves equally far from each instant to the next. Above each chain stands its time;
@@ -66,15 +66,12 @@ def film_strip(walk: "WalkResult", *, count: int | None = None, figure: Figure |
 
     Args:
         walk: a walk with frames.
-        count: number of instants in the strip, at least 2; by default 6 to 12, as many as stay legible.
         figure: an empty figure to draw into; by default a new one that suits the walk.
 
     Raises:
-        ValueError: the walk has no frames or broken ones, or fewer than 2 instants are asked for.
+        ValueError: the walk has no frames or broken ones.
     """
     joints = checked_joints(walk)
-    if count is not None and count < 2:
-        raise ValueError(f"count: {count} is too few; give 2 or more")
     tilts = walk.joints_in_room is not None
     low, high = walk_box(walk, joints)
     close_ups = [] if tilts else _close_ups(walk)
@@ -120,7 +117,7 @@ def film_strip(walk: "WalkResult", *, count: int | None = None, figure: Figure |
     center = center_in_room(walk)
     path = np.stack([np.interp(walk.frame_time, walk.time, row) for row in center.T], axis=1)
     radius = walk.setup.parameters.circle_radius
-    shown = _instants(path, float(np.ptp(joints[0, :, 0])), count)
+    shown = _instants(path, float(np.ptp(joints[0, :, 0])))
     for title, axes, view in views:
         for frame in shown:
             draw_chain(axes, joints[frame], radius, view, _link_colors(colors[frame]), edge=0.25)
@@ -143,23 +140,20 @@ def _link_colors(color: Array) -> tuple[Array, Array, Array]:
     return 1 - 0.45 * (1 - color), color, 0.6 * color
 
 
-def _instants(path: Array, width: float, count: int | None) -> list[int]:
-    """Frames between which the centre of mass moves equally far, the first and the last among them.
+def _instants(path: Array, width: float) -> list[int]:
+    """6 to 12 frames between which the centre of mass moves equally far, the first and the last among them.
 
     Args:
         path: centre of mass in each frame [m], shape (f, 3).
         width: width of the chain in the first frame [m].
-        count: number of frames; None: 6 to 12, as many as stay legible.
     """
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-    if count is None:
-        count = int(np.clip(1 + way[-1] / (0.6 * width), 6, 12))
-    marks = np.linspace(0.0, way[-1], count)[1:-1]
+    marks = np.linspace(0.0, way[-1], int(np.clip(1 + way[-1] / (0.6 * width), 6, 12)))[1:-1]
     return sorted({0, *(int(np.argmin(np.abs(way - mark))) for mark in marks), len(way) - 1})
 
 
 def _write_times(axes: Axes, times: Array, joints: Array, colors: Array, gap: float, inch: float) -> None:
-    """Write the time of each chain above its highest joint, a little aside or higher where it would touch a text.
+    """Write the time of each chain above its highest joint, higher where it would touch another text.
 
     Args:
         axes: the view from the side.
@@ -169,17 +163,14 @@ def _write_times(axes: Axes, times: Array, joints: Array, colors: Array, gap: fl
         gap: from a joint to the text [m].
         inch: on paper [m].
     """
-    wide, high = 0.38 * inch, 0.13 * inch
     taken = np.array([text.get_position() for text in axes.texts]).reshape(-1, 2)
-    for number in range(len(times)):
-        top = joints[number, np.argmax(joints[number, :, 1])] + (0.0, gap)
-        for lift, aside in product(range(100), (0, 1, -1, 2, -2, 3, -3)):
-            x, y = top + 0.05 * inch * np.array([aside, lift])
-            if not np.any((np.abs(taken[:, 0] - x) < wide) & (np.abs(taken[:, 1] - y) < high)):
-                break
-        taken = np.append(taken, [[x, y]], axis=0)
-        style: dict[str, Any] = {"color": 0.7 * colors[number], "fontsize": "small", "path_effects": _HALO}
-        axes.text(x, y, f"{times[number]:.2f} s", ha="center", va="bottom", zorder=6, **style)
+    for moment, chain, color in zip(times, joints, colors, strict=True):
+        place = chain[np.argmax(chain[:, 1])] + (0.0, gap)
+        while np.any(np.all(np.abs(taken - place) < np.array([0.38, 0.13]) * inch, axis=1)):
+            place[1] += 0.02 * inch
+        taken = np.append(taken, [place], axis=0)
+        style: dict[str, Any] = {"color": 0.7 * color, "fontsize": "small", "path_effects": _HALO}
+        axes.text(place[0], place[1], f"{moment:.2f} s", ha="center", va="bottom", zorder=6, **style)
 
 
 def _draw_way(axes: Axes, walk: "WalkResult", center: Array, view: Array) -> None:
@@ -240,27 +231,25 @@ def _frame_close_up(
 def _close_ups(walk: "WalkResult") -> list[_CloseUp]:
     """At most four moments in order of time, no frame twice, whose boxes lie side by side if their spots allow it.
 
-    They are the first touch of the floor, the first self-contact, the collapse and the end, as far as they happen. The
-    collapse is the last time at which the top of the chain is half as high as at the release.
+    They are the first touch of the floor, the first self-contact, the collapse and the end, as far as they happen.
     """
     joints, radius = walk.frame_joints, walk.setup.parameters.circle_radius
-    above = from_floor(walk, joints)
-    height, last = above.max(axis=1), len(joints) - 1
+    above, last = from_floor(walk, joints), len(joints) - 1
     found: dict[int, tuple[str, Array]] = {}
     touching = np.flatnonzero(above.min(axis=1) < 1.02 * radius)
     if touching.size:
         frame = int(touching[0])
         found[frame] = "first touch", joints[frame, np.argmin(above[frame])]
-    meeting = _first_meeting(joints, 2.02 * radius)
-    if meeting is not None:
-        found[meeting[0]] = "first self-contact", meeting[1]
-    frame = int(np.flatnonzero(height >= 0.5 * height[0])[-1])
-    found[frame] = "collapse", joints[frame, _sharpest_bend(joints[frame])]
+    for title, moment, spot_of in (
+        ("first self-contact", walk.self_contact_at, _meeting),
+        ("collapse", walk.collapsed_at, _sharpest_bend),
+    ):
+        if not np.isnan(moment):
+            frame = min(int(np.searchsorted(walk.frame_time, moment)), last)
+            found[frame] = title, spot_of(joints[frame])
     middle = np.median(joints[last, :, 0])
-    found[last] = (
-        "rest" if walk.status is Status.AT_REST else "end",
-        np.array([middle, floor_height(walk, middle)]),
-    )
+    title = "rest" if walk.status is Status.AT_REST else "end"
+    found[last] = title, np.array([middle, floor_height(walk, middle)])
     size = np.array([1.0, 1.0 / _CLOSE_UP_ASPECT]) * _CLOSE_UP_LINKS * walk.setup.parameters.link_length
     moments = sorted(found.items())
     middles = _side_by_side(np.array([spot[0] for _, (_, spot) in moments]), size[0])
@@ -273,33 +262,28 @@ def _close_ups(walk: "WalkResult") -> list[_CloseUp]:
 
 
 def _side_by_side(spots: Array, width: float) -> Array:
-    """Middles of boxes, moved apart where boxes overlap, but at most a sixth of a box off their spots [m]."""
+    """Middles of boxes, moved apart where boxes overlap, but at most 0.3 of a box off their spots [m]."""
     middles = spots.copy()
     for _ in range(10):
         for left, right in pairwise(np.argsort(spots, kind="stable")):
             shift = max(0.0, (width - middles[right] + middles[left]) / 2)
             middles[[left, right]] += (-shift, shift)
-        middles = np.clip(middles, spots - width / 6, spots + width / 6)
+        middles = np.clip(middles, spots - 0.3 * width, spots + 0.3 * width)
     return middles
 
 
-def _first_meeting(joints: Array, distance: float) -> tuple[int, Array] | None:
-    """First frame in which two joints at least 3 links apart are closer than `distance`, and where."""
-    count = joints.shape[1]
+def _meeting(joints: Array) -> Array:
+    """Where two joints at least 3 links apart are closest, (2,)."""
+    count = len(joints)
     apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
-    excluded = np.minimum(apart, count - apart) < 3
-    for frame, (x, y) in enumerate(joints.transpose(0, 2, 1)):
-        squares = np.subtract.outer(x, x) ** 2 + np.subtract.outer(y, y) ** 2
-        squares[excluded] = np.inf
-        nearest = np.unravel_index(np.argmin(squares), squares.shape)
-        if squares[nearest] < distance**2:
-            return frame, joints[frame, list(nearest)].mean(axis=0)
-    return None
+    distances = np.linalg.norm(joints[:, None] - joints, axis=-1)
+    distances[np.minimum(apart, count - apart) < 3] = np.inf
+    return np.asarray(joints[[*np.unravel_index(np.argmin(distances), distances.shape)]].mean(axis=0))
 
 
-def _sharpest_bend(joints: Array) -> int:
-    """Number of the joint at which the chain turns most over three links."""
+def _sharpest_bend(joints: Array) -> Array:
+    """The joint at which the chain turns most over three links, (2,)."""
     step = joints - np.roll(joints, 1, axis=0)
     direction = np.arctan2(step[:, 1], step[:, 0])
     turn = np.angle(np.exp(1j * (np.roll(direction, -2) - np.roll(direction, 1))))
-    return int(np.argmax(np.abs(turn)))
+    return np.asarray(joints[np.argmax(np.abs(turn))])
