@@ -3,9 +3,11 @@
 import base64
 import html
 import io
-from collections.abc import Callable, Iterable, Mapping
+import itertools
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Final
 
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -21,10 +23,16 @@ class InlineFigure(Figure):
         return png(self)
 
 
-def png(figure: Figure) -> bytes:
-    """A figure as the bytes of a PNG file."""
-    content = io.BytesIO()
-    figure.savefig(content, format="png", dpi=NOTEBOOK_DPI)
+def png(figure: Figure, dpi: float = NOTEBOOK_DPI) -> bytes:
+    """A figure as the bytes of a PNG file.
+
+    It is painted directly, which takes half the time of `savefig`: that draws everything once more beforehand.
+    """
+    given, content = figure.dpi, io.BytesIO()
+    figure.set_dpi(dpi)
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.print_png(content, metadata={"Software": None}, pil_kwargs={"compress_level": 3})
+    figure.set_dpi(given)
     return content.getvalue()
 
 
@@ -50,13 +58,34 @@ def axes_text(axes: Mapping[str, NDArray[Any]], samples: int) -> str:
 
 def page(title: str, rows: Iterable[tuple[str, str]], picture: bytes | None) -> str:
     """A fragment of HTML: a title, a table of names and values, and a picture (PNG) if there is one."""
-    lines = [
-        f'<tr><th style="text-align:left">{html.escape(name)}</th>'
-        f'<td style="text-align:left">{html.escape(value)}</td></tr>'
-        for name, value in rows
-    ]
-    shown = ""
-    if picture is not None:
-        data = base64.b64encode(picture).decode()
-        shown = f'<img alt="{html.escape(title)}" style="max-width:100%" src="data:image/png;base64,{data}">'
-    return f"<div><b>{html.escape(title)}</b><table>{''.join(lines)}</table>{shown}</div>"
+    shown = "" if picture is None else image(picture, title)
+    return f"<div><b>{html.escape(title)}</b>{table(('', ''), rows)}{shown}</div>"
+
+
+def image(content: bytes, text: str, width: str = "auto") -> str:
+    """A picture (PNG) that is part of the HTML, its text for who cannot see it, and its width."""
+    data = base64.b64encode(content).decode()
+    style = f"max-width:100%;width:{width}"
+    return f'<img alt="{html.escape(text)}" style="{style}" src="data:image/png;base64,{data}">'
+
+
+def table(
+    head: Sequence[str], rows: Iterable[Sequence[str]], *, numeric: bool = False, marked: Iterable[bool] = ()
+) -> str:
+    """A table of texts in HTML.
+
+    Args:
+        head: one text for each column; if all are empty, the table has no head.
+        rows: as many texts each.
+        numeric: whether the texts are numbers.
+        marked: whether a row needs attention; none by default.
+    """
+
+    def cells(tag: str, texts: Sequence[str]) -> str:
+        return "".join(f'<{tag} style="text-align:{side}">{html.escape(text)}</{tag}>' for text in texts)
+
+    side = "right" if numeric else "left"
+    top = f"<thead><tr>{cells('th', head)}</tr></thead>" if any(head) else ""
+    kinds = itertools.chain((" class=bad" if bad else "" for bad in marked), itertools.repeat(""))
+    body = "\n".join(f"<tr{kind}>{cells('td', row)}</tr>" for row, kind in zip(rows, kinds, strict=False))
+    return f'<div class="wide"><table>{top}<tbody>\n{body}\n</tbody></table></div>'

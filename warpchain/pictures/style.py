@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-from warpchain.files import replacing
+from warpchain.files import write_whole
 from warpchain.inputs.validation import InputError
 
 if TYPE_CHECKING:
@@ -65,16 +65,12 @@ class Picture:
 def save_figure(figure: "Figure", path: str | os.PathLike[str]) -> None:
     """Write a figure as a PNG, whole or not at all.
 
-    It is painted directly, which takes half the time of `savefig`: that draws everything once more beforehand.
-
     Raises:
         OSError: the file cannot be written.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from warpchain.pictures.inline import png
 
-    figure.set_dpi(PICTURE_DPI)
-    with replacing(path) as part:
-        FigureCanvasAgg(figure).print_png(part, pil_kwargs={"compress_level": 3})  # type: ignore[no-untyped-call]
+    write_whole(path, png(figure, PICTURE_DPI))
 
 
 def tidy(axes: "Axes", *, grid: Literal["x", "y", "both"] | None = None) -> None:

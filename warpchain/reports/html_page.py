@@ -1,14 +1,12 @@
 """Building blocks of HTML pages that contain everything and load nothing."""
 
-import base64
-import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from html import escape
-from itertools import chain, repeat
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from warpchain.files import Kind
+from warpchain.pictures.inline import image, png
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -56,34 +54,8 @@ def page(title: str, tiles: Mapping[str, tuple[int, str]], sections: Mapping[str
 
 def picture(figure: "Figure", caption: str) -> str:
     """A figure with its caption; the image is part of the HTML."""
-    content = io.BytesIO()
-    figure.savefig(content, format="png", dpi=_DPI, metadata={"Software": None})
-    data = base64.b64encode(content.getvalue()).decode()
-    width = round(96 * figure.get_figwidth())
-    image = f'<img src="data:image/png;base64,{data}" alt="{escape(caption)}" style="width:{width}px">'
-    return f"<figure>{image}<figcaption>{escape(caption)}</figcaption></figure>"
-
-
-def table(
-    head: Sequence[str], rows: Iterable[Sequence[str]], *, numeric: bool = False, marked: Iterable[bool] = ()
-) -> str:
-    """A table of texts.
-
-    Args:
-        head: one text for each column; if all are empty, the table has no head.
-        rows: as many texts each.
-        numeric: whether the texts are numbers.
-        marked: whether a row needs attention; none by default.
-    """
-
-    def cells(tag: str, texts: Sequence[str]) -> str:
-        return "".join(f"<{tag}>{escape(text)}</{tag}>" for text in texts)
-
-    top = f"<thead><tr>{cells('th', head)}</tr></thead>" if any(head) else ""
-    kinds = (" class=bad" if bad else "" for bad in chain(marked, repeat(False)))
-    body = "\n".join(f"<tr{kind}>{cells('td', row)}</tr>" for row, kind in zip(rows, kinds, strict=False))
-    kind = ' class="number"' if numeric else ""
-    return f'<div class="wide"><table{kind}>{top}<tbody>\n{body}\n</tbody></table></div>'
+    shown = image(png(figure, _DPI), caption, f"{round(96 * figure.get_figwidth())}px")
+    return f"<figure>{shown}<figcaption>{escape(caption)}</figcaption></figure>"
 
 
 _STYLE: Final = """
@@ -105,9 +77,9 @@ figure img { max-width: 100%; display: block; }
 figcaption { max-width: 46rem; margin-top: .5rem; color: #555; font-size: .9rem; }
 .wide { overflow-x: auto; }
 table { border-collapse: collapse; font-size: .9rem; }
-th, td { padding: .2rem .8rem .2rem 0; text-align: left; vertical-align: top; border-bottom: 1px solid #e3e3e3; }
+th, td { padding: .2rem .8rem .2rem 0; vertical-align: top; border-bottom: 1px solid #e3e3e3;
+         font-variant-numeric: tabular-nums; }
 th { border-bottom: 1px solid #777; }
-.number td, .number th { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 tr.bad td, p.bad { color: #a84a00; }
 iframe { width: 100%; border: 1px solid #ccc; }
 pre { max-height: 30rem; overflow: auto; padding: 1rem; background: #f3f4f5; font-size: .8rem; line-height: 1.35; }
