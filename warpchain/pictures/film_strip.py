@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from warpchain.pictures.chain import (
     ABOVE,
-    FRONT,
     SIDE,
     draw_chain,
     draw_ground,
@@ -43,12 +42,10 @@ _WIDTH: Final = 10.0
 _HIGHEST: Final = 4.6
 _DEEPEST: Final = 8.0
 """Width of the paper, greatest height of the side view, and of it and the view from above together."""
-_LEFT, _BETWEEN, _RIGHT, _TOP, _BELOW, _FOOT = 0.9, 0.85, 0.25, 0.6, 0.85, 0.1
-"""Room for labels: beside and between the views, for legend and titles above them, below each row, at the foot."""
+_LEFT, _RIGHT, _TOP, _BELOW, _FOOT = 0.9, 0.25, 0.6, 0.85, 0.1
+"""Room for labels: beside the views, for legend and titles above them, below each row, at the foot."""
 _CLOCK: Final = 0.2
 """Room for the times above the chains."""
-_NARROWEST: Final = 1.3
-"""Least width of the view from the front."""
 _FLOOR: Final = 0.4
 """Height of the floor in the side view."""
 _CLOSE_UP_LINKS, _CLOSE_UP_ASPECT = 9, 1.5
@@ -61,8 +58,7 @@ def film_strip(walk: "WalkResult", figure: Figure | None = None) -> Figure:
 
     In the strip the centre of mass moves equally far from each instant to the next. Above each chain stands its time;
     outer links are darker than inner ones. The close-ups show the first touch of the floor, the first self-contact, the
-    collapse and the end. A chain whose plane tilts is seen from the side, from the front and from above instead, all to
-    one scale. From the front z grows to the left, and from above downwards, as such a viewer sees it.
+    collapse and the end. A chain whose plane tilts is seen from above instead, to the same scale: z grows downwards.
 
     Args:
         walk: a walk with frames.
@@ -80,13 +76,9 @@ def film_strip(walk: "WalkResult", figure: Figure | None = None) -> Figure:
         low[:2] = np.minimum(low[:2], close_up.low + np.array([-margin, margin]))
         high[:2] = np.maximum(high[:2], close_up.high + margin)
     size = high - low
-    # A chain that stays upright is thin from above and from the front: room for the numbers on the axes.
-    broad = max(size[1], size[2]) if tilts else 0.0
-    across = _WIDTH - _LEFT - _RIGHT - (_BETWEEN if tilts else 0.0)
-    scale = min(across / (size[0] + broad), _HIGHEST / size[1], (_DEEPEST - _FLOOR) / (size[1] + broad))
-    if tilts and scale * broad < _NARROWEST:
-        scale = (across - _NARROWEST) / size[0]
-        broad = _NARROWEST / scale
+    broad = max(size[2], 0.15 * size[0]) if tilts else 0.0
+    across = _WIDTH - _LEFT - _RIGHT
+    scale = min(across / size[0], _HIGHEST / size[1], (_DEEPEST - _FLOOR) / (size[1] + broad))
     close_up_width = min((across + 0.1) / max(1, len(close_ups)), _WIDTH / 3)
     lower = scale * broad + 0.5 if tilts else (close_up_width - 0.1) / _CLOSE_UP_ASPECT
     width, height, depth, top = scale * size[0], scale * size[1] + _FLOOR + _CLOCK, _FLOOR / scale, _CLOCK / scale
@@ -96,22 +88,19 @@ def film_strip(walk: "WalkResult", figure: Figure | None = None) -> Figure:
     def panel(left: float, bottom: float, width: float, height: float) -> Axes:
         return figure.add_axes((left / paper[0], bottom / paper[1], width / paper[0], height / paper[1]))
 
-    left = _LEFT + (across - scale * (size[0] + broad)) / 2
+    left = _LEFT + (across - width) / 2
     bottom = _FOOT + lower + _BELOW
     side = panel(left, bottom, width, height)
     side.set(xlim=(low[0], high[0]), ylim=(low[1] - depth, high[1] + top), xlabel="x / m", ylabel="y / m")
-    views = [(f"{setting(walk)}{', from the side' * tilts}", side, SIDE)]
+    views = [(setting(walk), side, SIDE)]
     draw_ground(side, floor_line(walk, low[0], high[0]), low[1] - depth)
     _draw_distance(side, walk, low[1], 0.5 * depth)
     if tilts:
         z = (low[2] + high[2]) / 2 + np.array([0.5, -0.5]) * broad
-        front = panel(left + width + _BETWEEN, bottom, scale * broad, height)
-        front.set(xlim=z, ylim=(-depth, high[1] + top), xlabel="z / m", ylabel="y / m")
-        front.xaxis.set_major_locator(MaxNLocator(4))
         above = panel(left, _FOOT + 0.5, width, scale * broad)
         above.set(xlim=(low[0], high[0]), ylim=z, xlabel="x / m", ylabel="z / m", facecolor=GROUND)
-        draw_ground(front, np.array([[z[0], 0.0], [z[1], 0.0]]), -depth)
-        views += [("from the front", front, FRONT), ("from above", above, ABOVE)]
+        above.yaxis.set_major_locator(MaxNLocator(5))
+        views.append(("from above", above, ABOVE))
     # viridis without its palest end, which can hardly be seen on white paper
     colors = colormaps["viridis"](0.9 * walk.frame_time / (walk.frame_time[-1] or 1.0))[:, :3]
     center = center_in_room(walk)

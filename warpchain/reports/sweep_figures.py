@@ -1,4 +1,4 @@
-"""Figures of sweeps: the paper's Figure 6, grids, tolerances compared, sensitivity, how walks ended.
+"""Figures of sweeps: the paper's Figure 6, grids, sensitivity, how walks ended.
 
 Means and standard deviations are those of the walks that came to rest. The number of walks that failed, or have not
 been run yet, is on the figure.
@@ -10,21 +10,18 @@ from contextlib import suppress
 from typing import Any, Final
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from warpchain.inputs.validation import short
 from warpchain.pictures.grid_figure import draw_grid
-from warpchain.pictures.labels import COUNTS, DISTANCE, FREQUENCY, cell_values, lost_note, quantity_name, quantity_text
+from warpchain.pictures.labels import COUNTS, DISTANCE, FREQUENCY, cell_values, lost_note, quantity_name
 from warpchain.pictures.style import (
     BLUE,
     FAINT,
     GREEN,
-    GROUND,
     INK,
     LINE_COLORS,
     RED,
@@ -33,7 +30,7 @@ from warpchain.pictures.style import (
     panel_grid,
     tidy,
 )
-from warpchain.reports.statistics import CONFIDENCE, sensitivities, tolerance_agreement
+from warpchain.reports.sensitivity import sensitivity
 from warpchain.status import Status
 from warpchain.store.block_result import BlockResult
 from warpchain.store.sweep_result import SweepResult
@@ -68,7 +65,7 @@ def figures(result: SweepResult, quantity: str = "dx") -> Iterator[Picture]:
         InputError: there is no such column.
     """
     statistics, shown = result.cell_statistics(quantity), set[str]()
-    for draw in (figure6, tolerance, sensitivity) if quantity == "dx" else ():
+    for draw in (figure6, sensitivity) if quantity == "dx" else ():
         with suppress(NothingToShow):
             picture = draw(result)
             shown.add(picture.name)
@@ -77,7 +74,7 @@ def figures(result: SweepResult, quantity: str = "dx") -> Iterator[Picture]:
     for name in statistics:
         varied = _varied(result.blocks[name])
         in_figure6 = "distance" in shown and "frequency" in varied and _is_series(result.blocks[name])
-        if varied and not in_figure6 and not ("tolerance" in shown and "tolerance" in varied):
+        if varied and not in_figure6:
             groups.setdefault(frozenset(varied if len(varied) > 1 else ()), []).append(name)
     for names in groups.values():
         with suppress(NothingToShow):
@@ -141,7 +138,9 @@ def figure6(result: SweepResult) -> Picture:
         )
     gap = float(np.diff(frequencies).min()) if len(frequencies) > 1 else 1.0
     columns = {1: 1, 2: 2, 4: 2}.get(len(cells), 3)
-    figure, used, empty = _grid(len(cells), columns, (3.1, 2.6), (0.0, 1.0))
+    size = max(4.2, 3.1 * columns), 1.0 + 2.6 * -(-len(cells) // columns)
+    figure = Figure(figsize=size, layout="constrained")
+    used, empty = panel_grid(figure, len(cells), columns, sharex=True)
     for (links, series), axes in zip(sorted(cells.items()), used, strict=True):
         for number, (label, each) in enumerate(series.items()):
             # Boxes of several series stand side by side about their frequency.
@@ -175,80 +174,6 @@ def figure6(result: SweepResult) -> Picture:
     return Picture("distance", caption + "bar of two standard deviations.", figure)
 
 
-def tolerance(result: SweepResult) -> Picture:
-    """The same walks at the loosest and the tightest tolerance of a sweep.
-
-    Shown are the relative differences of single walks and of the means of each cell.
-
-    Raises:
-        NothingToShow: see `tolerance_agreement`.
-    """
-    agreement = tolerance_agreement(result)
-    cells = agreement.cells
-    figure = Figure(figsize=(6.0, 1.8 + 0.34 * len(cells)), layout="constrained")
-    axes = figure.subplots()
-    axes.axvspan(-10, 10, color=GROUND, linewidth=0)
-    axes.axvline(0.0, color=FAINT, linewidth=1.0)
-    for row, cell in enumerate(cells):
-        labels = ("_", "_") if row else ("one walk", "means ± 2 standard errors")
-        single = 100 * cell.differences
-        axes.scatter(single, np.full(len(single), row - 0.14), s=12, alpha=0.5, color=BLUE, label=labels[0], zorder=3)
-        error = 200 * np.nan_to_num(cell.standard_error)
-        style: dict[str, Any] = {"fmt": "D", "color": RED, "markersize": 5, "linewidth": 1.4, "zorder": 4}
-        axes.errorbar(100 * cell.difference, row + 0.16, xerr=error, label=labels[1], **style)
-    axes.set_yticks(range(len(cells)), [cell.cell for cell in cells])
-    axes.set_ylim(len(cells) - 0.5, -0.5)
-    widest = 110 * max(0.1, *(float(np.abs(cell.differences).max()) for cell in cells))
-    axes.set_xlim(-widest, widest)
-    lost = f"\n{agreement.lost} pairs are not complete" if agreement.lost else ""
-    axes.set_xlabel(f"difference of $Δx$ ({short(agreement.loose)} less {short(agreement.tight)}) / %{lost}")
-    figure.legend(loc="outside upper right", frameon=False, ncols=2, columnspacing=1.0)
-    tidy(axes)
-    return Picture("tolerance", str(agreement), figure)
-
-
-def sensitivity(result: SweepResult) -> Picture:
-    """Sobol' indices of the distance with a panel for each cell.
-
-    All panels have the quantities in the same order, by the mean of their total indices, the greatest at the top.
-
-    Raises:
-        NothingToShow: see `sensitivities`.
-    """
-    cells = sensitivities(result)
-    totals: dict[str, list[float]] = {}
-    for cell in cells:
-        for name, total in zip(cell.names, cell.total_order, strict=True):
-            totals.setdefault(name, []).append(total)
-    names = sorted(totals, key=lambda name: -float(np.mean(totals[name])))
-    figure, used, _ = _grid(len(cells), 3, (3.2, 0.6 + 0.36 * len(names)), (2.4, 0.9))
-    for axes, cell in zip(used, cells, strict=True):
-        places = np.array([names.index(name) for name in cell.names])
-        for shift, color, label, values, interval in (
-            (-0.2, BLUE, "total", cell.total_order, cell.total_order_interval),
-            (0.2, LINE_COLORS[5], "first order", cell.first_order, cell.first_order_interval),
-        ):
-            axes.barh(places + shift, values, height=0.38, color=color, label=label)
-            axes.hlines(places + shift, interval[:, 0], interval[:, 1], color=INK, linewidth=1.2)
-        axes.axvline(0.0, color=INK, linewidth=0.8)
-        axes.set_title(cell.cell, fontsize="medium", loc="left")
-        if cell.lost:
-            note = f"{cell.lost} of {cell.samples + cell.lost} samples are not complete"
-            axes.set_xlabel(note, color=RED, fontsize="small")
-        tidy(axes, grid="x")
-    used[0].set_yticks(range(len(names)), [quantity_text(name) for name in names])
-    used[0].set_ylim(len(names) - 0.4, -0.6)
-    figure.supxlabel(f"share of the variance of $Δx$, with {CONFIDENCE:.0%} intervals", fontsize="medium")
-    figure.legend(*used[0].get_legend_handles_labels(), loc="outside upper right", frameon=False, ncols=2)
-    caption = (
-        "Sobol indices: the share of the variance of the distance walked that a quantity causes by itself (first "
-        f"order) and takes part in (total); lines are {CONFIDENCE:.0%} bootstrap intervals. Walks are chaotic: "
-        "changing anything a little scatters them, which all total indices contain alike. "
-        f"Samples: {', '.join(f'{cell.samples}' for cell in cells)}."
-    )
-    return Picture("sensitivity", caption, figure)
-
-
 def status_counts(result: SweepResult) -> Picture:
     """Number of walks by status, missing ones included."""
     counts = {label: count for label, count in result.summary().items() if count}
@@ -264,23 +189,3 @@ def status_counts(result: SweepResult) -> Picture:
     axes.set_xlabel("walks")
     tidy(axes)
     return Picture("status_counts", "How the walks ended.", figure)
-
-
-def _grid(
-    count: int, most: int, panel: tuple[float, float], margin: tuple[float, float]
-) -> tuple[Figure, list[Axes], list[Axes]]:
-    """A figure with `count` panels in at most `most` columns, with common axes.
-
-    Args:
-        count: number of panels.
-        most: greatest number of columns.
-        panel: width and height that each panel adds to the figure [inches].
-        margin: width and height beside the panels [inches].
-
-    Returns:
-        The figure, its panels by rows, and the axes that stay empty, which show nothing.
-    """
-    columns = min(count, most)
-    size = max(4.2, margin[0] + panel[0] * columns), margin[1] + panel[1] * -(-count // columns)
-    figure = Figure(figsize=size, layout="constrained")
-    return figure, *panel_grid(figure, count, columns, sharex=True)
