@@ -96,16 +96,6 @@ def test_they_do_not_change_the_walk() -> None:
         assert (walk.steps_accepted, walk.steps_rejected) == (plain.steps_accepted, plain.steps_rejected)
 
 
-def test_by_default_half_a_second_is_kept_with_frames() -> None:
-    """Frames bring 0.5 s of the time before; an ellipse has none, and a chain that was never released neither."""
-    before = brief_walk().before_release
-    assert before is not None and -0.5 <= before.frame_time[0] < -0.49
-    shape = warpchain.walk(**BRIEF | {"start": "ellipse", "links": 32})
-    assert shape.before_release is None and len(shape.frame_time)
-    held = warpchain.walk(**BRIEF, hold_limit=0.02)
-    assert held.status.label == "not_steady" and held.before_release is None
-
-
 def test_impossible_times_are_refused() -> None:
     """Negative, endless and no times, and a time without frames, each with the remedy."""
     for wrong in (-0.1, float("inf"), float("nan"), True, "long"):

@@ -4,7 +4,6 @@ import html
 import math
 import re
 import shutil
-import subprocess
 from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
@@ -13,7 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from PIL import Image
 
 from tests.support.made_sweeps import FIGURE_6, distance, make_sweep
 from tests.support.made_walks import make_unreleased, make_walk
@@ -318,38 +316,3 @@ def test_a_report_replaces_reports_only(folder: Path, tmp_path: Path, content: s
 
 
 # In a browser
-
-
-@pytest.mark.skipif(
-    BROWSER is None, reason="no browser: none of chromium, chromium-browser, google-chrome is installed"
-)
-def test_a_browser_shows_the_report(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A real browser, cut off from any network, draws figures, text and the chain in its player without complaint."""
-    assert BROWSER is not None
-    with_walk(monkeypatch, make_walk)
-    write_report(folder, tmp_path / "report.html", animation_of=0)
-    command = [
-        BROWSER,
-        *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
-        *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
-        *("--host-resolver-rules=MAP * ~NOTFOUND", "--enable-logging=stderr", "--hide-scrollbars"),
-        "--force-prefers-reduced-motion",  # the player waits at the first picture
-        *("--window-size=1100,5000", "--virtual-time-budget=2000", f"--user-data-dir={tmp_path / 'profile'}"),
-        f"--screenshot={tmp_path / 'report.png'}",
-        (tmp_path / "report.html").as_uri(),
-    ]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
-    assert done.returncode == 0, done.stderr
-    assert not [line for line in done.stderr.splitlines() if "CONSOLE" in line]
-    picture = np.asarray(Image.open(tmp_path / "report.png").convert("RGB")).astype(int)
-    assert picture.shape == (5000, 1100, 3)
-
-    def area(color: str) -> int:
-        """Number of pixels of a colour, as in #0072B2."""
-        wanted = [int(color[place : place + 2], 16) for place in (1, 3, 5)]
-        return int((np.abs(picture - wanted).max(axis=2) <= 2).sum())
-
-    assert area("#9CCBE6") > 50  # inner links, which only the player draws
-    assert area("#D55E00") > 500  # Figure 6 and the counts of failures
-    assert area("#222222") > 500  # text
-    assert area("#FFFFFF") < 0.97 * picture[..., 0].size

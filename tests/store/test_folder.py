@@ -8,7 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
@@ -20,6 +20,7 @@ import pytest
 import yaml
 
 from tests.support import synthetic_sweep
+from tests.support.stopped_calls import is_stopped
 from tests.support.synthetic_sweep import LONG_SWEEP, SHARD_SIZE, SWEEP, content, run, synthetic_rows, write
 from warpchain.inputs.validation import InputError, InputWarning
 from warpchain.store import folder
@@ -111,10 +112,6 @@ def test_a_sweep_survives_kills(tmp_path: Path) -> None:
     assert not [name for name in os.listdir(tmp_path / "killed") if name.startswith(".")]
 
 
-class _Kill(BaseException):
-    """Stands for a kill between two system calls."""
-
-
 @pytest.mark.parametrize("fresh", [False, True])
 def test_every_step_of_opening_may_be_the_last(tmp_path: Path, fresh: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Stopped before any change to the folder, opening it again succeeds and leaves the same as one never stopped."""
@@ -122,29 +119,11 @@ def test_every_step_of_opening_may_be_the_last(tmp_path: Path, fresh: bool, monk
     run(tmp_path / "whole", sweep)
     expected, stops = content(tmp_path / "whole"), 0
     while True:
-        folder, left = tmp_path / str(stops), stops
+        folder = tmp_path / str(stops)
         if fresh:
             run(folder)
-
-        def counted(real: Callable[..., Any]) -> Callable[..., Any]:
-            def call(*arguments: Any, **settings: Any) -> Any:
-                nonlocal left
-                left -= 1
-                if left < 0:
-                    raise _Kill
-                return real(*arguments, **settings)
-
-            return call
-
-        with monkeypatch.context() as patched:
-            for place, name in ((os, "replace"), (os, "rename"), (os, "mkdir"), (os, "unlink"), (os, "rmdir")):
-                patched.setattr(place, name, counted(getattr(place, name)))
-            try:
-                open_folder(folder, sweep, fresh=fresh).close()
-            except _Kill:
-                pass
-            else:
-                break
+        if not is_stopped(lambda: open_folder(folder, sweep, fresh=fresh).close(), stops, monkeypatch):  # noqa: B023
+            break
         run(folder, sweep, fresh=fresh and "changed" not in (folder / "sweep.json").read_text())
         assert content(folder) == expected, stops
         stops += 1
@@ -245,17 +224,6 @@ def test_a_shard_of_another_sweep_is_refused(tmp_path: Path) -> None:
     first.write_bytes(kept)
     with pytest.warns(InputWarning):
         open_folder(tmp_path / "one").close()
-
-
-def test_a_folder_of_an_older_version_names_it(tmp_path: Path) -> None:
-    """Refused in one line, with the version that reads it."""
-    run(tmp_path)
-    path = tmp_path / "sweep.json"
-    path.write_text(re.sub('"format_version": [0-9]+', '"format_version": 5', path.read_text()))
-    with refused(
-        InputError, tmp_path, f"{path}: format version 5 of warpchain 0.1, which reads it; run the sweep again"
-    ):
-        open_folder(tmp_path)
 
 
 def test_a_sweep_that_is_refused_now_is_named(tmp_path: Path) -> None:

@@ -156,20 +156,6 @@ def test_workers_and_interruptions_leave_the_same_bytes(
     assert data_of(tmp_path / "stopped") == uninterrupted
 
 
-def test_a_walk_that_was_never_released_has_no_motion(tmp_path: Path) -> None:
-    """It is kept with no instants, breaks nothing, and is in no picture."""
-    scene = {"start": "spinning", "hold_limit": 0.02, "frequency": 12.0}
-    result = sweep(TINY | {"samples": 2, "grid": {"links": [60]}, "scene": scene, "record": {"series": True}}, tmp_path)
-    assert result.summary()["not_steady"] == 2
-    walk = result.series(sample=1)
-    assert (walk.time.shape, walk.center.shape, walk.frame_joints.shape[0]) == ((0,), (0, 2), 0)
-    assert walk.sprocket_center is None and np.isnan(walk.dx)
-    with pytest.raises(ValueError, match="no time series"):
-        walk.plot()
-    merge(tmp_path, tmp_path / "merged.h5")
-    assert load(tmp_path / "merged.h5").series(sample=1).time.shape == (0,)
-
-
 def test_damage_to_a_motion_is_seen(kept: Path, tmp_path: Path) -> None:
     """A flipped bit in a series is refused with the remedy when the walk is asked for; a run computes it again."""
     sweep(KEPT, tmp_path, workers=1)

@@ -18,7 +18,7 @@ from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
 from warpchain.store.manifest import Manifest
 from warpchain.store.merged_file import merge
-from warpchain.store.sweep_result import SweepResult, load
+from warpchain.store.sweep_result import load
 from warpchain.sweeps.plan import load_sweep
 from warpchain.walks.rows import COLUMNS, STORED_COLUMNS, drawn_column, missing_rows
 from warpchain.walks.walk_result import load_walk
@@ -129,11 +129,7 @@ def test_missing_walks_are_counted(single: Path) -> None:
     assert 0 < failed < 30
     assert result.summary() == {"at_rest": 76 - failed, "time_limit": failed, "missing": 20}
     assert result.missing_count == 20 and result.unit("self_contact") == "1"
-    assert repr(result).splitlines() == [
-        f"<SweepResult synthetic: 96 walks, {76 - failed} at_rest, {failed} time_limit, 20 missing>",
-        "  <BlockResult main (links: 2, start: 2, self_contact: 2, frequency: 2, sample: 6): "
-        f"{76 - failed} at_rest, {failed} time_limit, 20 missing>",
-    ]
+    assert f"{failed} time_limit, 20 missing" in repr(result)
     assert {"dx", "phase_drawn", "statistics", "summary", "blocks"} <= set(dir(result))
 
 
@@ -215,22 +211,16 @@ def test_walks_as_a_table(folder: Path) -> None:
     assert table[table.block == "ellipse"].gravity.tolist() == np.repeat([1.6, 3.7, 9.8, 12.0, 24.8], 8).tolist()
 
 
-def same_result(one: SweepResult, other: SweepResult) -> bool:
-    """Whether two results have the same blocks, columns, axes and origin, to the bit."""
-    return (one.sweep, one.provenance, list(one.blocks)) == (other.sweep, other.provenance, list(other.blocks)) and all(
-        [(name, values.tobytes(), values.dtype) for name, values in {**ours.axes, **ours.columns}.items()]
-        == [(name, values.tobytes(), values.dtype) for name, values in {**theirs.axes, **theirs.columns}.items()]
-        for ours, theirs in zip(one.blocks.values(), other.blocks.values(), strict=True)
-        if not any(values.dtype.kind == "O" for values in ours.axes.values())
-    )
-
-
 def test_a_merged_file_is_read_like_a_folder(folder: Path, single: Path, tmp_path: Path) -> None:
     """The same result, which the commands show likewise."""
     for number, given in enumerate((folder, single)):
         path = tmp_path / f"{number}.h5"
         merge(given, path)
-        assert same_result(load(path), load(given))
+        one, other = load(path), load(given)
+        assert (one.sweep, one.provenance, list(one.blocks)) == (other.sweep, other.provenance, list(other.blocks))
+        for ours, theirs in zip(one.blocks.values(), other.blocks.values(), strict=True):
+            for name, values in {**ours.axes, **ours.columns}.items():
+                np.testing.assert_array_equal(values, {**theirs.axes, **theirs.columns}[name], err_msg=name)
         for command in ("info", "plot", "report"):
             with pytest.raises(SystemExit) as done:
                 main([command, str(path)])
