@@ -11,7 +11,6 @@ from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.loop.before_release import BeforeRelease
 from warpchain.loop.catenary import catenary_between
 from warpchain.loop.stationary_loop import LoopParameters, StationaryLoop, average_frames
-from warpchain.pictures.loop_figure import loop_figure
 
 SOFT = preset("soft")
 LENGTH = SOFT.link_length
@@ -108,7 +107,7 @@ def test_what_makes_no_mean_loop_is_refused() -> None:
     with pytest.raises(ValueError, match="no free part"):
         average_frames(before, LoopParameters.of(SOFT), np.zeros(2), radius)
     with pytest.raises(ValueError, match="record_before"):
-        loop_figure(make_walk())
+        make_walk().plot("loop")
 
 
 def test_the_catenary_is_one() -> None:

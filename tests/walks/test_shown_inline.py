@@ -17,10 +17,10 @@ PNG = b"\x89PNG\r\n\x1a\n"
 
 
 def test_a_walk_is_shown_with_numbers_and_picture() -> None:
-    """Rich HTML has status, distance and seed, and the picture that PNG has."""
+    """Rich HTML has status, distance and chain, and the picture that PNG has."""
     walk = make_walk()
     shown = walk._repr_html_()
-    for text in ("at_rest", "0.64 m", "30 links at 15 Hz", str(walk.seed), "data:image/png;base64,"):
+    for text in ("at_rest", "0.64 m", "30 links at 15 Hz", "data:image/png;base64,"):
         assert text in shown
     assert walk._repr_png_().startswith(PNG)
 
@@ -30,7 +30,7 @@ def test_a_sweep_is_shown_with_its_counts(tmp_path: Path, monkeypatch: pytest.Mo
     result = make_sweep(tmp_path, FIGURE_6)
     assert result._repr_png_().startswith(PNG) and result.plot()._repr_png_().startswith(PNG)
     shown = result._repr_html_()
-    for text in ("made &lt;up&gt; &amp; down", "at_rest", "links 60, 90", "frequency 5, 10", "samples 12", "<img"):
+    for text in ("made &lt;up&gt; &amp; down", "at_rest", "links: 5", "sample: 12", "<img"):
         assert text in shown
 
     def fail(self: Any) -> Figure:

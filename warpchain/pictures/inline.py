@@ -3,13 +3,11 @@
 import base64
 import html
 import io
-import itertools
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable
 from typing import Any, Final
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 NOTEBOOK_DPI: Final = 100
 """Resolution of a figure in a notebook [dots per inch]."""
@@ -46,20 +44,10 @@ def first_png(draws: Iterable[Callable[[], Any]]) -> bytes | None:
     return None
 
 
-def axes_text(axes: Mapping[str, NDArray[Any]], samples: int) -> str:
-    """Name and values of each axis, only the ends of many, and the number of samples."""
-    parts = []
-    for name, values in axes.items():
-        texts = [f"{value:g}" if values.dtype.kind == "f" else str(value) for value in values]
-        shown = ", ".join(texts) if len(texts) <= 6 else f"{texts[0]} … {texts[-1]} ({len(texts)} values)"
-        parts.append(f"{name} {shown}")
-    return "; ".join([*parts, f"samples {samples}"])
-
-
-def page(title: str, rows: Iterable[tuple[str, str]], picture: bytes | None) -> str:
-    """A fragment of HTML: a title, a table of names and values, and a picture (PNG) if there is one."""
-    shown = "" if picture is None else image(picture, title)
-    return f"<div><b>{html.escape(title)}</b>{table(('', ''), rows)}{shown}</div>"
+def fragment(text: str, picture: bytes | None) -> str:
+    """A fragment of HTML: lines of text, and a picture (PNG) if there is one."""
+    shown = "" if picture is None else image(picture, text.partition("\n")[0])
+    return f"<div><pre>{html.escape(text)}</pre>{shown}</div>"
 
 
 def image(content: bytes, text: str, width: str = "auto") -> str:
@@ -67,25 +55,3 @@ def image(content: bytes, text: str, width: str = "auto") -> str:
     data = base64.b64encode(content).decode()
     style = f"max-width:100%;width:{width}"
     return f'<img alt="{html.escape(text)}" style="{style}" src="data:image/png;base64,{data}">'
-
-
-def table(
-    head: Sequence[str], rows: Iterable[Sequence[str]], *, numeric: bool = False, marked: Iterable[bool] = ()
-) -> str:
-    """A table of texts in HTML.
-
-    Args:
-        head: one text for each column; if all are empty, the table has no head.
-        rows: as many texts each.
-        numeric: whether the texts are numbers.
-        marked: whether a row needs attention; none by default.
-    """
-
-    def cells(tag: str, texts: Sequence[str]) -> str:
-        return "".join(f'<{tag} style="text-align:{side}">{html.escape(text)}</{tag}>' for text in texts)
-
-    side = "right" if numeric else "left"
-    top = f"<thead><tr>{cells('th', head)}</tr></thead>" if any(head) else ""
-    kinds = itertools.chain((" class=bad" if bad else "" for bad in marked), itertools.repeat(""))
-    body = "\n".join(f"<tr{kind}>{cells('td', row)}</tr>" for row, kind in zip(rows, kinds, strict=False))
-    return f'<div class="wide"><table>{top}<tbody>\n{body}\n</tbody></table></div>'

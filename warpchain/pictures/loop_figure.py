@@ -10,7 +10,6 @@ from matplotlib.ticker import MaxNLocator
 
 from warpchain.loop.catenary import Catenary
 from warpchain.loop.stationary_loop import StationaryLoop
-from warpchain.pictures.inline import InlineFigure
 from warpchain.pictures.style import BLUE, FAINT, GREEN, GROUND, INK, tidy
 from warpchain.pictures.walk_shape import setting
 
@@ -26,7 +25,7 @@ IN_LINKS: Final = 2.0
 """The tension is shown this many links away from the sprocket: averages near it include links that touch it."""
 
 
-def loop_figure(walk: "WalkResult", *, figure: Figure | None = None) -> Figure:
+def draw_loop(walk: "WalkResult", figure: Figure) -> None:
     """The mean loop of a walk before its release, to scale, and its curvature and tension along the arc.
 
     Raises:
@@ -34,7 +33,6 @@ def loop_figure(walk: "WalkResult", *, figure: Figure | None = None) -> Figure:
     """
     loop = walk.mean_loop()
     hanging, kink = loop.catenary(), loop.kink()
-    figure = InlineFigure(figsize=(10.0, 6.4), layout="constrained") if figure is None else figure
     width, height = np.ptp(loop.position, axis=0)
     share = float(np.clip(0.56 * (width + 0.08) / (height + 0.08), 0.23, 0.42))
     left, right = np.asarray(figure.subfigures(1, 2, width_ratios=[share, 1 - share]))
@@ -43,7 +41,7 @@ def loop_figure(walk: "WalkResult", *, figure: Figure | None = None) -> Figure:
 
     _draw_shape(shape, loop, hanging, walk.sprocket_radius)
     x, y = (float(np.interp(kink.dip_at, loop.s, values)) for values in (loop.position - loop.center).T)
-    _mark(shape, x, y, "kink", beside=True)
+    _mark(shape, x, y, "kink")
     spread = 1e3 * float(loop.spread[loop.is_free].max())
     shape.set_title(f"{setting(walk)}\njoints within {spread:.2g} mm (s.d.)", fontsize="small", loc="left")
     tidy(shape)
@@ -64,7 +62,6 @@ def loop_figure(walk: "WalkResult", *, figure: Figure | None = None) -> Figure:
     pull.set(xlim=(loop.free[0] - 0.03, loop.free[1] + 0.03), ylabel="tension $T - \\rho v^2$ / N")
     pull.set_xlabel("arc length $s$ from the lowest point, along the motion / m")
     pull.set_ylim(bottom=min(0.0, 1.1 * float(loop.effective_tension[inside].min())))
-    return figure
 
 
 def _draw_shape(axes: Axes, loop: StationaryLoop, hanging: Catenary, sprocket_radius: float) -> None:
@@ -100,10 +97,7 @@ def _draw_lines(
     tidy(axes, grid="both")
 
 
-def _mark(axes: Axes, x: float, y: float, text: str, *, beside: bool = False) -> None:
-    """A small circle with a text below it, or to the right of it."""
+def _mark(axes: Axes, x: float, y: float, text: str) -> None:
+    """A small circle with a text to the right of it and below."""
     axes.plot([x], [y], marker="o", markersize=7.0, markerfacecolor="none", markeredgecolor=INK, zorder=5)
-    place: dict[str, Any] = (
-        {"xytext": (8, 0), "va": "center"} if beside else {"xytext": (0, -8), "ha": "center", "va": "top"}
-    )
-    axes.annotate(text, (x, y), textcoords="offset points", color=INK, fontsize="small", **place)
+    axes.annotate(text, (x, y), (8, -4), textcoords="offset points", va="top", color=INK, fontsize="small")

@@ -13,7 +13,7 @@ from warpchain.inputs.scene import floor_points
 from warpchain.pictures.chain import floor_height
 from warpchain.pictures.film_strip import film_strip
 from warpchain.pictures.inline import InlineFigure
-from warpchain.pictures.loop_figure import loop_figure
+from warpchain.pictures.loop_figure import draw_loop
 from warpchain.pictures.style import BLUE, DASHES, DOTS, FAINT, GREEN, INK, RED, tidy
 from warpchain.pictures.walk_shape import Kind, setting
 
@@ -30,20 +30,30 @@ def draw(walk: "WalkResult", kind: Kind, *, figure: Figure | None = None, ax: Ax
         raise ValueError(f"kind: {kind!r} is unknown; give {', '.join(map(repr, get_args(Kind)))}")
     if kind not in ("film_strip", "loop") and len(walk.time) == 0:
         raise ValueError(f"walk: it has no time series. {walk.status.sentence}")
-    if kind == "energy":
-        return energy_figure(walk, figure=figure, ax=ax)
-    if ax is not None:
+    if ax is not None and kind != "energy":
         raise ValueError(f"ax: {kind} has several axes; give an empty figure=, or a SubFigure of yours")
-    draws = {"film_strip": film_strip, "height_and_speed": height_and_speed, "loop": loop_figure, "tilt": tilt_figure}
-    return draws[kind](walk, figure=figure)
+    if ax is not None and figure is not None:
+        raise ValueError("ax: given together with figure; leave one out")
+    if kind == "film_strip":
+        return film_strip(walk, figure)
+    if ax is not None:
+        _energy(walk, ax)
+        return ax.figure.figure if isinstance(ax.figure, SubFigure) else ax.figure
+    sizes = {"height_and_speed": (6.4, 5.0), "loop": (10.0, 6.4), "energy": (6.4, 4.0), "tilt": (6.4, 5.0)}
+    figure = InlineFigure(figsize=sizes[kind], layout="constrained") if figure is None else figure
+    draws = {"height_and_speed": _height_and_speed, "loop": draw_loop, "tilt": _tilt}
+    if kind == "energy":
+        _energy(walk, figure.subplots())
+    else:
+        draws[kind](walk, figure)
+    return figure
 
 
-def height_and_speed(walk: "WalkResult", *, figure: Figure | None = None) -> Figure:
+def _height_and_speed(walk: "WalkResult", figure: Figure) -> None:
     """Height and horizontal speed of the centre of mass against time since the release, as in Figure 5.
 
     A thin line is the height of a floor that is not flat, below the centre of mass.
     """
-    figure = InlineFigure(figsize=(6.4, 5.0), layout="constrained") if figure is None else figure
     height, speed = figure.subplots(2, 1, sharex=True)
     height.plot(walk.time, walk.center[:, 1], color=BLUE, linewidth=1.4)
     speed.plot(walk.time, walk.center_velocity[:, 0], color=BLUE, linewidth=1.4)
@@ -54,23 +64,14 @@ def height_and_speed(walk: "WalkResult", *, figure: Figure | None = None) -> Fig
     else:
         height.plot(walk.time, floor_height(walk, walk.center[:, 0]), color=FAINT, linewidth=0.8)
     _finish(walk, height, speed)
-    return figure
 
 
-def energy_figure(walk: "WalkResult", *, figure: Figure | None = None, ax: Axes | None = None) -> Figure:
+def _energy(walk: "WalkResult", ax: Axes) -> None:
     """Energies of a walk against time, and what was lost by then.
 
     Lost is the energy at the release less that of the moment. The dot at the end is the sum of the ledger's losses,
     which counts each cause by itself: it lies on the line if the integration conserved energy.
-
-    Raises:
-        ValueError: figure and axes are given.
     """
-    if figure is not None and ax is not None:
-        raise ValueError("ax: given together with figure; leave one out")
-    if ax is None:
-        figure = InlineFigure(figsize=(6.4, 4.0), layout="constrained") if figure is None else figure
-        ax = figure.subplots()
     ledger, whole = walk.energy, walk.kinetic_energy + walk.gravitational_energy + walk.spring_energy
     released = ledger["kinetic_at_release"] + ledger["potential_at_release"]
     for name, values, color in (
@@ -85,10 +86,9 @@ def energy_figure(walk: "WalkResult", *, figure: Figure | None = None, ax: Axes 
     ax.set_ylabel("energy / J")
     ax.legend(frameon=False)
     _finish(walk, ax)
-    return ax.figure.figure if isinstance(ax.figure, SubFigure) else ax.figure
 
 
-def tilt_figure(walk: "WalkResult", *, figure: Figure | None = None) -> Figure:
+def _tilt(walk: "WalkResult", figure: Figure) -> None:
     """Tilt and yaw of the plane, and lateral drift of the centre of mass, against time.
 
     Marked are the moments at which the chain was first tilted by 45°, beyond which it has fallen over, and at which
@@ -99,7 +99,6 @@ def tilt_figure(walk: "WalkResult", *, figure: Figure | None = None) -> Figure:
     """
     if walk.joints_in_room is None:
         raise ValueError("walk: its plane is fixed, so it has no tilt; run it with plane: tilting")
-    figure = InlineFigure(figsize=(6.4, 5.0), layout="constrained") if figure is None else figure
     angles, drift = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     for limit in (-FALLEN, FALLEN):
         angles.axhline(limit, color=FAINT, linewidth=0.8, linestyle=DOTS)
@@ -118,7 +117,6 @@ def tilt_figure(walk: "WalkResult", *, figure: Figure | None = None) -> Figure:
     angles.legend(frameon=False, fontsize="small")
     figure.align_ylabels()
     _finish(walk, angles, drift)
-    return figure
 
 
 def _finish(walk: "WalkResult", *panels: Axes) -> None:

@@ -1,7 +1,8 @@
 """Building blocks of HTML pages that contain everything and load nothing."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
+from itertools import chain, repeat
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -56,6 +57,28 @@ def picture(figure: "Figure", caption: str) -> str:
     """A figure with its caption; the image is part of the HTML."""
     shown = image(png(figure, _DPI), caption, f"{round(96 * figure.get_figwidth())}px")
     return f"<figure>{shown}<figcaption>{escape(caption)}</figcaption></figure>"
+
+
+def table(
+    head: Sequence[str], rows: Iterable[Sequence[str]], *, numeric: bool = False, marked: Iterable[bool] = ()
+) -> str:
+    """A table of texts in HTML.
+
+    Args:
+        head: one text for each column; if all are empty, the table has no head.
+        rows: as many texts each.
+        numeric: whether the texts are numbers.
+        marked: whether a row needs attention; none by default.
+    """
+
+    def cells(tag: str, texts: Sequence[str]) -> str:
+        return "".join(f'<{tag} style="text-align:{side}">{escape(text)}</{tag}>' for text in texts)
+
+    side = "right" if numeric else "left"
+    top = f"<thead><tr>{cells('th', head)}</tr></thead>" if any(head) else ""
+    kinds = chain((" class=bad" if bad else "" for bad in marked), repeat(""))
+    body = "\n".join(f"<tr{kind}>{cells('td', row)}</tr>" for row, kind in zip(rows, kinds, strict=False))
+    return f'<div class="wide"><table>{top}<tbody>\n{body}\n</tbody></table></div>'
 
 
 _STYLE: Final = """

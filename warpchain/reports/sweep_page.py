@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from warpchain.files import checked_output, write_whole
 from warpchain.inputs.validation import short
-from warpchain.pictures.inline import table
 from warpchain.pictures.labels import axis_symbol, cell_text, cell_values, unit_text, value_text, with_unit
-from warpchain.reports.html_page import REPORTS, page, picture
+from warpchain.reports.html_page import REPORTS, page, picture, table
 from warpchain.status import Status
 from warpchain.store.block_result import BlockResult
 from warpchain.store.manifest import Folder

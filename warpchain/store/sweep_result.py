@@ -95,11 +95,9 @@ class SweepResult:
 
     def _repr_html_(self) -> str:
         """Walks by status, axes of each block, and the main figure."""
-        from warpchain.pictures.inline import axes_text, page
+        from warpchain.pictures.inline import fragment
 
-        blocks = [(f"block {name}", axes_text(each.axes, each.shape[-1])) for name, each in self.blocks.items()]
-        walks = f"{self.walk_count:,}: {counted(self.summary())}"
-        return page(f"Sweep {self.name}", [("walks", walks), ("seed", str(self.seed)), *blocks], self._repr_png_())
+        return fragment(repr(self), self._repr_png_())
 
     @property
     def walk_count(self) -> int:
