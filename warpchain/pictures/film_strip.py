@@ -130,11 +130,9 @@ def _link_colors(color: Array) -> tuple[Array, Array, Array]:
 
 
 def _instants(path: Array, width: float) -> list[int]:
-    """6 to 12 frames between which the centre of mass moves equally far, the first and the last among them.
+    """6 to 12 frames between which the centre of mass moves equally far along its path, the first and last among them.
 
-    Args:
-        path: centre of mass in each frame [m], shape (f, 3).
-        width: width of the chain in the first frame [m].
+    They are as many as stay legible with chains of this width [m] in the first frame.
     """
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
     marks = np.linspace(0.0, way[-1], int(np.clip(1 + way[-1] / (0.6 * width), 6, 12)))[1:-1]
@@ -142,16 +140,7 @@ def _instants(path: Array, width: float) -> list[int]:
 
 
 def _write_times(axes: Axes, times: Array, joints: Array, colors: Array, gap: float, inch: float) -> None:
-    """Write the time of each chain above its highest joint, higher where it would touch another text.
-
-    Args:
-        axes: the view from the side.
-        times: of k instants [s], shape (k,).
-        joints: joints x, y [m], shape (k, n, 2).
-        colors: of the chains, shape (k, 3).
-        gap: from a joint to the text [m].
-        inch: on paper [m].
-    """
+    """Write times [s] above the highest joints of k chains, (k, n, 2), by a gap [m], higher where texts would touch."""
     taken = np.array([text.get_position() for text in axes.texts]).reshape(-1, 2)
     for moment, chain, color in zip(times, joints, colors, strict=True):
         place = chain[np.argmax(chain[:, 1])] + (0.0, gap)

@@ -68,14 +68,10 @@ class Axis:
 
 @dataclass(frozen=True)
 class Panel:
-    """One panel.
+    """One panel: its x axis, the axis of its lines or the y axis of a map, and its cells.
 
-    Attributes:
-        kind: lines, or a map.
-        across: the x axis.
-        along: the axis of the lines, or the y axis of a map; None for a single line.
-        title: what else the cells have in common.
-        cells: their statistics; arrays of shape (values of `along`, values of `across`), of one row if it is None.
+    Arrays of the cells have shape (values of `along`, values of `across`), of one row if there is just one line; the
+    title says what else they have in common.
     """
 
     kind: Kind
@@ -329,19 +325,18 @@ def _draw_legends(
     """One legend of all panels; if their lines are of several axes, each panel has one of its own, too."""
     style: dict[str, Any] = {"frameon": False, "fontsize": "small"}
     dot: dict[str, Any] = {"marker": "o", "markersize": 3.5}
-    entries = {
-        name: [
-            Line2D([], [], color=color, label=text, **dot)
-            for color, text in zip(palette.values(), short_texts(list(palette)), strict=True)
+    handles: list[Line2D | Patch] = []
+    title = None
+    for name, palette in palettes.items():
+        texts = short_texts(list(palette))
+        lines = [
+            Line2D([], [], color=color, label=text, **dot) for color, text in zip(palette.values(), texts, strict=True)
         ]
-        for name, palette in palettes.items()
-    }
-    titles = {name: with_unit(math_symbol(name), unit_text(name)) for name in palettes}
-    for axes, panel in zip(areas, panels, strict=True):
-        if len(palettes) > 1 and panel.kind == "lines" and panel.along:
-            axes.legend(handles=entries[panel.along.name], title=titles[panel.along.name], **style)
-    (only,) = entries if len(entries) == 1 else (None,)
-    handles: list[Line2D | Patch] = [] if only is None else [*entries[only]]
+        if len(palettes) == 1:
+            handles, title = [*lines], with_unit(math_symbol(name), unit_text(name))
+        for axes, panel in zip(areas, panels, strict=True):
+            if len(palettes) > 1 and panel.kind == "lines" and panel.along and panel.along.name == name:
+                axes.legend(handles=lines, title=with_unit(math_symbol(name), unit_text(name)), **style)
     if any(panel.kind == "lines" for panel in panels):
         handles.append(Patch(color=(FAINT, _DEEP), linewidth=0, label="± standard error"))
     if any(panel.along is None for panel in panels):
@@ -354,5 +349,4 @@ def _draw_legends(
         beside = any(panel.along for panel in panels if panel.kind == "lines")
         place = {"loc": "outside right upper", "ncols": 1} if beside else {"loc": "outside upper right", "ncols": 2}
     if handles:
-        title = None if only is None else titles[only]
         (areas[0] if owner is None else owner).legend(handles=handles, title=title, **style, **place)

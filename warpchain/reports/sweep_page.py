@@ -6,7 +6,7 @@ the software; on demand also one walk in motion. The same folder always gives th
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from html import escape
 from typing import Any, Final
 
@@ -23,7 +23,7 @@ from warpchain.store.block_result import BlockResult
 from warpchain.store.manifest import Folder
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.version import VERSION
-from warpchain.walks.rows import fault_remedies
+from warpchain.walks.faults import FAULTS
 from warpchain.walks.walk_result import WalkResult
 
 Array = NDArray[Any]
@@ -32,7 +32,7 @@ FRAME_INTERVAL: Final = 2e-3
 """Time between two frames of the walk in motion [s]."""
 
 _MOST_LISTED: Final = 100
-"""Greatest number of failed walks of each status, and of inaccurate ones, that are listed one by one."""
+"""Greatest number of walks with the same status or fault that are listed one by one."""
 
 
 def write_report(
@@ -53,11 +53,15 @@ def write_report(
     """
     result = load(directory)
     checked_output(path, REPORTS)
+    columns = [block.columns["status"] for block in result.blocks.values()]
+    failed = [(each.label, each.sentence, [own == each for own in columns]) for each in Status if not each.ok]
+    faults = [block.faults for block in result.blocks.values()]
+    inaccurate = [(name, remedy, [own[name] for own in faults]) for name, remedy in FAULTS.items()]
     sections = {
         "Figures": _figures(result),
         "Cells": _cells(result),
-        "Failed walks": _failed(result),
-        "Inaccurate walks": _inaccurate(result),
+        "Failed walks": _listed(result, failed) or "<p>None.</p>",
+        "Inaccurate walks": _listed(result, inaccurate),
         "One walk": "" if animation_of is None else _walk(result, animation_of, device),
         "Sweep": _sweep(result),
         "Provenance": _provenance(result),
@@ -111,39 +115,25 @@ def _cells(result: SweepResult) -> str:
     return "\n".join(parts)
 
 
-def _failed(result: SweepResult) -> str:
-    """The failed walks by status, with the meaning of the status and what to try."""
-    parts = []
-    for status in Status:
-        chosen = [block.columns["status"] == status for block in result.blocks.values()]
-        count = sum(int(mask.sum()) for mask in chosen)
-        if not status.ok and count:
-            parts.append(f"<h3>{status.label}: {count:,}</h3><p>{escape(status.sentence)}</p>")
-            parts.append(_walk_table(result, chosen, count))
-    return "\n".join(parts) or "<p>None.</p>"
+def _listed(result: SweepResult, found: Iterable[tuple[str, str, Sequence[Array]]]) -> str:
+    """Walks with their block, cell and sample, of many only the first.
 
-
-def _inaccurate(result: SweepResult) -> str:
-    """The inaccurate walks, with what to try; empty if there is none."""
-    count = result.inaccurate_count
-    if not count:
-        return ""
-
-    remedies = fault_remedies(block.faults for block in result.blocks.values())
-    parts = [f"<p>{number:,}: {escape(remedy)}</p>" for remedy, number in remedies.items()]
-    chosen = [block.inaccurate for block in result.blocks.values()]
-    return "\n".join([*parts, _walk_table(result, chosen, count)])
-
-
-def _walk_table(result: SweepResult, chosen: Sequence[Array], count: int) -> str:
-    """A table of the chosen walks of each block with their cell and sample; of many only the first."""
-    several, rows = len(result.blocks) > 1, list[list[str]]()
-    for block, mask in zip(result.blocks.values(), chosen, strict=True):
-        for *place, sample in np.argwhere(mask)[: _MOST_LISTED - len(rows)]:
-            index, cell = block.columns["index"][(*place, sample)], cell_text(cell_values(block.axes, place)) or "–"
-            rows.append([f"{index}", *[block.name] * several, cell, f"{sample}"])
-    head = ["walk", *["block"] * several, "cell", "sample"]
-    return table(head, rows) + f"<p>… and {count - len(rows):,} more.</p>" * (count > len(rows))
+    Args:
+        result: the sweep.
+        found: a heading, what it means and what to try, and which walks of each block it is said of.
+    """
+    several, parts = len(result.blocks) > 1, []
+    for heading, sentence, chosen in found:
+        rows, count = list[list[str]](), sum(int(mask.sum()) for mask in chosen)
+        for block, mask in zip(result.blocks.values(), chosen, strict=True):
+            for *place, sample in np.argwhere(mask)[: _MOST_LISTED - len(rows)]:
+                index, cell = block.columns["index"][(*place, sample)], cell_text(cell_values(block.axes, place)) or "–"
+                rows.append([f"{index}", *[block.name] * several, cell, f"{sample}"])
+        if count:
+            parts.append(f"<h3>{heading}: {count:,}</h3><p>{escape(sentence)}</p>")
+            parts.append(table(["walk", *["block"] * several, "cell", "sample"], rows))
+            parts.append(f"<p>… and {count - len(rows):,} more.</p>" * (count > len(rows)))
+    return "\n".join(parts)
 
 
 def _walk(result: SweepResult, index: int, device: str | None) -> str:
