@@ -63,4 +63,4 @@ def test_null_is_nan_in_data_sets_and_a_name_in_figures(tmp_path: Path, command:
     assert [text.get_text() for text in result.plot().legends[0].get_texts()][:2] == ["null", "1"]
     assert all(picture.figure for picture in figures(result))
     assert command("report", "sweep").status == 0
-    assert "<td>null</td>" in (tmp_path / "sweep/report.html").read_text(encoding="utf-8")
+    assert ">null</td>" in (tmp_path / "sweep/report.html").read_text(encoding="utf-8")

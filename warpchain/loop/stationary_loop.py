@@ -22,7 +22,6 @@ from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import joint_radius, link_values
 from warpchain.inputs.setup import Setup
 from warpchain.loop.before_release import BeforeRelease
-from warpchain.loop.catenary import Catenary, catenary_between
 
 Array = NDArray[np.float64]
 
@@ -158,16 +157,6 @@ class StationaryLoop:
         near = np.flatnonzero(np.abs(self.s) < KINK_REACH * (self.free[1] - self.free[0]))
         peak, dip = near[np.argmax(self.curvature[near])], near[np.argmin(self.curvature[near])]
         return Kink(*(float(values[at]) for at in (peak, dip) for values in (self.curvature, self.s)))
-
-    def catenary(self) -> Catenary:
-        """The catenary between the ends of the free part and as long as it.
-
-        Raises:
-            ValueError: its length is not greater than the distance of its ends.
-        """
-        first, last = (np.array([np.interp(s, self.s, column) for column in self.position.T]) for s in self.free)
-        weight = self.parameters.density * self.parameters.gravity
-        return catenary_between(first, last, self.free[1] - self.free[0], weight)
 
 
 def average_loop(setup: Setup, before: BeforeRelease | None, center: Array | None) -> StationaryLoop:

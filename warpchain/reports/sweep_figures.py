@@ -44,9 +44,8 @@ _STARTS: Final = {
     "spinning": ("started spinning", BLUE, "s"),
 }
 """How the chain started → legend, colour, marker."""
-_OTHER_COLORS: Final = (BLUE, *LINE_COLORS[3:6], INK)
-_OTHER_MARKERS: Final = "s^vP*X"
-"""For further blocks of the same start."""
+_OTHERS: Final = (*zip((BLUE, *LINE_COLORS[3:6]), "^vP*", strict=True), *[(INK, "X")] * 100)
+"""Colour and marker of further blocks of the same start."""
 _MOST_PANELS: Final = 6
 """Up to so many numbers of links, each with a panel, Figure 6 shows; beyond, a figure of the grid does."""
 
@@ -122,9 +121,7 @@ def figure6(result: SweepResult) -> Picture:
             if values["start"] not in own:
                 label, color, marker = _STARTS[values["start"]]
                 if label in looks:  # of another block with this start
-                    label, marker = f"{block.name}, {label}", _OTHER_MARKERS[len(looks) % len(_OTHER_MARKERS)]
-                    used_colors = [look["color"] for look in looks.values()]
-                    color = next((each for each in _OTHER_COLORS if each not in used_colors), INK)
+                    label, (color, marker) = f"{block.name}, {label}", _OTHERS[len(looks) - 1]
                 own[values["start"]], looks[label] = label, {"color": color, "marker": marker}
             row = values["frequency"], float(found.mean[place]), float(found.sd[place])
             cells[values["links"]][own[values["start"]]].append(row)

@@ -72,15 +72,12 @@ def write_report(
 
 def _tiles(result: SweepResult) -> dict[str, tuple[int, str]]:
     """The numbers at the top of the page, see `page`."""
-    counts = result.summary()
-    rested, missing = counts[Status.AT_REST.label], counts["missing"]
-    planned = sum(counts.get(status.label, 0) for status in Status if status.ok) - rested
-    failed = result.walk_count - rested - planned - missing
-    tiles = {"walks": (result.walk_count, ""), "at rest": (rested, ""), "failed": (failed, "bad" if failed else "")}
-    tiles |= {"ended as planned, not at rest": (planned, "")} if planned else {}
+    ends = {status.label: status.ok for status in Status} | {"missing": True}
+    tiles = {"walks": (result.walk_count, "")}
+    for label, count in result.summary().items():
+        tiles |= {label.replace("_", " "): (count, "" if ends[label] else "bad")} if count else {}
     inaccurate = result.inaccurate_count
-    tiles |= {"inaccurate": (inaccurate, "bad")} if inaccurate else {}
-    return tiles | ({"not run yet": (missing, "")} if missing else {})
+    return tiles | ({"inaccurate": (inaccurate, "bad")} if inaccurate else {})
 
 
 def _figures(result: SweepResult) -> str:
@@ -203,14 +200,8 @@ def _sweep(result: SweepResult) -> str:
 
 def _provenance(result: SweepResult) -> str:
     """Seed, digest and versions of the software, and how to run the sweep again."""
-    software = ", ".join(f"{name} {number}" for name, number in result.provenance["versions"].items())
-    rows = [
-        ["seed", f"{result.seed}"],
-        ["digest of the sweep (SHA-256)", f"{result.provenance['digest']}"],
-        ["version of the numerics", f"{result.provenance['numerics_version']}"],
-        ["software that began the sweep", software],
-        ["software that wrote this page", f"warpchain {VERSION}"],
-    ]
+    rows = [[name, f"{value}"] for name, value in result.notes().items() if name != "sweep"]
+    rows.append(["this page", f"warpchain {VERSION}"])
     again = "<p>With the text under Sweep in a file: <code>warpchain sweep FILE.yaml -o DIR</code></p>"
     return table(["", ""], rows) + again
 
