@@ -9,12 +9,8 @@ import pytest
 
 import warpchain
 from tests.support.made_walks import assert_same, make_walk
-from warpchain.engine.batch import Batch
-from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import preset
 from warpchain.inputs.validation import InputError
 from warpchain.loop.before_release import FIELDS, BeforeRelease
-from warpchain.status import Status
 from warpchain.walks.one_walk import run_walk
 from warpchain.walks.walk_result import WalkResult
 
@@ -52,48 +48,6 @@ def test_they_end_with_the_release() -> None:
     np.testing.assert_allclose(before.center[-1], walk.center[0], atol=1e-3)
     kept = f"{-before.frame_time[0]:.3g} s, {len(before.time)} instants, {len(before.frame_time)} frames"
     assert repr(before) == f"<BeforeRelease: {kept}>"
-
-
-def test_loads_are_those_of_the_state() -> None:
-    """In a frame of a given state: F = k C + b dC/dt and f(ω' − ω) of every joint, by formulas of their own."""
-    links, parameters = 12, preset("soft")
-    rng = np.random.default_rng(3)
-    angle = -2 * np.pi * np.arange(links) / links
-    apothem = parameters.link_length / (2 * np.tan(np.pi / links))
-    position = np.stack([-apothem * np.sin(angle), apothem * np.cos(angle) + 1.0, angle], axis=1)
-    position += 1e-6 * rng.standard_normal(position.shape)
-    velocity = 0.1 * rng.standard_normal(position.shape)
-    batch = Batch(1, links, Options(method="dp5"), frame_every=1, keeps_loads=True)
-    batch.set_chain(0, parameters, links)
-    batch.load(0, position, velocity, stop_time=1.0, stop_status=Status.FINISHED)
-    batch.launch([0], batch.features(fixed_body="floor"), 1)
-    loads = batch.frame_loads(0)
-    time, joints = batch.drain_frames(0)
-    assert time[0] == 0.0
-    half = parameters.link_length / 2
-    pointing = np.exp(1j * position[:, 2])
-    middle, moving = position[:, 0] + 1j * position[:, 1], velocity[:, 0] + 1j * velocity[:, 1]
-    right, left = middle + half * pointing, middle - half * pointing
-    turning = 1j * half * pointing * velocity[:, 2]
-    opening = np.roll(left, -1) - right
-    rate = np.roll(moving - turning, -1) - (moving + turning)
-    force = parameters.joint_stiffness * opening + parameters.joint_damping * rate
-    np.testing.assert_allclose(joints[0, :, 0] + 1j * joints[0, :, 1], right, rtol=1e-12)
-    np.testing.assert_allclose(loads[0, :, 0] + 1j * loads[0, :, 1], force, rtol=1e-7)
-    spin = np.roll(velocity[:, 2], -1) - velocity[:, 2]
-    slip = np.tanh(spin / parameters.friction_smoothing)
-    moment = parameters.viscous_friction * spin + parameters.coulomb_friction * slip
-    np.testing.assert_allclose(loads[0, :, 2], moment, rtol=1e-9)
-
-
-def test_they_do_not_change_the_walk() -> None:
-    """With 0.2 s, with all that fits, with none and without frames, the walk is the same to the bit."""
-    plain = brief_walk(frame_interval=None)
-    assert plain.before_release is None and brief_walk(record_before=0.0).before_release is None
-    for settings in ({"record_before": 0.2}, {"record_before": 1e3, "frame_interval": 1e-3}, {"record_before": 0.0}):
-        walk = brief_walk(**settings)
-        assert walk.center.tobytes() == plain.center.tobytes()
-        assert (walk.steps_accepted, walk.steps_rejected) == (plain.steps_accepted, plain.steps_rejected)
 
 
 def test_impossible_times_are_refused() -> None:

@@ -1,7 +1,5 @@
 """Series and frames that a sweep keeps of its walks: what they are, that they survive, and who reads them."""
 
-import concurrent.futures
-import multiprocessing
 from pathlib import Path
 from typing import Any
 
@@ -133,14 +131,10 @@ def test_only_chosen_samples_are_kept(kept: Path) -> None:
 def test_workers_and_interruptions_leave_the_same_bytes(
     kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Threads, processes, and a run that was stopped by an error and resumed write the same shards."""
+    """Threads, and a run that was stopped by an error and resumed, write the same shards."""
     uninterrupted = data_of(kept)
     sweep(KEPT, tmp_path / "threads", workers=3)
     assert data_of(tmp_path / "threads") == uninterrupted
-    context = multiprocessing.get_context("spawn")
-    with concurrent.futures.ProcessPoolExecutor(2, mp_context=context) as processes:
-        sweep(KEPT, tmp_path / "processes", executor=processes, workers=2)
-    assert data_of(tmp_path / "processes") == uninterrupted
 
     def full(*arguments: object) -> None:
         if load(tmp_path / "stopped").missing_count == 13:

@@ -1,14 +1,11 @@
 """What a notebook shows of results and figures, without pyplot and without IPython's help."""
 
-import sys
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from matplotlib.figure import Figure
 
-import warpchain
 from tests.support.made_sweeps import FIGURE_6, make_sweep
 from tests.support.made_walks import make_unreleased, make_walk
 from warpchain.store.sweep_result import SweepResult
@@ -52,18 +49,3 @@ def test_energies_go_into_axes_of_the_caller() -> None:
         walk.plot("energy", ax=axes, figure=own)
     with pytest.raises(ValueError, match="it has no time series"):
         make_unreleased().plot("energy")
-
-
-def test_a_notebook_shows_that_a_walk_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One line in the output of the cell, which is updated until the walk is over."""
-    shown: list[str] = []
-
-    def update(content: dict[str, str], raw: bool, **_: bool) -> SimpleNamespace:
-        shown.append(content["text/plain"])
-        return SimpleNamespace(update=update)
-
-    kernel = SimpleNamespace(config={"IPKernelApp": {}})
-    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: kernel))
-    monkeypatch.setitem(sys.modules, "IPython.display", SimpleNamespace(display=update))
-    warpchain.walk(links=20, frequency=5.0, preset="soft", method="dp5", start="ellipse", walk_limit=0.02)
-    assert shown[0] == "compiling kernels" and shown[-1].startswith("walk: 0.02 s, ")

@@ -237,24 +237,6 @@ def test_a_time_outside_of_the_walk_has_no_state(fall: WalkResult, time: Any) ->
         fall.state(time)
 
 
-@pytest.mark.parametrize("settings", [ELLIPSE, SPUN], ids=["explicit", "hybrid"])
-def test_a_state_goes_on_with_the_chain_of_its_setup(settings: Mapping[str, Any]) -> None:
-    """A charm in the setup of a state, and one given beside the state, hang on the same chain."""
-    state = warpchain.walk(**settings).state(0.2)
-    charmed = state.setup.scene.model_copy(update={"charm_mass": 0.02})
-    put, given = (
-        warpchain.walk(start=start, walk_until=0.3, **beside)
-        for start, beside in (
-            (replace(state, setup=replace(state.setup, scene=charmed)), {}),
-            (state, {"charm_mass": 0.02}),
-        )
-    )
-    assert numbers(put) == numbers(given) and put.setup.scene.charm_mass == 0.02
-    gravity = state.parameters.gravity
-    added = 0.02 * gravity * state.position[state.setup.scene.charm_link, 1]
-    assert put.gravitational_energy[0] == pytest.approx(energy(state)[1] + added, rel=1e-9)
-
-
 def test_a_state_keeps_its_floor_in_simulate() -> None:
     """Unless another is given, the floor is that of the state's scene: a chain lies on its slope, not on y = 0."""
     state = warpchain.walk(**ELLIPSE, slope=10.0).state(0.3)

@@ -42,7 +42,7 @@ Kind = Literal["lines", "map"]
 MOST_LINES: Final = len(LINE_COLORS)
 """Greatest number of lines in a panel, unless lines are asked for."""
 MOST_PANELS: Final = 24
-"""Greatest number of panels of a block; of more, so many are chosen evenly."""
+"""Greatest number of panels of a block; of more, the first are shown."""
 _MOST_TICKS: Final = 8
 """Up to so many numbers have a tick each, if they are not too close."""
 _MOST_ROWS: Final = 16
@@ -145,8 +145,7 @@ def draw_grid(
         owner.supylabel(areas[0].get_ylabel(), fontsize="medium")
         areas[0].set_ylabel("")
     if owner is not None and left_out:
-        note = f"{len(panels)} of {len(panels) + left_out} panels, chosen evenly"
-        owner.suptitle(note, fontsize="medium", color=RED)
+        owner.suptitle(f"{len(panels)} of {len(panels) + left_out} panels", fontsize="medium", color=RED)
     if image is not None:
         maps = [axes for axes, panel in zip(areas, panels, strict=True) if panel.kind == "map"]
         areas[0].figure.colorbar(image, ax=maps, label=label).outline.set_visible(False)
@@ -172,9 +171,8 @@ def _all_panels(blocks: "Mapping[str, CellStatistics]", kind: Kind | None, x: st
             continue
         is_named = sum(set(own) == set(axes[name]) for own in axes.values()) > 1
         found = list(_panels(cells, kind, x, name if is_named else ""))
-        chosen = np.unique(np.linspace(0, len(found) - 1, MOST_PANELS).round().astype(int))
-        panels += [found[number] for number in chosen]
-        left_out += len(found) - len(chosen)
+        panels += found[:MOST_PANELS]
+        left_out += len(found[MOST_PANELS:])
     if not panels:
         needed = "two axes of several values" if kind == "map" else "an axis of several values"
         raise NothingToShow(f"a figure of a grid takes a block with {needed}; give a sweep that has one")
