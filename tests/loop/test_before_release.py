@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import warpchain
-from tests.support.made_walks import assert_same, make_walk
 from warpchain.inputs.validation import InputError
 from warpchain.loop.before_release import FIELDS, BeforeRelease
 from warpchain.walks.one_walk import run_walk
@@ -57,20 +56,6 @@ def test_impossible_times_are_refused() -> None:
             warpchain.walk(**BRIEF, record_before=wrong)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="frame_interval is None; give a frame_interval"):
         warpchain.walk(**BRIEF, record_before=0.1, frame_interval=None)
-
-
-def test_a_file_keeps_them(tmp_path: Path) -> None:
-    """Saved and loaded every number is the same to the bit; datasets say their unit."""
-    import h5py
-
-    walk = brief_walk(record_before=0.05)
-    walk.save(tmp_path / "walk.h5")
-    assert_same(walk, warpchain.load_walk(tmp_path / "walk.h5"))
-    with h5py.File(tmp_path / "walk.h5") as file:
-        for name, stored in FIELDS.items():
-            assert file["before_release"][stored.path(name)].attrs["unit"] == stored.unit
-    make_walk().save(tmp_path / "none.h5")
-    assert warpchain.load_walk(tmp_path / "none.h5").before_release is None
 
 
 def test_a_sweep_keeps_them(tmp_path: Path) -> None:

@@ -92,14 +92,6 @@ def test_html_is_complete_in_itself(make: Any, tmp_path: Path) -> None:
     assert f"<title>30 links, 15 Hz: \u0394x = {walk.dx:.3f} m{seen}</title>" in page
 
 
-def test_mp4_without_encoder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without the video extra an MP4 is refused in one line that says what to install."""
-    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    with pytest.raises(ImportError, match=r"pip install 'warpchain\[video\]'") as caught:
-        animate(make_walk(), tmp_path / "walk.mp4")
-    assert "\n" not in str(caught.value) and not list(tmp_path.iterdir())
-
-
 def test_mp4_frames(tmp_path: Path) -> None:
     """With the video extra an MP4 has a picture per tick of its clock, and its last one for 1.5 s."""
     ffmpeg = pytest.importorskip("imageio_ffmpeg")

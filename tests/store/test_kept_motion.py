@@ -16,7 +16,6 @@ from warpchain.inputs.validation import InputError, InputWarning
 from warpchain.reports.sweep_page import write_report
 from warpchain.run.sweep_run import sweep
 from warpchain.store.merged_file import merge
-from warpchain.store.shards import write_shard
 from warpchain.store.sweep_result import load
 from warpchain.walks.motion import Keep
 from warpchain.walks.scheduler import run_setups
@@ -126,28 +125,6 @@ def test_only_chosen_samples_are_kept(kept: Path) -> None:
     ):
         with pytest.raises(InputError, match=message):
             result.series(**at)
-
-
-def test_workers_and_interruptions_leave_the_same_bytes(
-    kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Threads, and a run that was stopped by an error and resumed, write the same shards."""
-    uninterrupted = data_of(kept)
-    sweep(KEPT, tmp_path / "threads", workers=3)
-    assert data_of(tmp_path / "threads") == uninterrupted
-
-    def full(*arguments: object) -> None:
-        if load(tmp_path / "stopped").missing_count == 13:
-            raise OSError(28, "No space left on device")
-        write_shard(*arguments)  # type: ignore[arg-type]
-
-    with monkeypatch.context() as patched:
-        patched.setattr("warpchain.run.sweep_run.write_shard", full)
-        with pytest.raises(OSError, match="No space left"):
-            sweep(KEPT, tmp_path / "stopped", workers=1)
-    assert load(tmp_path / "stopped").kept.sum() == 3  # walks 0, 3 and 5
-    sweep(KEPT, tmp_path / "stopped")
-    assert data_of(tmp_path / "stopped") == uninterrupted
 
 
 def test_damage_to_a_motion_is_seen(kept: Path, tmp_path: Path) -> None:

@@ -1,6 +1,5 @@
 """Results of sweeps: arrays with named axes, statistics, xarray, pandas, and the one merged file."""
 
-import json
 import math
 from pathlib import Path
 
@@ -182,19 +181,6 @@ def test_no_sweep_no_result(tmp_path: Path, single: Path) -> None:
     path.write_bytes(path.read_bytes()[:-1])
     with pytest.raises(InputError, match=f"{path}: damaged or cut short; delete it"):
         load(tmp_path)
-
-
-def test_one_block_as_a_data_set(single: Path) -> None:
-    """xarray gets names, coordinates, units, and what says how to make it again."""
-    result = load(single)
-    data = result.to_xarray()
-    assert data.dx.dims == ("links", "start", "self_contact", "frequency", "sample")
-    assert (
-        data.dx.sel(links=90, start="ellipse", self_contact=True, frequency=7.5, sample=5) == result.dx[1, 1, 1, 1, 5]
-    )
-    assert data.frequency.attrs["units"] == "Hz" and data.dx.attrs["units"] == "m"
-    assert data.attrs["walks_missing"] == 20 and data.attrs["digest"] == SINGLE.digest()
-    assert json.loads(data.attrs["sweep"]) == SINGLE.canonical() and int(data.attrs["seed"]) == SINGLE.seed
 
 
 def test_walks_as_a_table(folder: Path) -> None:

@@ -74,15 +74,6 @@ def test_rules_change_what_they_say() -> None:
     assert not any(values.alternates for values in (charm, stiff, graded, both)) and usual.alternates
 
 
-def test_means_and_sums_of_two_kinds_are_those_of_a_pair() -> None:
-    """To the bit, for any number of links; of unlike links they are NumPy's to rounding."""
-    pair = SOFT.inner_mass + SOFT.outer_mass
-    assert all(alternating(SOFT, links).total_mass == links // 2 * pair for links in range(4, 400, 2))
-    for links in (60, 61):
-        own = values_of(links, link_masses=np.linspace(1, 2, links), link_inertias=[1.0] * links)
-        assert own.total_mass == pytest.approx(1.5 * links, rel=1e-14)
-
-
 def test_an_odd_number_of_links_needs_links_of_one_kind_or_values_of_each() -> None:
     """61 links alike, or given one by one, make a chain, which walks."""
     for start in ("rest", "ellipse"):

@@ -13,9 +13,7 @@ import pytest
 
 from tests.support.made_walks import assert_same, make_unreleased, make_walk
 from warpchain.hdf5_files import hdf5_image
-from warpchain.inputs.setup import resolve
 from warpchain.status import Status
-from warpchain.version import FORMAT_VERSION
 from warpchain.walks.walk_result import ENERGIES, WalkResult, load_walk
 
 # Status
@@ -73,20 +71,6 @@ def test_round_trip(make: Callable[[], WalkResult], tmp_path: Path) -> None:
     walk.save(tmp_path / "walk.h5")
     assert_same(load_walk(tmp_path / "walk.h5"), walk)
     assert [path.name for path in tmp_path.iterdir()] == ["walk.h5"]
-
-
-def test_provenance(tmp_path: Path) -> None:
-    """The file says in JSON how to make the walk again."""
-    walk = make_walk()
-    walk.save(tmp_path / "walk.h5")
-    with h5py.File(tmp_path / "walk.h5") as file:
-        assert file.attrs["format"] == "warpchain walk" and file.attrs["format_version"] == FORMAT_VERSION
-        assert file.attrs["status"] == "at_rest"
-        setup = json.loads(file.attrs["setup"])
-        assert json.loads(file.attrs["seed"]) == walk.seed
-        assert json.loads(file.attrs["versions"]) == walk.versions
-    sections = {name: setup[name] for name in ("scene", "options", "parameters")}
-    assert resolve(setup["preset"], **sections) == walk.setup
 
 
 def _refused(path: Path) -> str:
