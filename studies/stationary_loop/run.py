@@ -16,8 +16,9 @@ import typer
 from matplotlib.figure import Figure
 
 import warpchain
-from studies.common import DASHES, RED, run_study, save_figure
+from studies.common import DASHES, GREEN, RED, run_study, save_figure
 from studies.stationary_loop.balances import imbalances
+from studies.stationary_loop.catenary import catenary_of
 from studies.stationary_loop.kinks import draw_kinks
 from studies.stationary_loop.theory import MeanLoop, NoSolutionError, TheoreticalLoop, predict
 
@@ -101,7 +102,7 @@ def show(name: str, walk: warpchain.WalkResult) -> None:
             print(row(which, loop, predict(loop, given)))
         except NoSolutionError as error:
             print(f"  {which:22} {error}")
-    print(row("catenary", loop, loop.catenary()))
+    print(row("catenary", loop, catenary_of(loop)))
     balances = (
         f"{key} {100 * found.rms:.1f} % ({100 * found.greatest:.1f} %)" for key, found in imbalances(loop).items()
     )
@@ -109,13 +110,16 @@ def show(name: str, walk: warpchain.WalkResult) -> None:
 
 
 def draw(walk: warpchain.WalkResult) -> Figure:
-    """The figure of a walk's loop with theory in it."""
+    """The figure of a walk's loop with theory and a catenary in it."""
     figure, loop = walk.plot("loop"), walk.mean_loop()
-    theory, style = predict(loop), {"color": RED, "linewidth": 1.3, "linestyle": DASHES, "zorder": 4}
     shape, bend, pull = figure.axes
-    shape.plot(*(theory.position - loop.center).T, **style)
-    bend.plot(theory.s, theory.curvature, label="theory", **style)
-    pull.plot(theory.s, theory.effective_tension, **style)
+    for name, curve, style in (
+        ("theory", predict(loop), {"color": RED, "linewidth": 1.3, "linestyle": DASHES, "zorder": 4}),
+        ("catenary, as long", catenary_of(loop), {"color": GREEN, "linewidth": 1.2}),
+    ):
+        shape.plot(*(curve.position - loop.center).T, **style)
+        bend.plot(curve.s, curve.curvature, label=name, **style)
+        pull.plot(curve.s, curve.effective_tension, **style)
     bend.legend(frameon=False, loc="upper left")
     return figure
 

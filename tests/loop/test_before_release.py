@@ -8,13 +8,8 @@ import numpy as np
 import pytest
 
 import warpchain
-from tests.support.made_walks import assert_same, make_walk
-from warpchain.engine.batch import Batch
-from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import preset
 from warpchain.inputs.validation import InputError
 from warpchain.loop.before_release import FIELDS, BeforeRelease
-from warpchain.status import Status
 from warpchain.walks.one_walk import run_walk
 from warpchain.walks.walk_result import WalkResult
 
@@ -54,58 +49,6 @@ def test_they_end_with_the_release() -> None:
     assert repr(before) == f"<BeforeRelease: {kept}>"
 
 
-def test_loads_are_those_of_the_state() -> None:
-    """In a frame of a given state: F = k C + b dC/dt and f(ω' − ω) of every joint, by formulas of their own."""
-    links, parameters = 12, preset("soft")
-    rng = np.random.default_rng(3)
-    angle = -2 * np.pi * np.arange(links) / links
-    apothem = parameters.link_length / (2 * np.tan(np.pi / links))
-    position = np.stack([-apothem * np.sin(angle), apothem * np.cos(angle) + 1.0, angle], axis=1)
-    position += 1e-6 * rng.standard_normal(position.shape)
-    velocity = 0.1 * rng.standard_normal(position.shape)
-    batch = Batch(1, links, Options(method="dp5"), frame_every=1, keeps_loads=True)
-    batch.set_chain(0, parameters, links)
-    batch.load(0, position, velocity, stop_time=1.0, stop_status=Status.FINISHED)
-    batch.launch([0], batch.features(fixed_body="floor"), 1)
-    loads = batch.frame_loads(0)
-    time, joints = batch.drain_frames(0)
-    assert time[0] == 0.0
-    half = parameters.link_length / 2
-    pointing = np.exp(1j * position[:, 2])
-    middle, moving = position[:, 0] + 1j * position[:, 1], velocity[:, 0] + 1j * velocity[:, 1]
-    right, left = middle + half * pointing, middle - half * pointing
-    turning = 1j * half * pointing * velocity[:, 2]
-    opening = np.roll(left, -1) - right
-    rate = np.roll(moving - turning, -1) - (moving + turning)
-    force = parameters.joint_stiffness * opening + parameters.joint_damping * rate
-    np.testing.assert_allclose(joints[0, :, 0] + 1j * joints[0, :, 1], right, rtol=1e-12)
-    np.testing.assert_allclose(loads[0, :, 0] + 1j * loads[0, :, 1], force, rtol=1e-7)
-    spin = np.roll(velocity[:, 2], -1) - velocity[:, 2]
-    slip = np.tanh(spin / parameters.friction_smoothing)
-    moment = parameters.viscous_friction * spin + parameters.coulomb_friction * slip
-    np.testing.assert_allclose(loads[0, :, 2], moment, rtol=1e-9)
-
-
-def test_they_do_not_change_the_walk() -> None:
-    """With 0.2 s, with all that fits, with none and without frames, the walk is the same to the bit."""
-    plain = brief_walk(frame_interval=None)
-    assert plain.before_release is None and brief_walk(record_before=0.0).before_release is None
-    for settings in ({"record_before": 0.2}, {"record_before": 1e3, "frame_interval": 1e-3}, {"record_before": 0.0}):
-        walk = brief_walk(**settings)
-        assert walk.center.tobytes() == plain.center.tobytes()
-        assert (walk.steps_accepted, walk.steps_rejected) == (plain.steps_accepted, plain.steps_rejected)
-
-
-def test_by_default_half_a_second_is_kept_with_frames() -> None:
-    """Frames bring 0.5 s of the time before; an ellipse has none, and a chain that was never released neither."""
-    before = brief_walk().before_release
-    assert before is not None and -0.5 <= before.frame_time[0] < -0.49
-    shape = warpchain.walk(**BRIEF | {"start": "ellipse", "links": 32})
-    assert shape.before_release is None and len(shape.frame_time)
-    held = warpchain.walk(**BRIEF, hold_limit=0.02)
-    assert held.status.label == "not_steady" and held.before_release is None
-
-
 def test_impossible_times_are_refused() -> None:
     """Negative, endless and no times, and a time without frames, each with the remedy."""
     for wrong in (-0.1, float("inf"), float("nan"), True, "long"):
@@ -113,20 +56,6 @@ def test_impossible_times_are_refused() -> None:
             warpchain.walk(**BRIEF, record_before=wrong)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="frame_interval is None; give a frame_interval"):
         warpchain.walk(**BRIEF, record_before=0.1, frame_interval=None)
-
-
-def test_a_file_keeps_them(tmp_path: Path) -> None:
-    """Saved and loaded every number is the same to the bit; datasets say their unit."""
-    import h5py
-
-    walk = brief_walk(record_before=0.05)
-    walk.save(tmp_path / "walk.h5")
-    assert_same(walk, warpchain.load_walk(tmp_path / "walk.h5"))
-    with h5py.File(tmp_path / "walk.h5") as file:
-        for name, stored in FIELDS.items():
-            assert file["before_release"][stored.path(name)].attrs["unit"] == stored.unit
-    make_walk().save(tmp_path / "none.h5")
-    assert warpchain.load_walk(tmp_path / "none.h5").before_release is None
 
 
 def test_a_sweep_keeps_them(tmp_path: Path) -> None:

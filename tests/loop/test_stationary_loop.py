@@ -1,4 +1,4 @@
-"""The loop on its sprocket: its mean against curves that are known, the catenary, and its figure."""
+"""The loop on its sprocket: its mean against curves that are known, and its figure."""
 
 import dataclasses
 
@@ -9,9 +9,7 @@ from tests.support.made_walks import make_walk
 from warpchain.inputs.parameters import preset
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.loop.before_release import BeforeRelease
-from warpchain.loop.catenary import catenary_between
 from warpchain.loop.stationary_loop import LoopParameters, StationaryLoop, average_frames
-from warpchain.pictures.loop_figure import loop_figure
 
 SOFT = preset("soft")
 LENGTH = SOFT.link_length
@@ -108,20 +106,4 @@ def test_what_makes_no_mean_loop_is_refused() -> None:
     with pytest.raises(ValueError, match="no free part"):
         average_frames(before, LoopParameters.of(SOFT), np.zeros(2), radius)
     with pytest.raises(ValueError, match="record_before"):
-        loop_figure(make_walk())
-
-
-def test_the_catenary_is_one() -> None:
-    """Between uneven ends: of the length asked for, with T_e cos φ constant, T_e κ = ρ g cos φ and κ the slope of φ."""
-    first, last = np.array([0.06, 0.01]), np.array([-0.055, -0.02])
-    for length in (0.125, 0.5, 2.0):
-        found = catenary_between(first, last, length, 2.5)
-        np.testing.assert_allclose(found.position[[0, -1]], [first, last], atol=1e-12)
-        steps = np.hypot(*np.diff(found.position, axis=0).T)
-        assert steps.sum() == pytest.approx(length, rel=1e-4) and np.ptp(found.s) == pytest.approx(length)
-        horizontal = found.effective_tension * np.cos(found.angle)
-        np.testing.assert_allclose(horizontal, horizontal[0], rtol=1e-12)
-        np.testing.assert_allclose(found.effective_tension * found.curvature, 2.5 * np.cos(found.angle))
-        np.testing.assert_allclose(np.gradient(found.angle, found.s)[1:-1], found.curvature[1:-1], rtol=3e-2)
-    with pytest.raises(ValueError, match="does not reach"):
-        catenary_between(first, last, 0.1, 2.5)
+        make_walk().plot("loop")

@@ -3,16 +3,7 @@
 import numpy as np
 import pytest
 
-from warpchain.inputs.validation import short
 from warpchain.pictures.labels import cell_text, short_texts
-
-
-@pytest.mark.parametrize(
-    ("value", "text"), [(1e-6, "1e-6"), (3e7, "3e7"), (1e-10, "1e-10"), (0.27, "0.27"), (60, "60"), (1e100, "1e100")]
-)
-def test_number_text(value: float, text: str) -> None:
-    """Numbers are written as people write them."""
-    assert short(value) == text
 
 
 @pytest.mark.parametrize(

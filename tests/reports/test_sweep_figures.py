@@ -1,6 +1,5 @@
 """Figures of sweeps, and the numbers that stand on them."""
 
-import math
 from pathlib import Path
 from typing import Any
 
@@ -9,16 +8,10 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
-from tests.support.made_sweeps import FIGURE_6, SENSITIVITY, TOLERANCE, distance, make_sweep
+from tests.support.made_sweeps import FIGURE_6, SENSITIVITY, distance, make_sweep
 from warpchain.pictures.style import GREEN, RED, NothingToShow, Picture
-from warpchain.reports.statistics import sensitivities, tolerance_agreement
-from warpchain.reports.sweep_figures import (
-    figure6,
-    figures,
-    sensitivity,
-    status_counts,
-    tolerance,
-)
+from warpchain.reports.sensitivity import sensitivities, sensitivity
+from warpchain.reports.sweep_figures import figure6, figures, status_counts
 from warpchain.status import Status
 from warpchain.store.sweep_result import SweepResult
 from warpchain.sweeps.plan import PlannedWalk
@@ -67,35 +60,28 @@ def panels(picture: Picture) -> list[Axes]:
     return [axes for axes in picture.figure.axes if axes.has_data() and axes.axison]
 
 
-def means(axes: Axes, color: str) -> dict[float, tuple[float, str]]:
-    """Position → mean and marker of the points of one colour in a panel."""
-    lines = [line for line in axes.lines if line.get_color() == color and line.get_marker() != "None"]
-    return {float(line.get_xdata()[0]): (float(line.get_ydata()[0]), str(line.get_marker())) for line in lines}
+def means(axes: Axes, color: str) -> dict[float, float]:
+    """Position → mean of the points of one colour in a panel."""
+    lines = [line for line in axes.lines if line.get_color() == color]
+    return {x: y for line in lines for x, y in np.asarray(line.get_xydata()).tolist() if np.isfinite(y)}
 
 
 # Figure 6
 
 
 def test_figure6_shows_means_boxes_and_bars(sweep6: SweepResult) -> None:
-    """The dot is the mean, the box one and the bar two standard deviations of the samples, each way."""
-    axes = panels(figure6(sweep6))[0]
+    """The dot is the mean, the box one and the bar two standard deviations; starts stand side by side."""
+    axes, *_, both, _ = panels(figure6(sweep6))
     expected = sweep6.blocks["rest"].dx[0]
     mean, sd = expected.mean(axis=-1), expected.std(axis=-1, ddof=1)
     dots = means(axes, RED)
     assert list(dots) == [5.0, 10.0, 15.0, 20.0, 25.0, 30.0]
-    np.testing.assert_allclose([value for value, _ in dots.values()], mean)
-    boxes = [patch for patch in axes.patches if isinstance(patch, Rectangle)][1::2]
+    np.testing.assert_allclose(list(dots.values()), mean)
+    boxes = [patch for patch in axes.patches if isinstance(patch, Rectangle)][6:]
     np.testing.assert_allclose([(box.get_y(), box.get_height()) for box in boxes], np.stack([mean - sd, 2 * sd], 1))
-    bars = [line.get_ydata() for line in axes.lines if len(line.get_xdata()) == 2]
+    bars = [path.vertices[:, 1] for path in axes.collections[0].get_paths()]  # type: ignore[index]
     np.testing.assert_allclose(bars, np.stack([mean - 2 * sd, mean + 2 * sd], 1))
-
-
-def test_figure6_tells_starts_apart(sweep6: SweepResult) -> None:
-    """Rest is red, ellipse green, with different markers, side by side about their common frequency."""
-    axes = panels(figure6(sweep6))[3]
-    rest, ellipse = means(axes, RED), means(axes, GREEN)
-    assert len(rest) == 6 and len(ellipse) == 5
-    assert {marker for _, marker in rest.values()} != {marker for _, marker in ellipse.values()}
+    rest, ellipse = means(both, RED), means(both, GREEN)
     np.testing.assert_allclose(np.add(list(rest)[1:], list(ellipse)) / 2, [10, 15, 20, 25, 30])
 
 
@@ -104,79 +90,8 @@ def test_figure6_counts_what_is_not_in_the_means(flawed6: SweepResult) -> None:
     first, second = panels(figure6(flawed6))
     assert first.get_xlabel() == "4 of 6 walks failed"
     assert second.get_xlabel() == "3 of 12 not run yet"
-    dots = means(first, RED)
-    assert list(dots) == [10.0]
-    np.testing.assert_allclose(dots[10.0][0], flawed6.blocks["rest"].dx[0, 0, 1:].mean())
+    assert means(first, RED) == {10.0: pytest.approx(flawed6.blocks["rest"].dx[0, 0, 1:].mean())}
     assert len(means(second, GREEN)) == 1
-
-
-# Maps
-
-
-# Tolerances
-
-
-def test_tolerance_numbers(tmp_path: Path) -> None:
-    """Single walks and means of cells are compared with their partners at the other tolerance."""
-    result = make_sweep(tmp_path, TOLERANCE)
-    agreement = tolerance_agreement(result)
-    loose, tight = result.dx[:, :, 0].reshape(4, 12), result.dx[:, :, 1].reshape(4, 12)
-    assert (agreement.loose, agreement.tight, agreement.lost) == (1e-6, 1e-9, 0)
-    np.testing.assert_allclose(agreement.differences, (loose / tight - 1).ravel())
-    ratios = loose.mean(axis=1) / tight.mean(axis=1) - 1
-    np.testing.assert_allclose([cell.difference for cell in agreement.cells], ratios)
-    errors = (loose - tight).std(axis=1, ddof=1) / 12**0.5 / tight.mean(axis=1)
-    np.testing.assert_allclose([cell.standard_error for cell in agreement.cells], errors)
-    assert f"means of a cell by at most {np.abs(ratios).max():.2%}" in str(agreement)
-    picture = tolerance(result)
-    left, right = picture.figure.axes
-    np.testing.assert_array_equal(left.collections[1].get_offsets(), np.stack([tight.ravel(), loose.ravel()], 1))
-    assert right.get_yticklabels()[0].get_text() == "n = 60, ν = 10 Hz"
-    assert picture.caption == str(agreement) and "48 walks at tolerances 1e-6 and 1e-9" in picture.caption
-
-
-def test_tolerance_leaves_out_incomplete_pairs(tmp_path: Path) -> None:
-    """A pair counts if both walks came to rest; the others are counted, on the figure as well."""
-    content = one_block(same_samples_along=["tolerance"], grid={"tolerance": [1e-9, 1e-7, 1e-6]})
-
-    def outcome(walk: PlannedWalk) -> float | Status | None:
-        return {1: Status.STEP_LIMIT, 2: None, 5: Status.NOT_FINITE, 8: Status.TIME_LIMIT}.get(
-            walk.index, distance(walk)
-        )
-
-    result = make_sweep(tmp_path, content, outcome)
-    agreement = tolerance_agreement(result)
-    assert agreement.lost == 3 and len(agreement.differences) == 1
-    assert agreement.differences[0] == result.dx[2, 3] / result.dx[0, 3] - 1
-    assert math.isnan(agreement.cells[0].standard_error) and agreement.cells[0].cell == "main"
-    assert "3 pairs are not complete" in tolerance(result).figure.axes[1].get_xlabel()
-    assert "3 more pairs" in str(agreement)
-
-
-@pytest.mark.parametrize(
-    ("content", "outcome", "problem"),
-    [
-        (one_block(grid={"tolerance": [1e-6, 1e-9]}), distance, "same_samples_along"),
-        (one_block(grid={"tolerance": [1e-6, 1e-9]}), lambda walk: Status.NOT_FINITE, "come to rest"),
-        (
-            one_block(
-                same_samples_along=["tolerance"],
-                blocks=[
-                    {"name": "a", "grid": {"tolerance": [1e-6, 1e-9]}},
-                    {"name": "b", "grid": {"tolerance": [1e-6, 1e-8]}},
-                ],
-            ),
-            distance,
-            "different tolerances",
-        ),
-    ],
-)
-def test_tolerance_compares_only_what_can_be_compared(
-    tmp_path: Path, content: dict[str, Any], outcome: Any, problem: str
-) -> None:
-    """Walks of other samples, or none at all, are not compared; the reason names the remedy."""
-    with pytest.raises(NothingToShow, match=problem):
-        tolerance_agreement(make_sweep(tmp_path, content, outcome))
 
 
 # Sensitivity
@@ -191,17 +106,12 @@ def test_sensitivity_is_scipys(saltelli: SweepResult) -> None:
         func = {"f_A": table[:1], "f_B": table[1:2], "f_AB": table[2:, None]}
         expected = stats.sobol_indices(func=func, n=64)
         spread = expected.bootstrap(n_resamples=500)
-        order = [saltelli.drawn.index(name) for name in cell.names]
-        np.testing.assert_allclose(cell.first_order, expected.first_order[order], atol=1e-12)
-        np.testing.assert_allclose(cell.total_order, expected.total_order[order], atol=1e-12)
-        for values, ends, theirs in (
-            (cell.first_order, cell.first_order_interval, spread.first_order.confidence_interval),
-            (cell.total_order, cell.total_order_interval, spread.total_order.confidence_interval),
-        ):
-            assert ((ends[:, 0] < values) & (values < ends[:, 1])).all()
-            widths = np.ptp(ends, axis=1) / (theirs.high - theirs.low)[order]
-            assert np.median(widths) == pytest.approx(1.0, abs=0.15)
-        assert list(cell.total_order) == sorted(cell.total_order, reverse=True)
+        np.testing.assert_allclose(cell.indices, [expected.first_order, expected.total_order], atol=1e-12)
+        low, high = np.moveaxis(cell.intervals, -1, 0)
+        assert ((low < cell.indices) & (cell.indices < high)).all()
+        theirs = [each.confidence_interval for each in (spread.first_order, spread.total_order)]
+        widths = (high - low) / [each.high - each.low for each in theirs]
+        np.testing.assert_allclose(np.median(widths, axis=1), 1.0, atol=0.15)
         assert (cell.samples, cell.lost) == (64, 0)
 
 
@@ -239,10 +149,8 @@ def test_figures_are_those_that_a_sweep_has_something_for(
     tmp_path: Path, sweep6: SweepResult, saltelli: SweepResult, flawed6: SweepResult
 ) -> None:
     """Each kind of sweep gives its own figures, all of which can be drawn; counts only if walks ended differently."""
-    compared = make_sweep(tmp_path / "a", TOLERANCE)
     for result, names in (
         (sweep6, ["distance"]),
-        (compared, ["tolerance"]),
         (saltelli, ["distance", "sensitivity"]),
         (flawed6, ["distance", "status_counts"]),
     ):

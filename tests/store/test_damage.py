@@ -3,8 +3,6 @@
 import os
 import random
 import shutil
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -124,23 +122,6 @@ def status_of(*arguments: object) -> int | str | None:
     with pytest.raises(SystemExit) as done:
         main([str(word) for word in arguments])
     return done.value.code
-
-
-def test_a_zeroed_sector_does_not_hang_the_command_line(tmp_path: Path) -> None:
-    """What made the HDF5 library loop for ever is refused at once: status 1 and one line."""
-    run(tmp_path / "sweep")
-    make_walk().save(tmp_path / "walk.h5")
-    shard = next((tmp_path / "sweep/shards").iterdir())
-    for path, words in ((shard, ("info", tmp_path / "sweep")), (tmp_path / "walk.h5", ("plot", tmp_path / "walk.h5"))):
-        whole = path.read_bytes()
-        starts = [start for start in range(0, 10 * SECTOR, SECTOR) if any(whole[start : start + SECTOR])]
-        assert len(starts) > 2
-        for start in starts[-2:]:
-            path.write_bytes(whole[:start] + bytes(SECTOR) + whole[start + SECTOR :])
-            command = [sys.executable, "-m", "warpchain", *map(str, words)]
-            done = subprocess.run(command, capture_output=True, encoding="utf-8", timeout=60)
-            assert done.returncode == 1 and done.stdout == ""
-            assert done.stderr.startswith(f"error: {path}: damaged or cut short") and done.stderr.count("\n") == 1
 
 
 # What is in a folder

@@ -1,7 +1,5 @@
 """Series and frames that a sweep keeps of its walks: what they are, that they survive, and who reads them."""
 
-import concurrent.futures
-import multiprocessing
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +16,6 @@ from warpchain.inputs.validation import InputError, InputWarning
 from warpchain.reports.sweep_page import write_report
 from warpchain.run.sweep_run import sweep
 from warpchain.store.merged_file import merge
-from warpchain.store.shards import write_shard
 from warpchain.store.sweep_result import load
 from warpchain.walks.motion import Keep
 from warpchain.walks.scheduler import run_setups
@@ -128,46 +125,6 @@ def test_only_chosen_samples_are_kept(kept: Path) -> None:
     ):
         with pytest.raises(InputError, match=message):
             result.series(**at)
-
-
-def test_workers_and_interruptions_leave_the_same_bytes(
-    kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Threads, processes, and a run that was stopped by an error and resumed write the same shards."""
-    uninterrupted = data_of(kept)
-    sweep(KEPT, tmp_path / "threads", workers=3)
-    assert data_of(tmp_path / "threads") == uninterrupted
-    context = multiprocessing.get_context("spawn")
-    with concurrent.futures.ProcessPoolExecutor(2, mp_context=context) as processes:
-        sweep(KEPT, tmp_path / "processes", executor=processes, workers=2)
-    assert data_of(tmp_path / "processes") == uninterrupted
-
-    def full(*arguments: object) -> None:
-        if load(tmp_path / "stopped").missing_count == 13:
-            raise OSError(28, "No space left on device")
-        write_shard(*arguments)  # type: ignore[arg-type]
-
-    with monkeypatch.context() as patched:
-        patched.setattr("warpchain.run.sweep_run.write_shard", full)
-        with pytest.raises(OSError, match="No space left"):
-            sweep(KEPT, tmp_path / "stopped", workers=1)
-    assert load(tmp_path / "stopped").kept.sum() == 3  # walks 0, 3 and 5
-    sweep(KEPT, tmp_path / "stopped")
-    assert data_of(tmp_path / "stopped") == uninterrupted
-
-
-def test_a_walk_that_was_never_released_has_no_motion(tmp_path: Path) -> None:
-    """It is kept with no instants, breaks nothing, and is in no picture."""
-    scene = {"start": "spinning", "hold_limit": 0.02, "frequency": 12.0}
-    result = sweep(TINY | {"samples": 2, "grid": {"links": [60]}, "scene": scene, "record": {"series": True}}, tmp_path)
-    assert result.summary()["not_steady"] == 2
-    walk = result.series(sample=1)
-    assert (walk.time.shape, walk.center.shape, walk.frame_joints.shape[0]) == ((0,), (0, 2), 0)
-    assert walk.sprocket_center is None and np.isnan(walk.dx)
-    with pytest.raises(ValueError, match="no time series"):
-        walk.plot()
-    merge(tmp_path, tmp_path / "merged.h5")
-    assert load(tmp_path / "merged.h5").series(sample=1).time.shape == (0,)
 
 
 def test_damage_to_a_motion_is_seen(kept: Path, tmp_path: Path) -> None:

@@ -57,6 +57,7 @@ def test_samples_of_several_folders_are_put_together(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("given", "message"),
     [
+        (content(), "has walks that a has, of seed 7"),
         (content(samples=5), "has walks that a has, of seed 7"),
         (content(seed=8, grid={"links": [60, 90], "frequency": [5, 12]}), "is not the sweep of"),
         (content(seed=8, options={"tolerance": 1e-5}), "is not the sweep of"),
@@ -80,18 +81,6 @@ def test_folders_that_do_not_fit_are_refused(
     assert "error: b: " in error and message in error and "\n" not in error
     assert not (tmp_path / "both.h5").exists()
     assert yaml.safe_load((tmp_path / "b/sweep.yaml").read_text())["name"] == "small"
-
-
-def test_a_folder_given_twice_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its walks would be counted twice, whatever the path that leads to it again."""
-    make_sweep(tmp_path / "a", content())
-    (tmp_path / "link").symlink_to("a")
-    monkeypatch.chdir(tmp_path)
-    folder = Path("a")
-    for again in (folder, "a", "./a", tmp_path / "a", Path("link")):
-        with pytest.raises(InputError, match=f"^{again}: given twice; give each folder once$"):
-            merge_folders([folder, again], "both.h5")
-    assert not Path("both.h5").exists()
 
 
 def test_parts_of_one_grid_are_the_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

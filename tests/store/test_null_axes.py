@@ -63,21 +63,4 @@ def test_null_is_nan_in_data_sets_and_a_name_in_figures(tmp_path: Path, command:
     assert [text.get_text() for text in result.plot().legends[0].get_texts()][:2] == ["null", "1"]
     assert all(picture.figure for picture in figures(result))
     assert command("report", "sweep").status == 0
-    assert "<td>null</td>" in (tmp_path / "sweep/report.html").read_text(encoding="utf-8")
-
-
-def test_blocks_with_and_without_null_share_a_figure(tmp_path: Path) -> None:
-    """An axis of numbers in one block and with null in another is drawn as it is in each: along x and as lines."""
-    grids = [{"load_factor": [None, 1]}, {"load_factor": [1, 2]}]
-    grids += [{**grid, "links": [60, 70]} for grid in grids]
-    numbered = [{"name": f"b{number}", "grid": grid} for number, grid in enumerate(grids)]
-    result = make_sweep(tmp_path, {key: TINY[key] for key in TINY if key != "grid"} | {"blocks": numbered, "scene": {}})
-    assert len(list(figures(result))) > 1 and len(result.plot().axes) == 4
-
-
-def test_null_where_a_field_has_no_null_is_refused(tmp_path: Path) -> None:
-    """In one line, before a folder is made."""
-    for name in ("links", "frequency", "floor_friction", "tolerance"):
-        with pytest.raises(InputError, match=rf"^sweep\.grid\.{name}\[0\]: "):
-            warpchain.sweep(TINY | {"grid": {name: [None]}}, tmp_path / "a")
-    assert not (tmp_path / "a").exists()
+    assert ">null</td>" in (tmp_path / "sweep/report.html").read_text(encoding="utf-8")

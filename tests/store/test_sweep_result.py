@@ -1,9 +1,6 @@
 """Results of sweeps: arrays with named axes, statistics, xarray, pandas, and the one merged file."""
 
-import json
 import math
-import subprocess
-import sys
 from pathlib import Path
 
 import h5py
@@ -18,7 +15,7 @@ from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
 from warpchain.store.manifest import Manifest
 from warpchain.store.merged_file import merge
-from warpchain.store.sweep_result import SweepResult, load
+from warpchain.store.sweep_result import load
 from warpchain.sweeps.plan import load_sweep
 from warpchain.walks.rows import COLUMNS, STORED_COLUMNS, drawn_column, missing_rows
 from warpchain.walks.walk_result import load_walk
@@ -75,19 +72,18 @@ def test_arrays_have_named_axes(folder: Path) -> None:
 
 def test_the_layout_is_that_of_the_sweep(tmp_path: Path) -> None:
     """A real sweep's walks are found where they were planned, and its copy in the folder is the same sweep."""
-    sweep = load_sweep(
+    grid = {"preset": ["soft", "paper"], "method": ["dp5", "bs32"], "self_contact": [True, False]}
+    blocks = [
+        {"name": "rest", "samples": 2, "grid": {"links": [60, 90], "frequency": [5, 10, 15]}},
         {
-            "version": 1,
-            "name": "real",
-            "seed": 3,
-            "preset": "soft",
-            "blocks": [
-                {"name": "rest", "samples": 2, "grid": {"links": [60, 90], "frequency": [5, 10, 15]}},
-                {"name": "methods", "samples": 1, "scene": {"start": "ellipse"}, "distributions": {"all": "fixed"}}
-                | {"grid": {"preset": ["soft", "paper"], "method": ["dp5", "bs32"], "self_contact": [True, False]}},
-            ],
-        }
-    )
+            "name": "methods",
+            "samples": 1,
+            "scene": {"start": "ellipse"},
+            "distributions": {"all": "fixed"},
+            "grid": grid,
+        },
+    ]
+    sweep = load_sweep({"version": 1, "name": "real", "seed": 3, "preset": "soft", "blocks": blocks})
     with SweepFolder.open(tmp_path, sweep, shard_size=5) as store:
         for shard in store.missing():
             rows = missing_rows(shard.kind, shard.keys)
@@ -129,11 +125,7 @@ def test_missing_walks_are_counted(single: Path) -> None:
     assert 0 < failed < 30
     assert result.summary() == {"at_rest": 76 - failed, "time_limit": failed, "missing": 20}
     assert result.missing_count == 20 and result.unit("self_contact") == "1"
-    assert repr(result).splitlines() == [
-        f"<SweepResult synthetic: 96 walks, {76 - failed} at_rest, {failed} time_limit, 20 missing>",
-        "  <BlockResult main (links: 2, start: 2, self_contact: 2, frequency: 2, sample: 6): "
-        f"{76 - failed} at_rest, {failed} time_limit, 20 missing>",
-    ]
+    assert f"{failed} time_limit, 20 missing" in repr(result)
     assert {"dx", "phase_drawn", "statistics", "summary", "blocks"} <= set(dir(result))
 
 
@@ -191,19 +183,6 @@ def test_no_sweep_no_result(tmp_path: Path, single: Path) -> None:
         load(tmp_path)
 
 
-def test_one_block_as_a_data_set(single: Path) -> None:
-    """xarray gets names, coordinates, units, and what says how to make it again."""
-    result = load(single)
-    data = result.to_xarray()
-    assert data.dx.dims == ("links", "start", "self_contact", "frequency", "sample")
-    assert (
-        data.dx.sel(links=90, start="ellipse", self_contact=True, frequency=7.5, sample=5) == result.dx[1, 1, 1, 1, 5]
-    )
-    assert data.frequency.attrs["units"] == "Hz" and data.dx.attrs["units"] == "m"
-    assert data.attrs["walks_missing"] == 20 and data.attrs["digest"] == SINGLE.digest()
-    assert json.loads(data.attrs["sweep"]) == SINGLE.canonical() and int(data.attrs["seed"]) == SINGLE.seed
-
-
 def test_walks_as_a_table(folder: Path) -> None:
     """pandas gets one row for each walk, with block, axes, sample and all that any block draws."""
     table = load(folder).to_pandas()
@@ -215,22 +194,16 @@ def test_walks_as_a_table(folder: Path) -> None:
     assert table[table.block == "ellipse"].gravity.tolist() == np.repeat([1.6, 3.7, 9.8, 12.0, 24.8], 8).tolist()
 
 
-def same_result(one: SweepResult, other: SweepResult) -> bool:
-    """Whether two results have the same blocks, columns, axes and origin, to the bit."""
-    return (one.sweep, one.provenance, list(one.blocks)) == (other.sweep, other.provenance, list(other.blocks)) and all(
-        [(name, values.tobytes(), values.dtype) for name, values in {**ours.axes, **ours.columns}.items()]
-        == [(name, values.tobytes(), values.dtype) for name, values in {**theirs.axes, **theirs.columns}.items()]
-        for ours, theirs in zip(one.blocks.values(), other.blocks.values(), strict=True)
-        if not any(values.dtype.kind == "O" for values in ours.axes.values())
-    )
-
-
 def test_a_merged_file_is_read_like_a_folder(folder: Path, single: Path, tmp_path: Path) -> None:
     """The same result, which the commands show likewise."""
     for number, given in enumerate((folder, single)):
         path = tmp_path / f"{number}.h5"
         merge(given, path)
-        assert same_result(load(path), load(given))
+        one, other = load(path), load(given)
+        assert (one.sweep, one.provenance, list(one.blocks)) == (other.sweep, other.provenance, list(other.blocks))
+        for ours, theirs in zip(one.blocks.values(), other.blocks.values(), strict=True):
+            for name, values in {**ours.axes, **ours.columns}.items():
+                np.testing.assert_array_equal(values, {**theirs.axes, **theirs.columns}[name], err_msg=name)
         for command in ("info", "plot", "report"):
             with pytest.raises(SystemExit) as done:
                 main([command, str(path)])
@@ -253,25 +226,6 @@ def test_merged_file_of_one_block(single: Path, tmp_path: Path) -> None:
             assert notes == {key: np.array(value).tolist() for key, value in expected[name].attrs.items()}, name
         mean = data.dx.where(data.status == 1).mean("sample")
         np.testing.assert_allclose(mean, load(single).statistics().mean)
-
-
-def test_a_merge_that_fails_leaves_the_older_file(folder: Path, single: Path, tmp_path: Path) -> None:
-    """In a process that may write small files only, one line names the file; what was there stays."""
-    path = tmp_path / "merged.h5"
-    merge(single, path)
-    older = path.read_bytes()
-    program = (
-        "import resource, sys\n"
-        "from warpchain.cli.main import main\n"
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (30000, 30000))\n"
-        "main(['merge', *sys.argv[1:]])\n"
-    )
-    done = subprocess.run([sys.executable, "-c", program, folder, path], capture_output=True, encoding="utf-8")
-    assert done.returncode == 1 and done.stderr.count("\n") == 1
-    assert done.stderr.startswith(f"error: {path}: cannot be written (File too large); make room")
-    assert path.read_bytes() == older and list(tmp_path.iterdir()) == [path]
-    with pytest.raises(OSError, match=r"cannot be written \(No such file or directory\); give a folder that is there"):
-        merge(folder, tmp_path / "none" / "merged.h5")
 
 
 def test_a_merged_file_replaces_another_only(folder: Path, single: Path, tmp_path: Path) -> None:

@@ -10,9 +10,9 @@ import pytest
 import warpchain
 from studies.stationary_loop import run
 from studies.stationary_loop.balances import imbalances
+from studies.stationary_loop.catenary import catenary_between
 from studies.stationary_loop.kinks import draw_kinks
 from studies.stationary_loop.theory import End, predict, solve
-from warpchain.loop.catenary import catenary_between
 
 
 @cache
@@ -102,12 +102,28 @@ def test_a_simulated_loop_is_what_theory_predicts() -> None:
 
 
 def test_figures_have_theory_and_kinks(tmp_path: Path) -> None:
-    """The figure of a loop has a third line in each panel; kinks of a sweep are drawn by links and frequency."""
+    """The figure of a loop has two lines more in each panel; kinks of a sweep are drawn by links and frequency."""
     walk = held_walk()
     pairs = zip(run.draw(walk).axes, walk.plot("loop").axes, strict=True)
-    assert [len(axes.lines) - len(plain.lines) for axes, plain in pairs] == [1, 1, 1]
+    assert [len(axes.lines) - len(plain.lines) for axes, plain in pairs] == [2, 2, 2]
     frames = {"series": True, "frames": {"samples": [0], "before": 0.2}}
     grid = {"links": [40], "frequency": [12.0, 14.0]}
     settings = {"preset": "soft", "scene": {"start": "spinning", "further_hold": 0.5, "walk_limit": 0.05}}
     result = warpchain.sweep(grid=grid, samples=1, record=frames, out=tmp_path / "kinks", progress=False, **settings)
     assert [line.get_xdata().tolist() for line in draw_kinks(result).axes[1].lines] == [[12.0, 14.0]]
+
+
+def test_the_catenary_is_one() -> None:
+    """Between uneven ends: of the length asked for, with T_e cos φ constant, T_e κ = ρ g cos φ and κ the slope of φ."""
+    first, last = np.array([0.06, 0.01]), np.array([-0.055, -0.02])
+    for length in (0.125, 0.5, 2.0):
+        found = catenary_between(first, last, length, 2.5)
+        np.testing.assert_allclose(found.position[[0, -1]], [first, last], atol=1e-12)
+        steps = np.hypot(*np.diff(found.position, axis=0).T)
+        assert steps.sum() == pytest.approx(length, rel=1e-4) and np.ptp(found.s) == pytest.approx(length)
+        horizontal = found.effective_tension * np.cos(found.angle)
+        np.testing.assert_allclose(horizontal, horizontal[0], rtol=1e-12)
+        np.testing.assert_allclose(found.effective_tension * found.curvature, 2.5 * np.cos(found.angle))
+        np.testing.assert_allclose(np.gradient(found.angle, found.s)[1:-1], found.curvature[1:-1], rtol=3e-2)
+    with pytest.raises(ValueError, match="does not reach"):
+        catenary_between(first, last, 0.1, 2.5)

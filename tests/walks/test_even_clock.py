@@ -4,7 +4,7 @@ import numpy as np
 
 import warpchain
 from warpchain.kernels import layout
-from warpchain.walks.even_clock import EvenClock, between
+from warpchain.walks.even_clock import between
 
 ELLIPSE = {"links": 36, "frequency": 20.0, "start": "ellipse", "preset": "soft", "method": "dp5"}
 
@@ -44,17 +44,6 @@ def test_a_jump_of_the_velocity_shifts_a_place_by_an_eighth_of_it_at_most() -> N
     true = 1.0 - 0.2 * times + jump * np.maximum(0.0, times - impact)
     assert np.abs(rows[:, layout.CENTER_Y] - true).max() <= jump * span / 8
     assert (rows[:, layout.CENTER_V] >= -0.2).all() and (rows[:, layout.CENTER_V] <= 0.2).all()
-
-
-def test_rows_do_not_depend_on_how_samples_are_cut() -> None:
-    """Samples taken at once, one by one or in uneven pieces give the same rows: the first sample, then every mark."""
-    times = np.concatenate([[0.0], np.cumsum(np.random.default_rng(2).uniform(0.2e-3, 2.5e-3, 200))])
-    samples = made_samples(times, layout.SAMPLE_COLUMNS)
-    whole = EvenClock(1e-3, layout.SAMPLE_COLUMNS).rows(samples)
-    assert (whole[:, layout.TIME] == np.arange(len(whole)) * 1e-3).all() and len(whole) == int(times[-1] / 1e-3) + 1
-    for cuts in (range(1, 201), (3, 4, 90, 91, 92)):
-        clock = EvenClock(1e-3, layout.SAMPLE_COLUMNS)
-        assert np.concatenate([clock.rows(piece) for piece in np.split(samples, cuts)]).tobytes() == whole.tobytes()
 
 
 def test_a_walk_has_its_series_at_every_millisecond() -> None:

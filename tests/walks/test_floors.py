@@ -13,7 +13,6 @@ from warpchain import Status
 from warpchain.inputs.floor import distances
 from warpchain.pictures.animation import player
 from warpchain.pictures.chain import floor_line
-from warpchain.sweeps.plan import load_sweep
 
 STEP = [[-1.0, 0.0], [0.1, 0.0], [0.1, -0.05], [1.0, -0.05]]
 
@@ -68,21 +67,3 @@ def test_a_profile_survives_files_and_is_drawn(tmp_path: Path) -> None:
     assert drawn[1:4] == [[-10000, 0], [1000, 0], [1000, -500]]
     low = loaded.plot("film_strip").axes[0].get_ylim()[0]
     assert low < -0.05
-
-
-def test_a_slope_is_an_axis_and_is_drawn_at_random_and_a_profile_is_a_value_of_a_sweep() -> None:
-    """Every walk has the slope of its cell or its draw; a sweep with a profile is that of its canonical form."""
-    content = {"version": 1, "name": "floors", "seed": 1, "preset": "soft", "samples": 2}
-    blocks = [
-        {"name": "axis", "grid": {"slope": [-5, 0, 5]}},
-        {"name": "draw", "distributions": {"slope": {"uniform": [1, 2]}}},
-        {"name": "step", "scene": {"floor": STEP}},
-    ]
-    sweep = load_sweep(content | {"blocks": blocks})
-    axis, drawn = (
-        [sweep.planned(index).setup.scene.slope for index in block.indices.ravel()] for block in sweep.blocks[:2]
-    )
-    assert axis == [-5, -5, 0, 0, 5, 5] and all(1 < slope < 2 for slope in drawn)
-    again = load_sweep(json.loads(json.dumps(sweep.canonical())))
-    last = sweep.blocks[2].indices.flat[0]
-    assert again.digest() == sweep.digest() and again.planned(last).setup == sweep.planned(last).setup

@@ -99,11 +99,8 @@ def test_a_walk_goes_on_when_the_sprocket_has_vanished(settings: dict[str, Any])
         ([[0.1, 0, 0, 0]], {"start": "ellipse"}, "release: a motion of the sprocket, which start: ellipse"),
         ([[0.1, 0, 0, 0]], {"plane": "tilting"}, "release: a motion of the sprocket, which plane: tilting"),
         ([[0.1, 0, 0]], {}, r"row 0, \[0.1, 0, 0\], is not four numbers"),
-        ([[0.1, 0, 0, 0], [0.1, 0, 0, 0]], {}, "row 1: 0.1 s is not after 0.1 s"),
         ([[0.0, 0, 0, 0]], {}, "row 0: 0 s is not after 0 s"),
-        ([[0.1, 1e9, 0, 0]], {}, "is not within"),
         ([], {}, "0 rows; give 1 to 16"),
-        ("lift", {}, "release"),
         ([[0.2, 0.0, -0.5, 8.0]], {}, r"scene\.release: y = -0\.5 m takes the sprocket through the floor"),
     ],
 )

@@ -2,14 +2,12 @@
 
 import dataclasses
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import warpchain
-from tests.support.made_walks import assert_same, make_walk
 from warpchain.inputs.validation import InputError
 from warpchain.walks.walk_result import WalkResult
 
@@ -120,28 +118,3 @@ def test_standard_is_explicit_where_loads_are_recorded() -> None:
     for settings in ({"method": "hybrid"}, {"setup": rigid.setup}):
         with pytest.raises(InputError, match=refusal):
             warpchain.walk(**settings, record_loads=True)
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"record_loads": True, "frame_interval": None}, "record_loads: loads are kept with frames, .*; give one"),
-        ({"record_loads": 1}, "record_loads: 1 is not a truth value; give True or False"),
-        (
-            {"record_loads": True, "frame_interval": 9e-7},
-            "frame_interval: 9e-07 is not between 1e-06 s and 1000.0 s; .*",
-        ),
-    ],
-)
-def test_what_cannot_be_recorded_is_refused(settings: dict[str, Any], message: str) -> None:
-    """One line names the field and the remedy."""
-    with pytest.raises(InputError, match=message):
-        warpchain.walk(**FLIGHT, **settings)
-
-
-def test_files_keep_loads(tmp_path: Path) -> None:
-    """Loads come back to the bit, with their units; without them they are empty."""
-    for name, walk in (("loads", flight(ellipse_aspect=1.0)), ("none", make_walk())):
-        walk.save(tmp_path / f"{name}.h5")
-        assert_same(warpchain.load_walk(tmp_path / f"{name}.h5"), walk)
-    assert len(flight(ellipse_aspect=1.0).frame_moments) > 100

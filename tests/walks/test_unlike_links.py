@@ -55,15 +55,6 @@ def test_a_charm_closes_the_ledger_and_is_read_back(tmp_path: Path) -> None:
     again = warpchain.load_walk(tmp_path / "charm.h5")
     assert again.setup == walk.setup
     assert again.setup.scene.charm_mass == 0.02
-    given = warpchain.walk(start="ellipse", walk_limit=0.01, **BRIEF, **KINDS)
-    given.save(tmp_path / "given.h5")
-    assert warpchain.load_walk(tmp_path / "given.h5").setup.scene.link_masses == tuple(KINDS["link_masses"])
-
-
-def test_a_charm_moves_the_centre_of_a_walk_from_its_first_moment() -> None:
-    """A heavy link makes another walk, and a light one of no mass none."""
-    walks = [warpchain.walk(start="ellipse", **BRIEF, charm_mass=mass, charm_link=3).dx for mass in (0.0, 0.01)]
-    assert walks[0] == warpchain.walk(start="ellipse", **BRIEF).dx != walks[1]
 
 
 def test_rules_change_what_they_say() -> None:
@@ -83,15 +74,6 @@ def test_rules_change_what_they_say() -> None:
     assert not any(values.alternates for values in (charm, stiff, graded, both)) and usual.alternates
 
 
-def test_means_and_sums_of_two_kinds_are_those_of_a_pair() -> None:
-    """To the bit, for any number of links; of unlike links they are NumPy's to rounding."""
-    pair = SOFT.inner_mass + SOFT.outer_mass
-    assert all(alternating(SOFT, links).total_mass == links // 2 * pair for links in range(4, 400, 2))
-    for links in (60, 61):
-        own = values_of(links, link_masses=np.linspace(1, 2, links), link_inertias=[1.0] * links)
-        assert own.total_mass == pytest.approx(1.5 * links, rel=1e-14)
-
-
 def test_an_odd_number_of_links_needs_links_of_one_kind_or_values_of_each() -> None:
     """61 links alike, or given one by one, make a chain, which walks."""
     for start in ("rest", "ellipse"):
@@ -102,26 +84,6 @@ def test_an_odd_number_of_links_needs_links_of_one_kind_or_values_of_each() -> N
     each = {"link_masses": [SOFT.inner_mass] * 37, "link_inertias": [SOFT.inner_inertia] * 37}
     assert walk.status == Status.AT_REST
     assert walk.dx == warpchain.walk(start="ellipse", **{**BRIEF, "links": 37}, **each).dx
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"charm_link": 60}, "scene.charm_link: 60 is not among 60 links; give 0 to 59"),
-        ({"stiff_joint": 60}, "scene.stiff_joint: 60 is not among 60 links; give 0 to 59"),
-        ({"link_masses": [1.0, 2.0]}, "scene.link_masses: 2 numbers for 60 links; give one for each"),
-        ({"link_masses": [0.0] * 60}, "scene.link_masses[0]: 0 is no mass; give more"),
-        ({"link_inertias": {7: 1e-7}}, "scene.link_inertias: {7: 1e-07} is no list; give a number for each link, or "),
-        ({"coulomb_frictions": [-1.0] * 60}, "scene.coulomb_frictions[0]: Input should be greater than or equal to 0"),
-        ({"mass_gradient": 1.0}, "scene.mass_gradient: Input should be less than 1; given 1.0"),
-        ({"charm_mass": 0.02, "load_factor": 9.0}, "scene.load_factor: 9 is too much for links of so little rotary "),
-    ],
-)
-def test_what_makes_no_chain_is_refused(settings: dict[str, Any], message: str) -> None:
-    """In one line that names the field and what to give."""
-    with pytest.raises(InputError) as caught:
-        setup_walk("paper", settings, None)
-    assert str(caught.value).startswith(message) and "\n" not in str(caught.value)
 
 
 def test_a_sweep_has_charms_as_an_axis_and_draws_them() -> None:

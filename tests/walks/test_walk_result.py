@@ -2,7 +2,6 @@
 
 import json
 import math
-import os
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -14,9 +13,7 @@ import pytest
 
 from tests.support.made_walks import assert_same, make_unreleased, make_walk
 from warpchain.hdf5_files import hdf5_image
-from warpchain.inputs.setup import resolve
 from warpchain.status import Status
-from warpchain.version import FORMAT_VERSION
 from warpchain.walks.walk_result import ENERGIES, WalkResult, load_walk
 
 # Status
@@ -76,61 +73,6 @@ def test_round_trip(make: Callable[[], WalkResult], tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["walk.h5"]
 
 
-def test_provenance(tmp_path: Path) -> None:
-    """The file says in JSON how to make the walk again."""
-    walk = make_walk()
-    walk.save(tmp_path / "walk.h5")
-    with h5py.File(tmp_path / "walk.h5") as file:
-        assert file.attrs["format"] == "warpchain walk" and file.attrs["format_version"] == FORMAT_VERSION
-        assert file.attrs["status"] == "at_rest"
-        setup = json.loads(file.attrs["setup"])
-        assert json.loads(file.attrs["seed"]) == walk.seed
-        assert json.loads(file.attrs["versions"]) == walk.versions
-    sections = {name: setup[name] for name in ("scene", "options", "parameters")}
-    assert resolve(setup["preset"], **sections) == walk.setup
-
-
-def _fail_half_way(walk: WalkResult, file: h5py.File) -> None:
-    file["half"] = np.zeros(1000)
-    file.flush()
-    raise KeyboardInterrupt
-
-
-@pytest.mark.parametrize("culprit", ["write", "fsync", "replace"])
-def test_interrupted_save_keeps_old_file(culprit: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever fails while a walk is saved, the older file stays whole and nothing else is left."""
-    path = tmp_path / "walk.h5"
-    make_walk().save(path)
-    before = path.read_bytes()
-
-    def disk_full(*_: Any) -> None:
-        raise OSError(28, "No space left on device")
-
-    if culprit == "write":
-        monkeypatch.setattr(WalkResult, "_fill", _fail_half_way)
-    else:
-        monkeypatch.setattr(os, culprit, disk_full)
-    with pytest.raises((KeyboardInterrupt, OSError)) as caught:
-        make_walk(dx=0.1).save(path)
-    monkeypatch.undo()
-    if culprit != "write":
-        assert str(caught.value).startswith(f"{path}: cannot be written (No space left on device); ")
-    assert path.read_bytes() == before
-    assert [entry.name for entry in tmp_path.iterdir()] == ["walk.h5"]
-
-
-@pytest.mark.parametrize("place", ["missing/walk.h5", "file/walk.h5", "folder"])
-def test_unwritable_place(place: str, tmp_path: Path) -> None:
-    """A place that can't take the file is refused in one line that names it."""
-    (tmp_path / "file").touch()
-    (tmp_path / "folder").mkdir()
-    with pytest.raises(OSError) as caught:
-        make_walk().save(tmp_path / place)
-    assert str(caught.value).startswith(f"{tmp_path / place}: cannot be written (")
-    assert "; give" in str(caught.value) and "\n" not in str(caught.value)
-    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["file", "folder"]
-
-
 def _refused(path: Path) -> str:
     with pytest.raises(ValueError) as caught:
         load_walk(path)
@@ -151,13 +93,3 @@ def test_foreign_files_are_refused(tmp_path: Path) -> None:
     assert "damaged or cut short" in _refused(path)
     path.write_bytes(hdf5_image("another kind", lambda file: None))
     assert "a another kind, not a warpchain walk" in _refused(path)
-
-
-@pytest.mark.parametrize("kept", [0.999, 0.7, 0.3, 0.02])
-def test_truncated_file_is_refused(kept: float, tmp_path: Path) -> None:
-    """A file that was cut short is never read as a walk."""
-    path = tmp_path / "walk.h5"
-    make_walk().save(path)
-    content = path.read_bytes()
-    path.write_bytes(content[: int(kept * len(content))])
-    assert "damaged or cut short" in _refused(path)

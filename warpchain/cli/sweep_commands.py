@@ -128,9 +128,9 @@ def plot(
 ) -> None:
     """Draw all figures of a sweep or of a saved walk.
 
-    Of a sweep: the distance as in the paper's Figure 6, maps, lines over any axes, tolerance, sensitivity, statuses. Of
-    a walk: film_strip.png, height_and_speed.png, loop.png, energy.png and, if the plane tilts, tilt.png; a line says
-    what is left out and why.
+    Of a sweep: the distance as in the paper's Figure 6, maps, lines over any axes, sensitivity, statuses. Of a walk:
+    film_strip.png, height_and_speed.png, loop.png, energy.png and, if the plane tilts, tilt.png; a line says what is
+    left out and why.
     """
     from warpchain.cli.walk_files import draw_figures, saved, try_folder
     from warpchain.files import make_folder

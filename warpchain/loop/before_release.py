@@ -6,7 +6,7 @@ from typing import Annotated, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.hdf5_files import Stored, check_fields, stored_fields
+from warpchain.hdf5_files import Stored, stored_fields
 
 Array = NDArray[np.float64]
 
@@ -21,9 +21,6 @@ class BeforeRelease:
     Unit, meaning and shape stand beside each array. Coordinates are those of the walk, with the sprocket at its
     height at the release. Forces are F = k C + b dC/dt with the stiffness and damping that the joints had then: they
     may be softened. Moments are positive counter-clockwise. On the link after a joint both act with the opposite sign.
-
-    Raises:
-        ValueError: an array does not have its shape, a time is not negative, or times do not ascend.
     """
 
     time: Annotated[Array, Stored("s", "time since the release, negative", "t")]
@@ -33,20 +30,6 @@ class BeforeRelease:
     frame_joints: Annotated[Array, Stored("m", "joints x, y; joint i ends link i, even links inner", "f n 2")]
     frame_forces: Annotated[Array, Stored("N", "force x, y in each joint on the link that it ends", "f n 2")]
     frame_moments: Annotated[Array, Stored("N m", "friction moment in each joint on the link that it ends", "f n")]
-
-    def __post_init__(self) -> None:
-        """Check that the arrays fit together."""
-        if np.any(self.time >= 0) or np.any(self.frame_time >= 0):
-            raise ValueError("before_release: a time is not negative; give times before the release")
-        try:
-            check_fields(self, self.frame_joints.shape[1])
-        except ValueError as error:
-            raise ValueError(f"before_release.{error}") from None
-
-    def __repr__(self) -> str:
-        """One line."""
-        span = -float(self.frame_time[0]) if len(self.frame_time) else 0.0
-        return f"<BeforeRelease: {span:.3g} s, {len(self.time)} instants, {len(self.frame_time)} frames>"
 
 
 FIELDS: Final[dict[str, Stored]] = stored_fields(BeforeRelease)

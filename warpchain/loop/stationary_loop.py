@@ -22,7 +22,6 @@ from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import joint_radius, link_values
 from warpchain.inputs.setup import Setup
 from warpchain.loop.before_release import BeforeRelease
-from warpchain.loop.catenary import Catenary, catenary_between
 
 Array = NDArray[np.float64]
 
@@ -30,8 +29,8 @@ FEWEST_FRAMES: Final = 8
 """Number of frames that an average needs."""
 LEAST_WAY: Final = 4.0
 """Distance that the loop must move in all frames together [links]."""
-POINTS_PER_LINK: Final = 6
-"""Points of the mean curve per link."""
+POINTS_PER_LINK: Final = 24
+"""Points of the mean curve per link, 0.5 mm apart."""
 WHOLE_WAVES: Final = 5.0
 """Waves at least this long [links] are fully in the averages …"""
 NO_WAVES: Final = 2.0
@@ -155,24 +154,9 @@ class StationaryLoop:
 
     def kink(self) -> Kink:
         """The kink of the loop, beside its lowest point, where the curvature has its least value."""
-        reach = KINK_REACH * (self.free[1] - self.free[0])
-        before = np.flatnonzero((self.s > -reach) & (self.s < 0))
-        after = np.flatnonzero((self.s > 0) & (self.s < reach))
-        near = np.concatenate([before, after])
-        peak_at, peak = _vertex(self.s, self.curvature, int(near[np.argmax(self.curvature[near])]))
-        dips = [_vertex(self.s, self.curvature, int(side[np.argmin(self.curvature[side])])) for side in (before, after)]
-        dip_at, dip = min(dips, key=lambda place: place[1])
-        return Kink(peak=peak, peak_at=peak_at, dip=dip, dip_at=dip_at)
-
-    def catenary(self) -> Catenary:
-        """The catenary between the ends of the free part and as long as it.
-
-        Raises:
-            ValueError: its length is not greater than the distance of its ends.
-        """
-        first, last = (np.array([np.interp(s, self.s, column) for column in self.position.T]) for s in self.free)
-        weight = self.parameters.density * self.parameters.gravity
-        return catenary_between(first, last, self.free[1] - self.free[0], weight)
+        near = np.flatnonzero(np.abs(self.s) < KINK_REACH * (self.free[1] - self.free[0]))
+        peak, dip = near[np.argmax(self.curvature[near])], near[np.argmin(self.curvature[near])]
+        return Kink(*(float(values[at]) for at in (peak, dip) for values in (self.curvature, self.s)))
 
 
 def average_loop(setup: Setup, before: BeforeRelease | None, center: Array | None) -> StationaryLoop:
@@ -233,7 +217,8 @@ def average_frames(before: BeforeRelease, parameters: LoopParameters, center: Ar
     step = links / len(per_q)
     length = float(per_q.sum() * step)
     s = np.concatenate([[0.0], np.cumsum((per_q[1:] + per_q[:-1]) * step / 2)])
-    lowest, _ = _vertex(s, place[:, 1], int(np.argmin(place[:, 1])), length)
+    bottom = int(np.argmin(place[:, 1]))
+    lowest = s[bottom] - per_q[bottom] * first[bottom, 1] / second[bottom, 1]  # a step of Newton's to dy/dq = 0
     count = len(s) // 2 * 2
     grid = length * (np.arange(count) - count // 2) / count
 
@@ -241,9 +226,9 @@ def average_frames(before: BeforeRelease, parameters: LoopParameters, center: Ar
         return np.interp(grid, s - lowest, values, period=length)
 
     functions = {
-        "spread": _spread(joints, moved, curve.at(0, 8 * POINTS_PER_LINK), normal),
+        "spread": _spread(joints, moved, curve),
         "curvature": curvature,
-        "bending": _periodic_slope(curvature, links) / per_q,
+        "bending": (np.sum(third * normal, axis=1) - 3 * curvature * np.sum(first * second, axis=1)) / per_q**3,
         "tension": np.sum(force * tangent, axis=1),
         "effective_tension": np.sum(effective * tangent, axis=1),
         "shear": np.sum(effective * normal, axis=1),
@@ -264,15 +249,6 @@ def average_frames(before: BeforeRelease, parameters: LoopParameters, center: Ar
         free=_free_part(grid, np.hypot(*position.T), radius + OFF_SPROCKET),
         **{name: on_grid(values) for name, values in functions.items()},
     )
-
-
-def _periodic_slope(values: Array, period: float) -> Array:
-    """Derivative of a periodic function from even samples of one period, shape (g,)."""
-    waves = 2j * np.pi * np.fft.rfftfreq(len(values), period / len(values))
-    if len(values) % 2 == 0:
-        waves[-1] = 0.0
-    slope: Array = np.fft.irfft(np.fft.rfft(values) * waves, len(values))
-    return slope
 
 
 def _moved(joints: Array) -> Array:
@@ -303,50 +279,23 @@ class _Harmonics:
         kept = np.sin(np.pi / 2 * share) ** 2
         self._spectrum = np.mean(np.fft.rfft(values, axis=1) * back[..., None], axis=0) * kept[:, None]
 
-    def at(self, order: int, points: int = POINTS_PER_LINK) -> Array:
-        """The derivative of some order with respect to q, at q = 0, 1/points …, shape (points n, c)."""
-        factor = (2j * np.pi * self._waves[:, None]) ** order
-        values: Array = points * np.fft.irfft(self._spectrum * factor, points * self._links, axis=0)
+    def at(self, order: int) -> Array:
+        """The derivative of some order with respect to q, at POINTS_PER_LINK n even points from q = 0 on, (…, c)."""
+        spectrum, points = self._spectrum * (2j * np.pi * self._waves[:, None]) ** order, POINTS_PER_LINK
+        values: Array = points * np.fft.irfft(spectrum, points * self._links, axis=0)
         return values
 
-
-def _spread(joints: Array, moved: Array, place: Array, normal: Array) -> Array:
-    """Standard deviation of joints across the mean curve [m], at the points of its normals, (POINTS_PER_LINK n,)."""
-    links = joints.shape[1]
-    q = (np.arange(links) + moved[:, None]) % links
-
-    def at_joints(values: Array) -> Array:
-        points = links * np.arange(len(values)) / len(values)
-        return np.stack([np.interp(q, points, values[:, axis], period=links) for axis in (0, 1)], axis=-1)
-
-    across = np.sum((joints - at_joints(place)) * at_joints(normal), axis=-1)
-    nearest = np.floor(q).astype(np.int64).ravel() % links
-    counts = np.maximum(np.bincount(nearest, minlength=links), 1)
-    mean_square = np.bincount(nearest, across.ravel() ** 2, links) / counts
-    points = np.arange(len(normal)) / POINTS_PER_LINK
-    return np.sqrt(np.interp(points, np.arange(links) + 0.5, mean_square, period=links))
+    def at_joints(self, order: int, moved: Array) -> Array:
+        """The same where the joints are in frames, until which the loop has moved (f,) [links], shape (f, n, c)."""
+        factor = (2j * np.pi * self._waves) ** order * np.exp(2j * np.pi * self._waves * moved[:, None])
+        return np.asarray(np.fft.irfft(self._spectrum * factor[..., None], self._links, axis=1))
 
 
-def _vertex(s: Array, values: Array, middle: int, period: float | None = None) -> tuple[float, float]:
-    """Place and value of the vertex of the parabola through a point and its two neighbours.
-
-    Args:
-        s: arc length [m].
-        values: values at s.
-        middle: index of an extreme value; if it is at an end, or not extreme, the point itself is returned.
-        period: period of s [m], if the values are periodic.
-    """
-    around = np.arange(middle - 1, middle + 2)
-    if period is None and (around[0] < 0 or around[-1] >= len(s)):
-        return float(s[middle]), float(values[middle])
-    around %= len(s)
-    offset = s[around] - s[middle]
-    if period is not None:
-        offset = (offset + period / 2) % period - period / 2
-    square, slope, height = np.polyfit(offset, values[around], 2)
-    if square == 0 or abs(slope) > 2 * abs(square) * np.abs(offset).max():
-        return float(s[middle]), float(values[middle])
-    return float(s[middle] - slope / (2 * square)), float(height - slope**2 / (4 * square))
+def _spread(joints: Array, moved: Array, curve: _Harmonics) -> Array:
+    """Standard deviation of joints across the mean curve [m], at its points, (POINTS_PER_LINK n,)."""
+    off, along = joints - curve.at_joints(0, moved), curve.at_joints(1, moved)
+    across = (off[..., 0] * along[..., 1] - off[..., 1] * along[..., 0]) / np.linalg.norm(along, axis=-1)
+    return np.sqrt(np.maximum(0.0, _Harmonics(across[..., None] ** 2, moved).at(0)[:, 0]))
 
 
 def _free_part(s: Array, distance: Array, least: float) -> tuple[float, float]:
@@ -359,8 +308,4 @@ def _free_part(s: Array, distance: Array, least: float) -> tuple[float, float]:
     before, after = touching[touching < middle], touching[touching > middle]
     if distance[middle] <= least or not len(before) or not len(after):
         raise ValueError("before_release: the loop has no free part below a sprocket; give one that hangs on one")
-    ends = []
-    for touch, off in ((before[-1], before[-1] + 1), (after[0], after[0] - 1)):
-        share = (least - distance[touch]) / (distance[off] - distance[touch])
-        ends.append(float(s[touch] + share * (s[off] - s[touch])))
-    return ends[0], ends[1]
+    return float(s[before[-1] + 1]), float(s[after[0] - 1])

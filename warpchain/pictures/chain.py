@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 SIDE: Final = np.eye(3)
-FRONT: Final = np.eye(3)[[2, 1, 0]]
-"""Its axis to the right is z, which such a viewer sees grow to the left: invert it."""
 ABOVE: Final = np.eye(3)[[0, 2, 1]]
 """Its upper axis is z, which such a viewer sees grow downwards: invert it."""
 

@@ -36,7 +36,7 @@ INNER, OUTER, EDGE = "#9CCBE6", BLUE, "#00385A"
 _CORNER: Final = view_from(*np.radians((35.0, 22.0)))
 """The view from the front right, slightly above."""
 _PADDING: Final = np.array([[50, 50], [50, 30]])
-"""Pixels for numbers to the left and below, and to the right and above."""
+"""Pixels to the left and below, and to the right and above."""
 
 
 def floor_marks(low: float, high: float, most: int = 9) -> list[float]:
@@ -129,28 +129,13 @@ class Film:
         return projected
 
     def _draw_floor(self, low: Array, high: Array) -> None:
-        """The floor with a square grid, and numbers along the two edges that are nearest to the viewer."""
+        """The floor with a square grid, and what its squares measure."""
         (left, _, back), (right, _, front) = low, high
+        spacing = float(np.diff(floor_marks(left, right, 12)[:2])[0])
+        marks = [spacing * np.arange(np.ceil(low[axis] / spacing), high[axis] / spacing) for axis in (0, 2)]
         corners = np.array([[left, 0, back], [left, 0, front], [right, 0, front], [right, 0, back]])
         self._axes.fill(*self._project(corners), color=GROUND, linewidth=0, zorder=1)
-        spacing = float(np.diff(floor_marks(left, right, 12)[:2])[0])
-        for axis, name in ((0, "x"), (2, "z")):
-            outward = self._project(np.eye(3)[[2 - axis]])[:, 0]
-            outward /= np.linalg.norm(outward)
-            marks = spacing * np.arange(np.ceil(low[axis] / spacing), np.floor(high[axis] / spacing) + 1)
-            for mark in marks:
-                ends = np.zeros((2, 3))
-                ends[:, axis], ends[:, 2 - axis] = mark, (low[2 - axis], high[2 - axis])
-                self._axes.plot(*self._project(ends), color="#C8C8C8", linewidth=0.8, zorder=1.2)
-                self._annotate(f"{mark + 0.0:g}", ends[1], 14 * outward)
-            middle = np.zeros(3)
-            middle[axis], middle[2 - axis] = (low[axis] + high[axis]) / 2, high[2 - axis]
-            self._annotate(f"${name}$ / m", middle, 40 * outward)
-
-    def _annotate(self, text: str, place: Array, offset: Array) -> None:
-        """A text beside a place x, y, z [m]; the offset is in points."""
-        style: dict[str, Any] = {"ha": "center", "va": "center", "color": INK}
-        x, y = self._project(place[np.newaxis])[:, 0]
-        self._axes.annotate(
-            text, (x, y), xytext=tuple(offset), textcoords="offset points", annotation_clip=False, **style
-        )
+        lines = [[(x, 0, back), (x, 0, front)] for x in marks[0]] + [[(left, 0, z), (right, 0, z)] for z in marks[1]]
+        for line in lines:
+            self._axes.plot(*self._project(np.array(line)), color="#C8C8C8", linewidth=0.8, zorder=1.2)
+        self.figure.text(0.015, 0.02, f"squares of {spacing:g} m", va="bottom", fontsize=11, color=INK)

@@ -5,7 +5,7 @@ would take a third of the time that this figure takes, and every walk has one.
 """
 
 from dataclasses import dataclass
-from itertools import pairwise, product
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from warpchain.pictures.chain import (
     ABOVE,
-    FRONT,
     SIDE,
     draw_chain,
     draw_ground,
@@ -43,12 +42,10 @@ _WIDTH: Final = 10.0
 _HIGHEST: Final = 4.6
 _DEEPEST: Final = 8.0
 """Width of the paper, greatest height of the side view, and of it and the view from above together."""
-_LEFT, _BETWEEN, _RIGHT, _TOP, _BELOW, _FOOT = 0.9, 0.85, 0.25, 0.6, 0.85, 0.1
-"""Room for labels: beside and between the views, for legend and titles above them, below each row, at the foot."""
+_LEFT, _RIGHT, _TOP, _BELOW, _FOOT = 0.9, 0.25, 0.6, 0.85, 0.1
+"""Room for labels: beside the views, for legend and titles above them, below each row, at the foot."""
 _CLOCK: Final = 0.2
 """Room for the times above the chains."""
-_NARROWEST: Final = 1.3
-"""Least width of the view from the front."""
 _FLOOR: Final = 0.4
 """Height of the floor in the side view."""
 _CLOSE_UP_LINKS, _CLOSE_UP_ASPECT = 9, 1.5
@@ -56,25 +53,21 @@ _CLOSE_UP_LINKS, _CLOSE_UP_ASPECT = 9, 1.5
 _HALO: Final = (withStroke(linewidth=2.5, foreground="white"),)
 
 
-def film_strip(walk: "WalkResult", *, count: int | None = None, figure: Figure | None = None) -> Figure:
+def film_strip(walk: "WalkResult", figure: Figure | None = None) -> Figure:
     """The chain along its walk, drawn to scale, and close-ups of up to four moments.
 
     In the strip the centre of mass moves equally far from each instant to the next. Above each chain stands its time;
     outer links are darker than inner ones. The close-ups show the first touch of the floor, the first self-contact, the
-    collapse and the end. A chain whose plane tilts is seen from the side, from the front and from above instead, all to
-    one scale. From the front z grows to the left, and from above downwards, as such a viewer sees it.
+    collapse and the end. A chain whose plane tilts is seen from above instead, to the same scale: z grows downwards.
 
     Args:
         walk: a walk with frames.
-        count: number of instants in the strip, at least 2; by default 6 to 12, as many as stay legible.
         figure: an empty figure to draw into; by default a new one that suits the walk.
 
     Raises:
-        ValueError: the walk has no frames or broken ones, or fewer than 2 instants are asked for.
+        ValueError: the walk has no frames or broken ones.
     """
     joints = checked_joints(walk)
-    if count is not None and count < 2:
-        raise ValueError(f"count: {count} is too few; give 2 or more")
     tilts = walk.joints_in_room is not None
     low, high = walk_box(walk, joints)
     close_ups = [] if tilts else _close_ups(walk)
@@ -83,13 +76,9 @@ def film_strip(walk: "WalkResult", *, count: int | None = None, figure: Figure |
         low[:2] = np.minimum(low[:2], close_up.low + np.array([-margin, margin]))
         high[:2] = np.maximum(high[:2], close_up.high + margin)
     size = high - low
-    # A chain that stays upright is thin from above and from the front: room for the numbers on the axes.
-    broad = max(size[1], size[2]) if tilts else 0.0
-    across = _WIDTH - _LEFT - _RIGHT - (_BETWEEN if tilts else 0.0)
-    scale = min(across / (size[0] + broad), _HIGHEST / size[1], (_DEEPEST - _FLOOR) / (size[1] + broad))
-    if tilts and scale * broad < _NARROWEST:
-        scale = (across - _NARROWEST) / size[0]
-        broad = _NARROWEST / scale
+    broad = max(size[2], 0.15 * size[0]) if tilts else 0.0
+    across = _WIDTH - _LEFT - _RIGHT
+    scale = min(across / size[0], _HIGHEST / size[1], (_DEEPEST - _FLOOR) / (size[1] + broad))
     close_up_width = min((across + 0.1) / max(1, len(close_ups)), _WIDTH / 3)
     lower = scale * broad + 0.5 if tilts else (close_up_width - 0.1) / _CLOSE_UP_ASPECT
     width, height, depth, top = scale * size[0], scale * size[1] + _FLOOR + _CLOCK, _FLOOR / scale, _CLOCK / scale
@@ -99,28 +88,25 @@ def film_strip(walk: "WalkResult", *, count: int | None = None, figure: Figure |
     def panel(left: float, bottom: float, width: float, height: float) -> Axes:
         return figure.add_axes((left / paper[0], bottom / paper[1], width / paper[0], height / paper[1]))
 
-    left = _LEFT + (across - scale * (size[0] + broad)) / 2
+    left = _LEFT + (across - width) / 2
     bottom = _FOOT + lower + _BELOW
     side = panel(left, bottom, width, height)
     side.set(xlim=(low[0], high[0]), ylim=(low[1] - depth, high[1] + top), xlabel="x / m", ylabel="y / m")
-    views = [(f"{setting(walk)}{', from the side' * tilts}", side, SIDE)]
+    views = [(setting(walk), side, SIDE)]
     draw_ground(side, floor_line(walk, low[0], high[0]), low[1] - depth)
     _draw_distance(side, walk, low[1], 0.5 * depth)
     if tilts:
         z = (low[2] + high[2]) / 2 + np.array([0.5, -0.5]) * broad
-        front = panel(left + width + _BETWEEN, bottom, scale * broad, height)
-        front.set(xlim=z, ylim=(-depth, high[1] + top), xlabel="z / m", ylabel="y / m")
-        front.xaxis.set_major_locator(MaxNLocator(4))
         above = panel(left, _FOOT + 0.5, width, scale * broad)
         above.set(xlim=(low[0], high[0]), ylim=z, xlabel="x / m", ylabel="z / m", facecolor=GROUND)
-        draw_ground(front, np.array([[z[0], 0.0], [z[1], 0.0]]), -depth)
-        views += [("from the front", front, FRONT), ("from above", above, ABOVE)]
+        above.yaxis.set_major_locator(MaxNLocator(5))
+        views.append(("from above", above, ABOVE))
     # viridis without its palest end, which can hardly be seen on white paper
     colors = colormaps["viridis"](0.9 * walk.frame_time / (walk.frame_time[-1] or 1.0))[:, :3]
     center = center_in_room(walk)
     path = np.stack([np.interp(walk.frame_time, walk.time, row) for row in center.T], axis=1)
     radius = walk.setup.parameters.circle_radius
-    shown = _instants(path, float(np.ptp(joints[0, :, 0])), count)
+    shown = _instants(path, float(np.ptp(joints[0, :, 0])))
     for title, axes, view in views:
         for frame in shown:
             draw_chain(axes, joints[frame], radius, view, _link_colors(colors[frame]), edge=0.25)
@@ -143,43 +129,26 @@ def _link_colors(color: Array) -> tuple[Array, Array, Array]:
     return 1 - 0.45 * (1 - color), color, 0.6 * color
 
 
-def _instants(path: Array, width: float, count: int | None) -> list[int]:
-    """Frames between which the centre of mass moves equally far, the first and the last among them.
+def _instants(path: Array, width: float) -> list[int]:
+    """6 to 12 frames between which the centre of mass moves equally far along its path, the first and last among them.
 
-    Args:
-        path: centre of mass in each frame [m], shape (f, 3).
-        width: width of the chain in the first frame [m].
-        count: number of frames; None: 6 to 12, as many as stay legible.
+    They are as many as stay legible with chains of this width [m] in the first frame.
     """
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-    if count is None:
-        count = int(np.clip(1 + way[-1] / (0.6 * width), 6, 12))
-    marks = np.linspace(0.0, way[-1], count)[1:-1]
+    marks = np.linspace(0.0, way[-1], int(np.clip(1 + way[-1] / (0.6 * width), 6, 12)))[1:-1]
     return sorted({0, *(int(np.argmin(np.abs(way - mark))) for mark in marks), len(way) - 1})
 
 
 def _write_times(axes: Axes, times: Array, joints: Array, colors: Array, gap: float, inch: float) -> None:
-    """Write the time of each chain above its highest joint, a little aside or higher where it would touch a text.
-
-    Args:
-        axes: the view from the side.
-        times: of k instants [s], shape (k,).
-        joints: joints x, y [m], shape (k, n, 2).
-        colors: of the chains, shape (k, 3).
-        gap: from a joint to the text [m].
-        inch: on paper [m].
-    """
-    wide, high = 0.38 * inch, 0.13 * inch
+    """Write times [s] above the highest joints of k chains, (k, n, 2), by a gap [m], higher where texts would touch."""
     taken = np.array([text.get_position() for text in axes.texts]).reshape(-1, 2)
-    for number in range(len(times)):
-        top = joints[number, np.argmax(joints[number, :, 1])] + (0.0, gap)
-        for lift, aside in product(range(100), (0, 1, -1, 2, -2, 3, -3)):
-            x, y = top + 0.05 * inch * np.array([aside, lift])
-            if not np.any((np.abs(taken[:, 0] - x) < wide) & (np.abs(taken[:, 1] - y) < high)):
-                break
-        taken = np.append(taken, [[x, y]], axis=0)
-        style: dict[str, Any] = {"color": 0.7 * colors[number], "fontsize": "small", "path_effects": _HALO}
-        axes.text(x, y, f"{times[number]:.2f} s", ha="center", va="bottom", zorder=6, **style)
+    for moment, chain, color in zip(times, joints, colors, strict=True):
+        place = chain[np.argmax(chain[:, 1])] + (0.0, gap)
+        while np.any(np.all(np.abs(taken - place) < np.array([0.38, 0.13]) * inch, axis=1)):
+            place[1] += 0.02 * inch
+        taken = np.append(taken, [place], axis=0)
+        style: dict[str, Any] = {"color": 0.7 * color, "fontsize": "small", "path_effects": _HALO}
+        axes.text(place[0], place[1], f"{moment:.2f} s", ha="center", va="bottom", zorder=6, **style)
 
 
 def _draw_way(axes: Axes, walk: "WalkResult", center: Array, view: Array) -> None:
@@ -240,27 +209,25 @@ def _frame_close_up(
 def _close_ups(walk: "WalkResult") -> list[_CloseUp]:
     """At most four moments in order of time, no frame twice, whose boxes lie side by side if their spots allow it.
 
-    They are the first touch of the floor, the first self-contact, the collapse and the end, as far as they happen. The
-    collapse is the last time at which the top of the chain is half as high as at the release.
+    They are the first touch of the floor, the first self-contact, the collapse and the end, as far as they happen.
     """
     joints, radius = walk.frame_joints, walk.setup.parameters.circle_radius
-    above = from_floor(walk, joints)
-    height, last = above.max(axis=1), len(joints) - 1
+    above, last = from_floor(walk, joints), len(joints) - 1
     found: dict[int, tuple[str, Array]] = {}
     touching = np.flatnonzero(above.min(axis=1) < 1.02 * radius)
     if touching.size:
         frame = int(touching[0])
         found[frame] = "first touch", joints[frame, np.argmin(above[frame])]
-    meeting = _first_meeting(joints, 2.02 * radius)
-    if meeting is not None:
-        found[meeting[0]] = "first self-contact", meeting[1]
-    frame = int(np.flatnonzero(height >= 0.5 * height[0])[-1])
-    found[frame] = "collapse", joints[frame, _sharpest_bend(joints[frame])]
+    for title, moment, spot_of in (
+        ("first self-contact", walk.self_contact_at, _meeting),
+        ("collapse", walk.collapsed_at, _sharpest_bend),
+    ):
+        if not np.isnan(moment):
+            frame = min(int(np.searchsorted(walk.frame_time, moment)), last)
+            found[frame] = title, spot_of(joints[frame])
     middle = np.median(joints[last, :, 0])
-    found[last] = (
-        "rest" if walk.status is Status.AT_REST else "end",
-        np.array([middle, floor_height(walk, middle)]),
-    )
+    title = "rest" if walk.status is Status.AT_REST else "end"
+    found[last] = title, np.array([middle, floor_height(walk, middle)])
     size = np.array([1.0, 1.0 / _CLOSE_UP_ASPECT]) * _CLOSE_UP_LINKS * walk.setup.parameters.link_length
     moments = sorted(found.items())
     middles = _side_by_side(np.array([spot[0] for _, (_, spot) in moments]), size[0])
@@ -273,33 +240,28 @@ def _close_ups(walk: "WalkResult") -> list[_CloseUp]:
 
 
 def _side_by_side(spots: Array, width: float) -> Array:
-    """Middles of boxes, moved apart where boxes overlap, but at most a sixth of a box off their spots [m]."""
+    """Middles of boxes, moved apart where boxes overlap, but at most 0.3 of a box off their spots [m]."""
     middles = spots.copy()
     for _ in range(10):
         for left, right in pairwise(np.argsort(spots, kind="stable")):
             shift = max(0.0, (width - middles[right] + middles[left]) / 2)
             middles[[left, right]] += (-shift, shift)
-        middles = np.clip(middles, spots - width / 6, spots + width / 6)
+        middles = np.clip(middles, spots - 0.3 * width, spots + 0.3 * width)
     return middles
 
 
-def _first_meeting(joints: Array, distance: float) -> tuple[int, Array] | None:
-    """First frame in which two joints at least 3 links apart are closer than `distance`, and where."""
-    count = joints.shape[1]
+def _meeting(joints: Array) -> Array:
+    """Where two joints at least 3 links apart are closest, (2,)."""
+    count = len(joints)
     apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
-    excluded = np.minimum(apart, count - apart) < 3
-    for frame, (x, y) in enumerate(joints.transpose(0, 2, 1)):
-        squares = np.subtract.outer(x, x) ** 2 + np.subtract.outer(y, y) ** 2
-        squares[excluded] = np.inf
-        nearest = np.unravel_index(np.argmin(squares), squares.shape)
-        if squares[nearest] < distance**2:
-            return frame, joints[frame, list(nearest)].mean(axis=0)
-    return None
+    distances = np.linalg.norm(joints[:, None] - joints, axis=-1)
+    distances[np.minimum(apart, count - apart) < 3] = np.inf
+    return np.asarray(joints[[*np.unravel_index(np.argmin(distances), distances.shape)]].mean(axis=0))
 
 
-def _sharpest_bend(joints: Array) -> int:
-    """Number of the joint at which the chain turns most over three links."""
+def _sharpest_bend(joints: Array) -> Array:
+    """The joint at which the chain turns most over three links, (2,)."""
     step = joints - np.roll(joints, 1, axis=0)
     direction = np.arctan2(step[:, 1], step[:, 0])
     turn = np.angle(np.exp(1j * (np.roll(direction, -2) - np.roll(direction, 1))))
-    return int(np.argmax(np.abs(turn)))
+    return np.asarray(joints[np.argmax(np.abs(turn))])

@@ -1,21 +1,25 @@
-"""A quantity over a grid of any number of axes: lines with error bands, or maps; cells without walks are gaps."""
+"""A quantity over a grid of any number of axes: lines with error bars, or maps; cells without walks are gaps.
+
+Along x runs the frequency if it has three values or more, else the longest axis of numbers. The next longest axis gives
+the lines, or the rows of a map if both have many values; all other axes give panels.
+"""
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.collections import EllipseCollection
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import NullLocator, PercentFormatter
+from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
-from warpchain.pictures.grid_panels import MOST_LINES, Axis, Kind, Panel, grid_panels, line_values
+from warpchain.inputs.validation import InputError, shown
 from warpchain.pictures.inline import InlineFigure
 from warpchain.pictures.labels import (
     COUNTS,
@@ -27,33 +31,54 @@ from warpchain.pictures.labels import (
     unit_text,
     with_unit,
 )
-from warpchain.pictures.style import BLUE, FAINT, GROUND, INK, LINE_COLORS, RED, label_room, panel_grid, tidy
+from warpchain.pictures.style import BLUE, FAINT, GROUND, LINE_COLORS, RED, NothingToShow, panel_grid, tidy
 
 if TYPE_CHECKING:
     from warpchain.store.cell_statistics import CellStatistics
 
 Array = NDArray[Any]
+Kind = Literal["lines", "map"]
 
-_MOST_NUMBERS: Final = 60
-"""Greatest number of cells of a single map with numbers in them."""
-
+MOST_LINES: Final = len(LINE_COLORS)
+"""Greatest number of lines in a panel, unless lines are asked for."""
+MOST_PANELS: Final = 24
+"""Greatest number of panels of a block; of more, the first are shown."""
 _MOST_TICKS: Final = 8
-"""Up to so many values have a tick each, as far as there is room."""
-
+"""Up to so many numbers have a tick each, if they are not too close."""
 _MOST_ROWS: Final = 16
 """Greatest number of labelled rows or columns of a map."""
-
-_LARGEST_DOT: Final = 0.75
-"""Diameter of the dot of a cell whose walks all failed, relative to the cell."""
-
-_DECADES: Final = 30
-"""From such a ratio of the greatest value to the least on, an axis is logarithmic if its values are more even so."""
-
-_DEEP, _LIGHT = 0.35, 0.13
-"""Opacity of the bands of one standard error and one standard deviation."""
-
+_DEEP, _LIGHT = 0.45, 0.15
+"""Opacity of the bars of one standard error and one standard deviation."""
 _PANEL_SIZES: Final = {1: (5.2, 3.6), 2: (3.6, 2.9), 3: (3.0, 2.6), 4: (2.6, 2.4)}
 """Number of columns → width and height of a panel [inches]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """An axis of a grid: numbers in rising order, or names in the order given."""
+
+    name: str
+    values: Array
+
+    @property
+    def is_numeric(self) -> bool:
+        """Whether the values are numbers."""
+        return self.values.dtype.kind in "if"
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One panel: its x axis, the axis of its lines or the y axis of a map, and its cells.
+
+    Arrays of the cells have shape (values of `along`, values of `across`), of one row if there is just one line; the
+    title says what else they have in common.
+    """
+
+    kind: Kind
+    across: Axis
+    along: Axis | None
+    title: str
+    cells: "CellStatistics"
 
 
 def draw_grid(
@@ -67,8 +92,8 @@ def draw_grid(
 ) -> Figure | SubFigure:
     """Draw a quantity over the grids of one block or several.
 
-    Lines have a band of one standard error; a single line has a lighter one of one standard deviation, too. Names on
-    the x axis have bars instead. Where walks failed, a strip above the lines shows which share of them, in a map a dot.
+    Lines have bars of one standard error; a single line has lighter ones of one standard deviation, too. A red cross
+    on the x axis, or a dot in a map, says that walks failed there.
 
     Args:
         blocks: name of each block → the statistics of its cells.
@@ -85,120 +110,183 @@ def draw_grid(
         raise ValueError(f"kind: {kind!r} is unknown; give 'lines', 'map' or None")
     if ax is not None and figure is not None:
         raise ValueError("ax: given together with figure; leave one out")
-    panels, left_out = grid_panels(blocks, kind, x)
-    label = with_unit(quantity_text(quantity), next(iter(blocks.values())).unit)
+    panels, left_out = _all_panels(blocks, kind, x)
     if ax is not None and len(panels) > 1:
         raise ValueError(f"ax: this figure has {len(panels)} panels; leave ax out, or give figure")
-    alike = len({panel.signature for panel in panels}) == 1
+    label = with_unit(quantity_text(quantity), next(iter(blocks.values())).unit)
     are_lines = all(panel.kind == "lines" for panel in panels)
-    columns = len(panels) if len(panels) <= 3 else min(4, math.ceil(len(panels) ** 0.5))
-    if ax is None:
-        figure = InlineFigure(figsize=_size(panels, columns), layout="constrained") if figure is None else figure
-        areas, _ = panel_grid(figure, len(panels), columns, sharex=alike, sharey=alike or are_lines)
+    alike = len({(panel.kind, *map(_signature, (panel.across, panel.along))) for panel in panels}) == 1
+    if ax is not None:
+        areas, owner = [ax], None
     else:
-        areas, figure = [ax], None
-    plotted = list(zip(areas, panels, strict=True))
-    values = line_values(panels)
-    for axes, panel in plotted:
+        columns = len(panels) if len(panels) <= 3 else min(4, math.ceil(len(panels) ** 0.5))
+        owner = InlineFigure(figsize=_size(panels, columns), layout="constrained") if figure is None else figure
+        areas, _ = panel_grid(owner, len(panels), columns, sharex=alike, sharey=alike or are_lines)
+    palettes = _palettes(panels)
+    image = None
+    for axes, panel in zip(areas, panels, strict=True):
         axes.set_title(panel.title, fontsize="medium", loc="left")
         if panel.kind == "lines":
-            colors = _colors(panel, values)
-            _draw_lines(axes, panel, colors)
-            _set_ticks(axes, panel.across, panels)
-            if panel.cells.failed.any():
-                _draw_failed_strip(axes, panel, colors, max(float(each.failed_share.max()) for each in panels))
-    _draw_maps([each for each in plotted if each[1].kind == "map"], label)
-    _begin_at_zero([axes for axes, panel in plotted if panel.kind == "lines"])
-    _label(figure, plotted, label, alike=alike)
-    if figure is None:
-        _draw_legends(areas[0], plotted)
-        return areas[0].figure
-    if left_out:
-        note = f"{len(panels)} of {len(panels) + left_out} panels, chosen evenly"
-        figure.suptitle(note, fontsize="medium", color=RED)
-    beside = any(panel.along for panel in panels if panel.kind == "lines")
-    place = "outside right upper" if beside else "outside upper right"
-    _draw_legends(figure, plotted, loc=place, ncols=1 if beside else 2)
-    return figure
+            _draw_lines(axes, panel, palettes[panel.along.name] if panel.along else {})
+        else:
+            means = np.concatenate([each.cells.mean.ravel() for each in panels if each.kind == "map"])
+            image = _draw_map(axes, panel, (np.nanmin(means), np.nanmax(means)))
+        across, note = quantity_label(panel.across.name), lost_note([vars(panel.cells)])
+        is_common = owner is not None and alike
+        if is_common:
+            axes.set_xlabel(note, color=RED, fontsize="small")
+        else:
+            axes.set_xlabel(f"{across}\n{note}".strip())
+        if axes is areas[0] or not (is_common or are_lines):
+            axes.set_ylabel(quantity_label(panel.along.name) if panel.kind == "map" and panel.along else label)
+    if owner is not None and alike:
+        owner.supxlabel(across, fontsize="medium")
+    if owner is not None and (alike or are_lines):
+        owner.supylabel(areas[0].get_ylabel(), fontsize="medium")
+        areas[0].set_ylabel("")
+    if owner is not None and left_out:
+        owner.suptitle(f"{len(panels)} of {len(panels) + left_out} panels", fontsize="medium", color=RED)
+    if image is not None:
+        maps = [axes for axes, panel in zip(areas, panels, strict=True) if panel.kind == "map"]
+        areas[0].figure.colorbar(image, ax=maps, label=label).outline.set_visible(False)
+    lines = [axes for axes, panel in zip(areas, panels, strict=True) if panel.kind == "lines"]
+    low = min((axes.dataLim.y0 for axes in lines), default=0.0)
+    high = max((axes.dataLim.y1 for axes in lines), default=0.0)
+    if 0 <= low < 0.5 * high:
+        lines[0].set_ylim(0.0, 1.05 * high)
+    _draw_legends(owner, areas, panels, palettes)
+    return areas[0].figure if owner is None else owner
+
+
+def _all_panels(blocks: "Mapping[str, CellStatistics]", kind: Kind | None, x: str | None) -> tuple[list[Panel], int]:
+    """The panels of all blocks, and the number of those that are left out because there are too many."""
+    axes = {name: [name for name, values in cells.axes.items() if len(values) > 1] for name, cells in blocks.items()}
+    if x is not None and not any(x in own for own in axes.values()):
+        known = ", ".join(dict.fromkeys(name for own in axes.values() for name in own))
+        raise InputError(f"x: {shown(x)} is no axis of several values; give one of {known}")
+    panels: list[Panel] = []
+    left_out = 0
+    for name, cells in blocks.items():
+        if len(axes[name]) < (2 if kind == "map" else 1) or (x is not None and x not in axes[name]):
+            continue
+        is_named = sum(set(own) == set(axes[name]) for own in axes.values()) > 1
+        found = list(_panels(cells, kind, x, name if is_named else ""))
+        panels += found[:MOST_PANELS]
+        left_out += len(found[MOST_PANELS:])
+    if not panels:
+        needed = "two axes of several values" if kind == "map" else "an axis of several values"
+        raise NothingToShow(f"a figure of a grid takes a block with {needed}; give a sweep that has one")
+    if not any(np.isfinite(panel.cells.mean).any() for panel in panels):
+        if any(panel.cells.absent.any() for panel in panels):
+            raise NothingToShow("no walk has this quantity; give another, such as quantity='walk_time'")
+        raise NothingToShow("no walk has come to rest; let the sweep go on, or see the statuses in summary()")
+    return panels, left_out
+
+
+def _panels(cells: "CellStatistics", kind: Kind | None, x: str | None, block: str) -> Iterator[Panel]:
+    """The panels of a block; titles begin with `block`, if it is not empty."""
+    given = [Axis(name, np.asarray(values)) for name, values in cells.axes.items()]
+    rising = [np.argsort(axis.values) if axis.is_numeric else np.arange(len(axis.values)) for axis in given]
+    axes = [Axis(axis.name, axis.values[order]) for axis, order in zip(given, rising, strict=True)]
+    several = [axis for axis in axes if len(axis.values) > 1]
+    chosen, across, along, others = _roles(several, kind, x)
+    order = [several.index(axis) for axis in (*others, along, across) if axis is not None]
+
+    def arranged(table: Array) -> Array:
+        table = table[np.ix_(*rising)].reshape([len(axis.values) for axis in several]).transpose(order)
+        return table[..., np.newaxis, :] if along is None else table
+
+    tables = {name: arranged(getattr(cells, name)) for name in ("mean", "sd", *COUNTS)}
+    texts = [
+        [f"{math_symbol(axis.name)} = {text} {unit_text(axis.name)}".rstrip() for text in short_texts(axis.values)]
+        for axis in others
+    ]
+    for place in np.ndindex(*(len(axis.values) for axis in others)):
+        title = ", ".join([*[block] * bool(block), *(own[number] for own, number in zip(texts, place, strict=True))])
+        here: dict[str, Any] = {name: table[place] for name, table in tables.items()}
+        yield Panel(chosen, across, along, title, replace(cells, **here))
+
+
+def _roles(axes: Sequence[Axis], kind: Kind | None, x: str | None) -> tuple[Kind, Axis, Axis | None, list[Axis]]:
+    """What the axes of a grid become: kind, x axis, lines or rows, panels."""
+
+    def fit(axis: Axis) -> tuple[bool, bool, bool, int]:
+        is_frequency = axis.name == "frequency" and len(axis.values) > 2
+        return axis.name == x, axis.is_numeric, is_frequency, len(axis.values)
+
+    across = max(reversed(axes), key=fit)
+    others = [axis for axis in axes if axis is not across]
+    others.sort(key=lambda axis: (kind == "map" and axis.is_numeric, len(axis.values)))
+    along = others.pop() if others else None
+    if along is not None and len(along.values) > MOST_LINES:
+        is_short = len(across.values) <= MOST_LINES
+        kind = kind or ("lines" if is_short else "map")
+        if kind == "lines" and is_short and x is None:  # a long axis beside a short one
+            across, along = along, across
+    return kind or "lines", across, along, [axis for axis in axes if axis in others]
+
+
+def _signature(axis: Axis | None) -> tuple[object, ...] | None:
+    """Equal for axes that are the same."""
+    return None if axis is None else (axis.name, *axis.values.tolist())
 
 
 def _size(panels: Sequence[Panel], columns: int) -> tuple[float, float]:
     """Width and height of a figure [inches]."""
     width, height = _PANEL_SIZES[columns]
     beside = 1.3 if any(panel.along for panel in panels) else 0.0
-    above = 0.0 if beside else 0.3
-    return max(4.2, beside + width * columns), above + 0.3 + height * -(-len(panels) // columns)
+    return max(4.2, beside + width * columns), (0.3 if beside else 0.6) + height * -(-len(panels) // columns)
 
 
-def _palette(values: Array) -> dict[Any, str]:
-    """Value of an axis → its colour, from dark to light if there are more than can be told apart otherwise."""
-    colors = list(LINE_COLORS)
-    if len(values) > MOST_LINES:
-        colors = [to_hex(color) for color in colormaps["viridis"](np.linspace(0.0, 0.95, len(values)))]
-    return dict(zip(values.tolist(), colors, strict=False))
+def _palettes(panels: Sequence[Panel]) -> dict[str, dict[Any, str]]:
+    """Each axis that gives lines → its values in all panels → their colours, from dark to light if they are many."""
+    found: dict[str, list[Axis]] = {}
+    for panel in panels:
+        if panel.along is not None and panel.kind == "lines":
+            found.setdefault(panel.along.name, []).append(panel.along)
+    palettes = {}
+    for name, axes in found.items():
+        values = list(dict.fromkeys(value for axis in axes for value in axis.values.tolist()))
+        values = sorted(values) if all(axis.is_numeric for axis in axes) else values
+        colors = list(LINE_COLORS)
+        if len(values) > MOST_LINES:
+            colors = [to_hex(color) for color in colormaps["viridis"](np.linspace(0.0, 0.95, len(values)))]
+        palettes[name] = dict(zip(values, colors, strict=False))
+    return palettes
 
 
-def _colors(panel: Panel, values: Mapping[str, Array]) -> list[str]:
-    """Colour of each line of a panel, given the values of all panels: each has the same colour everywhere."""
-    if panel.along is None:
-        return [BLUE]
-    palette = _palette(values[panel.along.name])
-    return [palette[value] for value in panel.along.values.tolist()]
-
-
-def _places(panel: Panel) -> list[Array]:
-    """Places along x of each line; names have the points of several lines side by side."""
-    count = len(panel.cells.mean)
-    shifts = np.zeros(count) if panel.across.is_numeric else (np.arange(count) - (count - 1) / 2) * 0.7 / count
-    return [panel.across.places + shift for shift in shifts]
-
-
-def _draw_lines(axes: Axes, panel: Panel, colors: Sequence[str]) -> None:
-    """The lines of a panel with their bands, or points with bars where x has names."""
-    is_numeric = panel.across.is_numeric
-    for places, color, mean, sd, error in zip(
-        _places(panel), colors, panel.cells.mean, panel.cells.sd, panel.cells.standard_error, strict=True
-    ):
-        bands = [(error, _DEEP, 3.5)] if panel.along else [(sd, _LIGHT, 7.0), (error, _DEEP, 3.5)]
-        for half, opacity, width in bands:
-            style: dict[str, Any] = {"color": color, "alpha": opacity}
-            barred = np.isfinite(half)
-            if is_numeric:
-                axes.fill_between(places, mean - half, mean + half, linewidth=0, **style)
-                # A band between gaps has no width: such a point has a bar.
-                beside = np.pad(barred, 1)
-                barred &= ~beside[:-2] & ~beside[2:]
-            low, high = (mean - half)[barred], (mean + half)[barred]
-            axes.vlines(places[barred], low, high, linewidth=width, **style)
-        axes.plot(places, mean, "o-" if is_numeric else "o", markersize=3.5, linewidth=1.2, color=color)
+def _draw_lines(axes: Axes, panel: Panel, palette: Mapping[Any, str]) -> None:
+    """The lines of a panel with their bars; names along x have the points of several lines side by side."""
+    cells, values, is_numeric = panel.cells, panel.across.values, panel.across.is_numeric
+    count = len(cells.mean)
+    colors = [palette[value] for value in panel.along.values.tolist()] if panel.along else [BLUE]
+    shifts = np.zeros(count) if is_numeric else (np.arange(count) - (count - 1) / 2) * 0.7 / count
+    places = values if is_numeric else np.arange(len(values))
+    for number, (shift, color) in enumerate(zip(shifts, colors, strict=True)):
+        mean = cells.mean[number]
+        if panel.along is None:
+            axes.errorbar(places, mean, cells.sd[number], fmt="none", ecolor=(color, _LIGHT), elinewidth=8.0)
+        error, line = cells.standard_error[number], "o-" if is_numeric else "o"
+        style: dict[str, Any] = {"markersize": 3.5, "linewidth": 1.2, "color": color, "ecolor": (color, _DEEP)}
+        axes.errorbar(places + shift, mean, error, fmt=line, elinewidth=3.5, **style)
+    failed = np.flatnonzero(cells.failed.any(axis=0))
+    if failed.size:
+        floor: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "clip_on": False, "in_layout": False}
+        axes.plot(places[failed], 0.0 * failed, "x", color=RED, markersize=5.0, zorder=5, **floor)
+    texts = short_texts(values)
+    if not is_numeric:
+        rotation = 30 if max(map(len, texts)) * len(texts) > 30 else 0
+        axes.set_xticks(places, texts, rotation=rotation)
+        axes.set_xlim(-0.6, len(values) - 0.4)
+    else:
+        placed = values.astype(float)
+        if values[0] > 0 and _unevenness(np.log(placed)) < _unevenness(placed):
+            axes.set_xscale("log")
+            placed = np.log(placed)
+        if len(values) <= _MOST_TICKS and np.diff(placed).min() > 0.08 * np.ptp(placed):
+            axes.set_xticks(values, texts)
+            axes.xaxis.set_minor_locator(NullLocator())
     tidy(axes, grid="y")
-
-
-def _set_ticks(axes: Axes, across: Axis, panels: Sequence[Panel]) -> None:
-    """Scale and ticks of the x axis, for the values that all panels have on this axis."""
-    if not across.is_numeric:
-        axes.set_xticks(across.places, across.texts)
-        axes.set_xlim(-0.6, len(across.values) - 0.4)
-        if len(across.values) > label_room(axes, across.texts)[0]:
-            axes.tick_params(axis="x", rotation=30)
-        return
-    named = [panel.across for panel in panels if panel.across.name == across.name and panel.across.is_numeric]
-    values = np.unique(np.concatenate([axis.values for axis in named]))
-    placed = values.astype(float)
-    if values[0] > 0 and values[-1] >= _DECADES * values[0] and _unevenness(np.log(placed)) <= _unevenness(placed):
-        axes.set_xscale("log")
-        placed = np.log(placed)
-    if len(values) <= _MOST_TICKS:
-        texts = short_texts(values)
-        needed = float(np.ptp(placed)) / label_room(axes, texts)[0]
-        shown = [0, len(values) - 1]
-        for number in range(1, len(values) - 1):
-            if placed[number] - placed[shown[-2]] >= needed <= placed[-1] - placed[number]:
-                shown.insert(-1, number)
-        axes.set_xticks(values[shown], [texts[number] for number in shown])
-        axes.xaxis.set_minor_locator(NullLocator())
-    elif axes.get_xscale() == "linear":
-        axes.ticklabel_format(axis="x", scilimits=(-3, 4))
 
 
 def _unevenness(places: Array) -> float:
@@ -207,134 +295,56 @@ def _unevenness(places: Array) -> float:
     return float(gaps.std() / gaps.mean())
 
 
-def _draw_failed_strip(axes: Axes, panel: Panel, colors: Sequence[str], most: float) -> None:
-    """A strip above a panel with the share of the walks that failed, up to the greatest of all panels."""
-    strip = axes.inset_axes((0.0, 1.04, 1.0, 0.16), sharex=axes)
-    line = "o-" if panel.across.is_numeric else "o"
-    for places, color, share in zip(_places(panel), colors, panel.failed_share, strict=True):
-        strip.plot(places, share, line, color=color if panel.along else RED, linewidth=0.8, markersize=2.5)
-    strip.set_ylim(-0.1 * most, 1.1 * most)
-    strip.set_yticks([0.0, most])
-    strip.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=None if most < 0.01 else 0))
-    strip.set_ylabel("failed", fontsize="small", color=RED)
-    strip.tick_params(labelbottom=False, labelsize="x-small")
-    tidy(strip)
+def _draw_map(axes: Axes, panel: Panel, limits: tuple[float, float]) -> Any:
+    """A map, in the colours of these limits; empty where there is no mean, with dots as large as the share failed."""
+    assert panel.along is not None
+    cells = panel.cells
+    image = axes.imshow(cells.mean, origin="lower", aspect="auto", cmap="viridis", vmin=limits[0], vmax=limits[1])
+    for axis, values in ((axes.xaxis, panel.across.values), (axes.yaxis, panel.along.values)):
+        texts = short_texts(values)
+        most = _MOST_ROWS if axis is axes.yaxis else max(2, 32 // max(map(len, texts)))
+        every = slice(None, None, math.ceil(len(texts) / most))
+        axis.set_ticks(range(len(texts))[every], texts[every])
+    axes.set_facecolor(GROUND)
+    axes.spines[:].set_visible(False)
+    axes.tick_params(color=FAINT)
+    share = cells.failed / np.maximum(cells.count + cells.absent + cells.failed, 1)
+    rows, columns = np.nonzero(share)
+    axes.scatter(columns, rows, 50 * share[rows, columns], color=RED, edgecolor="white", linewidth=0.5)
+    return image
 
 
-def _has_numbers(maps: Sequence[Panel]) -> bool:
-    """Whether there is room for numbers in maps."""
-    return sum(panel.cells.mean.size for panel in maps) <= _MOST_NUMBERS
-
-
-def _draw_maps(maps: Sequence[tuple[Axes, Panel]], label: str) -> None:
-    """Maps in common colours, whose meaning is the label; cells that are NaN stay empty."""
-    if not maps:
-        return
-    means = np.concatenate([panel.cells.mean.ravel() for _, panel in maps])
-    colors = {"vmin": np.nanmin(means), "vmax": np.nanmax(means)} if np.isfinite(means).any() else {}
-    with_numbers = _has_numbers([panel for _, panel in maps])
-    for axes, panel in maps:
-        assert panel.along is not None
-        image = axes.imshow(panel.cells.mean, origin="lower", aspect="auto", cmap="viridis", **colors)
-        columns, rows = panel.across.texts, panel.along.texts
-        for axis, texts, room in zip((axes.xaxis, axes.yaxis), (columns, rows), label_room(axes, columns), strict=True):
-            every = slice(None, None, math.ceil(len(texts) / max(1, min(_MOST_ROWS, int(room)))))
-            axis.set_ticks(range(len(texts))[every], list(texts[every]))
-        axes.set_facecolor(GROUND)
-        axes.spines[:].set_visible(False)
-        axes.tick_params(color=FAINT)
-        if with_numbers:
-            _write_values(axes, image, panel.cells.mean, panel.counts)
-        else:
-            _draw_failed(axes, panel.failed_share)
-    areas = [axes for axes, _ in maps]
-    areas[0].figure.colorbar(image, ax=areas, label=label).outline.set_visible(False)
-
-
-def _write_values(axes: Axes, image: Any, table: Array, cells: Mapping[str, Array]) -> None:
-    """Write into each cell of a map its value, and how many of its walks failed or have not been run.
-
-    Args:
-        axes: where the map is.
-        image: the map.
-        table: its values; a dash stands for NaN, unless the cell has no walks at all.
-        cells: numbers of walks: name of `COUNTS` → table.
-    """
-    for place, value in np.ndenumerate(table):
-        rested, absent, lost, waiting = (cells[name][place] for name in COUNTS)
-        if not (rested or absent or lost or waiting):
-            continue
-        text = f"{value:.3g}" if np.isfinite(value) else "–"
-        text += f"\n{lost:.0f} failed" * bool(lost) + f"\n{waiting:.0f} to run" * bool(waiting)
-        red, green, blue, _ = image.to_rgba(value) if np.isfinite(value) else (1.0, 1.0, 1.0, 1.0)
-        color = INK if 0.3 * red + 0.59 * green + 0.11 * blue > 0.5 else "white"
-        axes.text(place[1], place[0], text, ha="center", va="center", color=color, fontsize="small")
-
-
-def _draw_failed(axes: Axes, share: Array) -> None:
-    """Mark cells of a map in which walks failed by a dot, whose area is proportional to the share that failed."""
-    rows, columns = np.nonzero(share > 0)
-    sizes = _LARGEST_DOT * np.sqrt(share[rows, columns])
-    places: dict[str, Any] = {"offsets": np.stack([columns, rows], axis=1), "offset_transform": axes.transData}
-    style: dict[str, Any] = {"facecolor": RED, "edgecolor": "white", "linewidth": 0.5}
-    dots = EllipseCollection(sizes, sizes, np.zeros(len(sizes)), units="xy", **places, **style)
-    axes.add_collection(dots, autolim=False)
-
-
-def _begin_at_zero(panels: Sequence[Axes]) -> None:
-    """Let the common y axis of lines begin at zero if all is positive and takes more than half of it."""
-    if panels:
-        low, high = (f(getattr(axes.dataLim, end) for axes in panels) for f, end in ((min, "y0"), (max, "y1")))
-        if 0 <= low < 0.5 * high:
-            panels[0].set_ylim(0.0, 1.05 * high)
-
-
-def _label(
-    figure: Figure | SubFigure | None, plotted: Sequence[tuple[Axes, Panel]], label: str, *, alike: bool
+def _draw_legends(
+    owner: Figure | SubFigure | None,
+    areas: Sequence[Axes],
+    panels: Sequence[Panel],
+    palettes: Mapping[str, Mapping[Any, str]],
 ) -> None:
-    """Label axes: common ones once for the figure, if there is one, others at each panel; say which walks are lost."""
-    common_x = figure is not None and alike
-    common_y = common_x or (figure is not None and all(panel.kind == "lines" for _, panel in plotted))
-    for axes, panel in plotted:
-        across, note = quantity_label(panel.across.name), lost_note([panel.counts])
-        rows = quantity_label(panel.along.name) if panel.kind == "map" and panel.along else label
-        if common_x:
-            axes.set_xlabel(note, color=RED, fontsize="small")
-        else:
-            axes.set_xlabel(f"{across}\n{note}" if note else across)
-        if not common_y:
-            axes.set_ylabel(rows)
-    if figure is not None and common_x:
-        figure.supxlabel(across, fontsize="medium")
-    if figure is not None and common_y:
-        figure.supylabel(rows, fontsize="medium")
-
-
-def _draw_legends(owner: Axes | Figure | SubFigure, plotted: Sequence[tuple[Axes, Panel]], **place: Any) -> None:
     """One legend of all panels; if their lines are of several axes, each panel has one of its own, too."""
-    panels = [panel for _, panel in plotted]
-    values = line_values(panels)
     style: dict[str, Any] = {"frameon": False, "fontsize": "small"}
-    title, handles = _line_handles(*next(iter(values.items()))) if len(values) == 1 else (None, [])
-    for axes, panel in plotted:
-        if len(values) > 1 and panel.kind == "lines" and panel.along:
-            own, lines = _line_handles(panel.along.name, values[panel.along.name])
-            axes.legend(handles=lines, title=own, **style)
+    dot: dict[str, Any] = {"marker": "o", "markersize": 3.5}
+    handles: list[Line2D | Patch] = []
+    title = None
+    for name, palette in palettes.items():
+        texts = short_texts(list(palette))
+        lines = [
+            Line2D([], [], color=color, label=text, **dot) for color, text in zip(palette.values(), texts, strict=True)
+        ]
+        if len(palettes) == 1:
+            handles, title = [*lines], with_unit(math_symbol(name), unit_text(name))
+        for axes, panel in zip(areas, panels, strict=True):
+            if len(palettes) > 1 and panel.kind == "lines" and panel.along and panel.along.name == name:
+                axes.legend(handles=lines, title=with_unit(math_symbol(name), unit_text(name)), **style)
     if any(panel.kind == "lines" for panel in panels):
         handles.append(Patch(color=(FAINT, _DEEP), linewidth=0, label="± standard error"))
     if any(panel.along is None for panel in panels):
         handles.append(Patch(color=(FAINT, _LIGHT), linewidth=0, label="± standard deviation"))
-    maps = [panel for panel in panels if panel.kind == "map"]
-    if not _has_numbers(maps) and any(panel.cells.failed.any() for panel in maps):
-        handles.append(Line2D([], [], color=RED, marker="o", linestyle="", label="share of walks failed"))
+    if any(panel.cells.failed.any() for panel in panels):
+        marker = "x" if panels[0].kind == "lines" else "o"
+        handles.append(Line2D([], [], color=RED, marker=marker, linestyle="", label="walks failed"))
+    place: dict[str, Any] = {}
+    if owner is not None:
+        beside = any(panel.along for panel in panels if panel.kind == "lines")
+        place = {"loc": "outside right upper", "ncols": 1} if beside else {"loc": "outside upper right", "ncols": 2}
     if handles:
-        owner.legend(handles=handles, title=title, **style, **place)
-
-
-def _line_handles(name: str, values: Array) -> tuple[str, list[Line2D | Patch]]:
-    """Title and entries of the legend of lines."""
-    handles: list[Line2D | Patch] = [
-        Line2D([], [], color=color, marker="o", markersize=3.5, label=text)
-        for color, text in zip(_palette(values).values(), short_texts(values), strict=True)
-    ]
-    return with_unit(math_symbol(name), unit_text(name)), handles
+        (areas[0] if owner is None else owner).legend(handles=handles, title=title, **style, **place)

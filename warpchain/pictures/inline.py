@@ -3,11 +3,11 @@
 import base64
 import html
 import io
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from typing import Any, Final
 
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 NOTEBOOK_DPI: Final = 100
 """Resolution of a figure in a notebook [dots per inch]."""
@@ -21,10 +21,16 @@ class InlineFigure(Figure):
         return png(self)
 
 
-def png(figure: Figure) -> bytes:
-    """A figure as the bytes of a PNG file."""
-    content = io.BytesIO()
-    figure.savefig(content, format="png", dpi=NOTEBOOK_DPI)
+def png(figure: Figure, dpi: float = NOTEBOOK_DPI) -> bytes:
+    """A figure as the bytes of a PNG file.
+
+    It is painted directly, which takes half the time of `savefig`: that draws everything once more beforehand.
+    """
+    given, content = figure.dpi, io.BytesIO()
+    figure.set_dpi(dpi)
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.print_png(content, metadata={"Software": None}, pil_kwargs={"compress_level": 3})
+    figure.set_dpi(given)
     return content.getvalue()
 
 
@@ -38,25 +44,14 @@ def first_png(draws: Iterable[Callable[[], Any]]) -> bytes | None:
     return None
 
 
-def axes_text(axes: Mapping[str, NDArray[Any]], samples: int) -> str:
-    """Name and values of each axis, only the ends of many, and the number of samples."""
-    parts = []
-    for name, values in axes.items():
-        texts = [f"{value:g}" if values.dtype.kind == "f" else str(value) for value in values]
-        shown = ", ".join(texts) if len(texts) <= 6 else f"{texts[0]} … {texts[-1]} ({len(texts)} values)"
-        parts.append(f"{name} {shown}")
-    return "; ".join([*parts, f"samples {samples}"])
+def fragment(text: str, picture: bytes | None) -> str:
+    """A fragment of HTML: lines of text, and a picture (PNG) if there is one."""
+    shown = "" if picture is None else image(picture, text.partition("\n")[0])
+    return f"<div><pre>{html.escape(text)}</pre>{shown}</div>"
 
 
-def page(title: str, rows: Iterable[tuple[str, str]], picture: bytes | None) -> str:
-    """A fragment of HTML: a title, a table of names and values, and a picture (PNG) if there is one."""
-    lines = [
-        f'<tr><th style="text-align:left">{html.escape(name)}</th>'
-        f'<td style="text-align:left">{html.escape(value)}</td></tr>'
-        for name, value in rows
-    ]
-    shown = ""
-    if picture is not None:
-        data = base64.b64encode(picture).decode()
-        shown = f'<img alt="{html.escape(title)}" style="max-width:100%" src="data:image/png;base64,{data}">'
-    return f"<div><b>{html.escape(title)}</b><table>{''.join(lines)}</table>{shown}</div>"
+def image(content: bytes, text: str, width: str = "auto") -> str:
+    """A picture (PNG) that is part of the HTML, its text for who cannot see it, and its width."""
+    data = base64.b64encode(content).decode()
+    style = f"max-width:100%;width:{width}"
+    return f'<img alt="{html.escape(text)}" style="{style}" src="data:image/png;base64,{data}">'

@@ -1,12 +1,11 @@
 """How all figures look: colours, axes, resolution; and a figure with its caption."""
 
 import os
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-from warpchain.files import replacing
+from warpchain.files import write_whole
 from warpchain.inputs.validation import InputError
 
 if TYPE_CHECKING:
@@ -66,16 +65,12 @@ class Picture:
 def save_figure(figure: "Figure", path: str | os.PathLike[str]) -> None:
     """Write a figure as a PNG, whole or not at all.
 
-    It is painted directly, which takes half the time of `savefig`: that draws everything once more beforehand.
-
     Raises:
         OSError: the file cannot be written.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from warpchain.pictures.inline import png
 
-    figure.set_dpi(PICTURE_DPI)
-    with replacing(path) as part:
-        FigureCanvasAgg(figure).print_png(part, pil_kwargs={"compress_level": 3})  # type: ignore[no-untyped-call]
+    write_whole(path, png(figure, PICTURE_DPI))
 
 
 def tidy(axes: "Axes", *, grid: Literal["x", "y", "both"] | None = None) -> None:
@@ -108,13 +103,3 @@ def panel_grid(
     for axes in grid[count - columns : count]:
         axes.tick_params(labelbottom=True)
     return grid[:count], grid[count:]
-
-
-def label_room(axes: "Axes", texts: Sequence[str]) -> tuple[float, float]:
-    """How many labels as wide as the widest text fit below a panel, and how many lines beside it.
-
-    The panel is measured before its layout, which changes its size little.
-    """
-    box, dpi = axes.get_window_extent(), axes.figure.dpi
-    character, line = 0.08, 0.16  # inches
-    return box.width / dpi / (character * (1 + max(map(len, texts)))), box.height / dpi / line

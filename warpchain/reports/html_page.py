@@ -1,7 +1,5 @@
 """Building blocks of HTML pages that contain everything and load nothing."""
 
-import base64
-import io
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from itertools import chain, repeat
@@ -9,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from warpchain.files import Kind
+from warpchain.pictures.inline import image, png
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -56,18 +55,14 @@ def page(title: str, tiles: Mapping[str, tuple[int, str]], sections: Mapping[str
 
 def picture(figure: "Figure", caption: str) -> str:
     """A figure with its caption; the image is part of the HTML."""
-    content = io.BytesIO()
-    figure.savefig(content, format="png", dpi=_DPI, metadata={"Software": None})
-    data = base64.b64encode(content.getvalue()).decode()
-    width = round(96 * figure.get_figwidth())
-    image = f'<img src="data:image/png;base64,{data}" alt="{escape(caption)}" style="width:{width}px">'
-    return f"<figure>{image}<figcaption>{escape(caption)}</figcaption></figure>"
+    shown = image(png(figure, _DPI), caption, f"{round(96 * figure.get_figwidth())}px")
+    return f"<figure>{shown}<figcaption>{escape(caption)}</figcaption></figure>"
 
 
 def table(
     head: Sequence[str], rows: Iterable[Sequence[str]], *, numeric: bool = False, marked: Iterable[bool] = ()
 ) -> str:
-    """A table of texts.
+    """A table of texts in HTML.
 
     Args:
         head: one text for each column; if all are empty, the table has no head.
@@ -77,50 +72,37 @@ def table(
     """
 
     def cells(tag: str, texts: Sequence[str]) -> str:
-        return "".join(f"<{tag}>{escape(text)}</{tag}>" for text in texts)
+        return "".join(f'<{tag} style="text-align:{side}">{escape(text)}</{tag}>' for text in texts)
 
+    side = "right" if numeric else "left"
     top = f"<thead><tr>{cells('th', head)}</tr></thead>" if any(head) else ""
-    kinds = (" class=bad" if bad else "" for bad in chain(marked, repeat(False)))
+    kinds = chain((" class=bad" if bad else "" for bad in marked), repeat(""))
     body = "\n".join(f"<tr{kind}>{cells('td', row)}</tr>" for row, kind in zip(rows, kinds, strict=False))
-    kind = ' class="number"' if numeric else ""
-    return f'<div class="wide"><table{kind}>{top}<tbody>\n{body}\n</tbody></table></div>'
+    return f'<div class="wide"><table>{top}<tbody>\n{body}\n</tbody></table></div>'
 
 
 _STYLE: Final = """
 :root { color-scheme: light; }
 body { margin: 0 auto; max-width: 62rem; padding: 1.5rem; color: #222; background: #fff;
        font: 16px/1.5 system-ui, sans-serif; }
-h1 { margin: 0; font-size: 1.9rem; }
-h2 { margin: 2.5rem 0 .75rem; padding-bottom: .25rem; border-bottom: 1px solid #ccc; font-size: 1.35rem; }
-h3 { margin: 1.5rem 0 .5rem; font-size: 1.05rem; }
+h2 { margin-top: 2.5rem; border-bottom: 1px solid #ccc; }
 p { max-width: 46rem; }
 a { color: #0072b2; margin-right: 1rem; }
-dl { display: flex; flex-wrap: wrap; gap: .75rem; margin: 1rem 0; }
+dl { display: flex; flex-wrap: wrap; gap: .75rem; }
 dl div { padding: .5rem 1rem; min-width: 6rem; background: #f3f4f5; border-left: 4px solid #0072b2; }
 dl .bad { border-color: #d55e00; }
-dt { font-size: .85rem; color: #555; }
-dd { margin: 0; font-size: 1.4rem; font-variant-numeric: tabular-nums; }
+dd { margin: 0; font-size: 1.4rem; }
 figure { margin: 1.5rem 0 2.5rem; }
 figure img { max-width: 100%; display: block; }
-figcaption { max-width: 46rem; margin-top: .5rem; color: #555; font-size: .9rem; }
+figcaption { max-width: 46rem; color: #555; font-size: .9rem; }
 .wide { overflow-x: auto; }
 table { border-collapse: collapse; font-size: .9rem; }
-th, td { padding: .2rem .8rem .2rem 0; text-align: left; vertical-align: top; border-bottom: 1px solid #e3e3e3; }
-th { border-bottom: 1px solid #777; }
-.number td, .number th { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+th, td { padding: .2rem .8rem .2rem 0; vertical-align: top; border-bottom: 1px solid #e3e3e3;
+         font-variant-numeric: tabular-nums; }
 tr.bad td, p.bad { color: #a84a00; }
 iframe { width: 100%; border: 1px solid #ccc; }
 pre { max-height: 30rem; overflow: auto; padding: 1rem; background: #f3f4f5; font-size: .8rem; line-height: 1.35; }
-@page { margin: 15mm; }
-@media print {
-  body { max-width: none; padding: 0; font-size: 10pt; }
-  nav, iframe { display: none; }
-  table { font-size: 8.5pt; }
-  pre { max-height: none; white-space: pre-wrap; }
-  .wide { overflow: visible; }
-  h2, h3 { break-after: avoid; }
-  figure, tr { break-inside: avoid; }
-}
+@media print { nav, iframe { display: none; } figure, tr { break-inside: avoid; } }
 """
 
 # The policy makes the browser refuse to load anything.

@@ -6,7 +6,7 @@ the software; on demand also one walk in motion. The same folder always gives th
 
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from html import escape
 from typing import Any, Final
 
@@ -15,18 +15,15 @@ import yaml
 from numpy.typing import NDArray
 
 from warpchain.files import checked_output, write_whole
-from warpchain.inputs.sections import SECTIONS
-from warpchain.inputs.validation import InputError, short
-from warpchain.pictures.labels import axis_symbol, cell_text, cell_values, unit_text, with_unit
+from warpchain.inputs.validation import short
+from warpchain.pictures.labels import axis_symbol, cell_text, cell_values, unit_text, value_text, with_unit
 from warpchain.reports.html_page import REPORTS, page, picture, table
 from warpchain.status import Status
 from warpchain.store.block_result import BlockResult
 from warpchain.store.manifest import Folder
 from warpchain.store.sweep_result import SweepResult, load
-from warpchain.sweeps.plan import load_sweep
-from warpchain.sweeps.recording import Recording
 from warpchain.version import VERSION
-from warpchain.walks.rows import MISSING, fault_remedies, field_column
+from warpchain.walks.faults import FAULTS
 from warpchain.walks.walk_result import WalkResult
 
 Array = NDArray[Any]
@@ -35,7 +32,7 @@ FRAME_INTERVAL: Final = 2e-3
 """Time between two frames of the walk in motion [s]."""
 
 _MOST_LISTED: Final = 100
-"""Greatest number of failed walks of each status, and of inaccurate ones, that are listed one by one."""
+"""Greatest number of walks with the same status or fault that are listed one by one."""
 
 
 def write_report(
@@ -56,16 +53,16 @@ def write_report(
     """
     result = load(directory)
     checked_output(path, REPORTS)
-    known = result.origin.sweeps[0].indices
-    if animation_of is not None and animation_of not in known:
-        raise InputError(f"--walk: there is no walk {animation_of}; give 0 … {known.max()}")
+    columns = [block.columns["status"] for block in result.blocks.values()]
+    failed = [(each.label, each.sentence, [own == each for own in columns]) for each in Status if not each.ok]
+    faults = [block.faults for block in result.blocks.values()]
+    inaccurate = [(name, remedy, [own[name] for own in faults]) for name, remedy in FAULTS.items()]
     sections = {
         "Figures": _figures(result),
         "Cells": _cells(result),
-        "Failed walks": _failed(result),
-        "Inaccurate walks": _inaccurate(result),
+        "Failed walks": _listed(result, failed) or "<p>None.</p>",
+        "Inaccurate walks": _listed(result, inaccurate),
         "One walk": "" if animation_of is None else _walk(result, animation_of, device),
-        "Parameters": _parameters(result),
         "Sweep": _sweep(result),
         "Provenance": _provenance(result),
     }
@@ -75,15 +72,12 @@ def write_report(
 
 def _tiles(result: SweepResult) -> dict[str, tuple[int, str]]:
     """The numbers at the top of the page, see `page`."""
-    counts = result.summary()
-    rested, missing = counts[Status.AT_REST.label], counts["missing"]
-    planned = sum(counts.get(status.label, 0) for status in Status if status.ok) - rested
-    failed = result.walk_count - rested - planned - missing
-    tiles = {"walks": (result.walk_count, ""), "at rest": (rested, ""), "failed": (failed, "bad" if failed else "")}
-    tiles |= {"ended as planned, not at rest": (planned, "")} if planned else {}
+    ends = {status.label: status.ok for status in Status} | {"missing": True}
+    tiles = {"walks": (result.walk_count, "")}
+    for label, count in result.summary().items():
+        tiles |= {label.replace("_", " "): (count, "" if ends[label] else "bad")} if count else {}
     inaccurate = result.inaccurate_count
-    tiles |= {"inaccurate": (inaccurate, "bad")} if inaccurate else {}
-    return tiles | ({"not run yet": (missing, "")} if missing else {})
+    return tiles | ({"inaccurate": (inaccurate, "bad")} if inaccurate else {})
 
 
 def _figures(result: SweepResult) -> str:
@@ -107,7 +101,7 @@ def _cells(result: SweepResult) -> str:
         counts |= {"not run yet": found.missing} if found.missing.any() else {}
         rows = [
             [
-                *(_plain(np.asarray(value).item()) for value in cell_values(block.axes, place).values()),
+                *(value_text(value) for value in cell_values(block.axes, place).values()),
                 *(_meters(float(values[place])) for values in lengths.values()),
                 *(f"{values[place]}" for values in counts.values()),
             ]
@@ -118,58 +112,25 @@ def _cells(result: SweepResult) -> str:
     return "\n".join(parts)
 
 
-def _failed(result: SweepResult) -> str:
-    """The failed walks by status, with the meaning of the status and what to try."""
-    parts = []
-    for status in Status:
-        chosen = [block.columns["status"] == status for block in result.blocks.values()]
-        count = sum(int(mask.sum()) for mask in chosen)
-        if not status.ok and count:
-            parts.append(f"<h3>{status.label}: {count:,}</h3><p>{escape(status.sentence)}</p>")
-            parts.append(_walk_table(result, chosen, count))
-    return "\n".join(parts) or "<p>None.</p>"
-
-
-def _inaccurate(result: SweepResult) -> str:
-    """The inaccurate walks, with what to try; empty if there is none."""
-    count = result.inaccurate_count
-    if not count:
-        return ""
-
-    def numbers(block: BlockResult) -> dict[str, Array]:
-        depths = [column for name, column in block.columns.items() if name.startswith("penetration_")]
-        names = {"energy error": "energy_error", "opening / m": "greatest_opening"}
-        return {head: block.columns[name] for head, name in names.items()} | {"penetration / m": np.max(depths, axis=0)}
-
-    remedies = fault_remedies(block.faults for block in result.blocks.values())
-    parts = [f"<p>{number:,}: {escape(remedy)}</p>" for remedy, number in remedies.items()]
-    chosen = [block.inaccurate for block in result.blocks.values()]
-    return "\n".join([*parts, _walk_table(result, chosen, count, numbers)])
-
-
-def _walk_table(
-    result: SweepResult,
-    chosen: Sequence[Array],
-    count: int,
-    numbers: Callable[[BlockResult], dict[str, Array]] = lambda block: {},
-) -> str:
-    """A table of walks with their block, cell and sample; of many only the first.
+def _listed(result: SweepResult, found: Iterable[tuple[str, str, Sequence[Array]]]) -> str:
+    """Walks with their block, cell and sample, of many only the first.
 
     Args:
         result: the sweep.
-        chosen: which walks of each block are meant.
-        count: how many that are.
-        numbers: heading → value for each walk of a block, of further columns.
+        found: a heading, what it means and what to try, and which walks of each block it is said of.
     """
-    several, head, rows = len(result.blocks) > 1, ["walk", "cell", "sample"], list[list[str]]()
-    for block, mask in zip(result.blocks.values(), chosen, strict=True):
-        further = numbers(block)
-        head = ["walk", *["block"] * several, "cell", "sample", *further]
-        for *place, sample in np.argwhere(mask)[: _MOST_LISTED - len(rows)]:
-            index, cell = block.columns["index"][(*place, sample)], cell_text(cell_values(block.axes, place)) or "–"
-            sizes = [f"{values[(*place, sample)]:.1e}" for values in further.values()]
-            rows.append([f"{index}", *[block.name] * several, cell, f"{sample}", *sizes])
-    return table(head, rows) + f"<p>… and {count - len(rows):,} more.</p>" * (count > len(rows))
+    several, parts = len(result.blocks) > 1, []
+    for heading, sentence, chosen in found:
+        rows, count = list[list[str]](), sum(int(mask.sum()) for mask in chosen)
+        for block, mask in zip(result.blocks.values(), chosen, strict=True):
+            for *place, sample in np.argwhere(mask)[: _MOST_LISTED - len(rows)]:
+                index, cell = block.columns["index"][(*place, sample)], cell_text(cell_values(block.axes, place)) or "–"
+                rows.append([f"{index}", *[block.name] * several, cell, f"{sample}"])
+        if count:
+            parts.append(f"<h3>{heading}: {count:,}</h3><p>{escape(sentence)}</p>")
+            parts.append(table(["walk", *["block"] * several, "cell", "sample"], rows))
+            parts.append(f"<p>… and {count - len(rows):,} more.</p>" * (count > len(rows)))
+    return "\n".join(parts)
 
 
 def _walk(result: SweepResult, index: int, device: str | None) -> str:
@@ -177,14 +138,13 @@ def _walk(result: SweepResult, index: int, device: str | None) -> str:
     from warpchain.run.sweep_run import on_device
     from warpchain.walks.one_walk import run_walk
 
-    sweep = load_sweep(result.sweep)
+    block, place = result.located(index)
+    sweep = block.sweep_at(place)
     planned = (sweep if device is None else on_device(sweep, device)).planned(index)
-    block = list(result.blocks.values())[planned.block]
-    place = (*planned.cell, planned.sample)
-    names = [f"block {block.name}"] * (len(result.blocks) > 1)
-    names += [cell_text(cell_values(block.axes, planned.cell))] * bool(planned.cell)
-    names += [f"sample {planned.sample}"]
-    frames = Recording.of(result.sweep.get("record", {})).frames
+    cell = cell_values(block.axes, place[:-1])
+    names = [f"block {block.name}"] * (len(result.blocks) > 1) + [cell_text(cell)] * bool(cell)
+    names += [f"sample {place[-1]}"]
+    frames = sweep.recording.frames
     if frames is not None and frames.includes(planned.sample) and block.kept[place]:
         walk, again, source = block.walk_motion(place), "", "Its frames were kept by the sweep."
     else:
@@ -222,81 +182,28 @@ def _player(walk: WalkResult) -> str:
 
 def _compared(walk: WalkResult, block: BlockResult, place: tuple[int, ...]) -> str:
     """Whether a walk that was run again has the same result as in the sweep."""
-    status, dx = int(block.columns["status"][place]), float(block.columns["dx"][place])
-    if status == MISSING:
+    if not block.is_there[place]:
         return "The sweep has not run it yet."
-    if walk.status == status and (walk.dx == dx or math.isnan(walk.dx)):
+    if block.has_same(walk, place):
         return "The sweep has the same, to the bit."
-    stored = f"Δx = {dx:.4f} m" if math.isfinite(dx) else Status(status).label
+    dx = float(block.columns["dx"][place])
+    stored = f"Δx = {dx:.4f} m" if math.isfinite(dx) else Status(int(block.columns["status"][place])).label
     return f"The sweep has another result, {stored}: it was computed by other software or on another machine."
 
 
-def _parameters(result: SweepResult) -> str:
-    """The values of all fields with units, a table for each section of the sweep file."""
-    blocks = result.sweep["blocks"]
-    parts = ["<p>± is the standard deviation of a Gaussian, truncated to physical values.</p>"]
-    presets = [["preset", "", _in_blocks({block["name"]: _value(block, "", "preset") for block in blocks}), "", ""]]
-    for section, model in SECTIONS.items():
-        rows = presets if section == "parameters" else []
-        for name in model.model_fields:
-            symbol = axis_symbol(name)
-            values = _in_blocks({block["name"]: _value(block, section, name) for block in blocks})
-            texts = "" if symbol == name.replace("_", " ") else symbol, values, unit_text(name)
-            rows.append([name, *texts, field_column(name).meaning])
-        head = ["name", "symbol", "value", "unit", "meaning"]
-        parts += [f"<h3>{section}</h3>", table(head, rows)]
-    return "\n".join(parts)
-
-
-def _value(block: Mapping[str, Any], section: str, name: str) -> str:
-    """A field in a block of a resolved sweep: its value, its values on an axis, or its distribution."""
-    if name in block["grid"]:
-        values = [_plain(value) for value in block["grid"][name]]
-        return ", ".join(values) if len(values) <= 12 else f"{values[0]} … {values[-1]} ({len(values)} values)"
-    own = block if name == "preset" else block[section]
-    default = SECTIONS["scene"].model_fields[name].default if section == "scene" else "of the preset"
-    plain = _plain(own.get(name, default))
-    distribution = block["distributions"].get(name, {})
-    if "gaussian" in distribution:
-        gaussian = distribution["gaussian"]
-        return f"{_plain(gaussian['mean']) if 'mean' in gaussian else plain} ± {_plain(gaussian['sigma'])}"
-    if "uniform" in distribution:
-        return "uniform, {} … {}".format(*map(_plain, distribution["uniform"]))
-    return plain
-
-
-def _in_blocks(values: Mapping[str, str]) -> str:
-    """The value that most blocks have, then the others with the names of their blocks."""
-    texts = list(values.values())
-    most = max(texts, key=texts.count)
-    return "; ".join([most, *(f"{name}: {text}" for name, text in values.items() if text != most)])
-
-
 def _sweep(result: SweepResult) -> str:
-    """The resolved sweep as a YAML file."""
+    """The resolved sweep as a YAML file, in which every parameter has its value."""
     text = yaml.safe_dump(result.sweep, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
-    return f"<pre>{escape(text)}</pre>"
+    note = "Values are in SI units; gaussian and uniform are what samples draw. <code>warpchain parameters</code> "
+    return f"<p>{note}says what each quantity is.</p><pre>{escape(text)}</pre>"
 
 
 def _provenance(result: SweepResult) -> str:
     """Seed, digest and versions of the software, and how to run the sweep again."""
-    software = ", ".join(f"{name} {number}" for name, number in result.provenance["versions"].items())
-    rows = [
-        ["seed", f"{result.seed}"],
-        ["digest of the sweep (SHA-256)", f"{result.provenance['digest']}"],
-        ["version of the numerics", f"{result.provenance['numerics_version']}"],
-        ["software that began the sweep", software],
-        ["software that wrote this page", f"warpchain {VERSION}"],
-    ]
+    rows = [[name, f"{value}"] for name, value in result.notes().items() if name != "sweep"]
+    rows.append(["this page", f"warpchain {VERSION}"])
     again = "<p>With the text under Sweep in a file: <code>warpchain sweep FILE.yaml -o DIR</code></p>"
     return table(["", ""], rows) + again
-
-
-def _plain(value: object) -> str:
-    """A value as in a sweep file."""
-    if value is None or isinstance(value, bool):
-        return "null" if value is None else str(value).lower()
-    return short(value) if isinstance(value, float) else str(value)
 
 
 def _meters(length: float) -> str:

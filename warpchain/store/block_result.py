@@ -1,7 +1,10 @@
 """One block of a sweep as arrays with named axes."""
 
+import itertools
 import math
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -11,10 +14,9 @@ from numpy.typing import NDArray
 
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.setup import Setup
-from warpchain.inputs.validation import InputError, plain, shown, suggestion
+from warpchain.inputs.validation import InputError, InputWarning, plain, shown, suggestion
 from warpchain.status import Status
 from warpchain.store.cell_statistics import CellStatistics
-from warpchain.store.repeated import place_of_index, repeat
 from warpchain.sweeps.block import POINT
 from warpchain.sweeps.plan import Sweep
 from warpchain.walks.rows import (
@@ -39,8 +41,8 @@ Array = NDArray[Any]
 
 _Variables = dict[str, tuple[tuple[str, ...], Array, dict[str, Any]]]
 """Name → axes, values and attributes, as xarray takes them."""
-KeptMotions = Callable[[Iterable[int]], "Iterator[tuple[int, h5py.Group]]"]
-"""Opens the kept motions of some walks, given their places in a flat column of their block; yields place and group."""
+Motion = tuple[Callable[[], "AbstractContextManager[h5py.File]"], str]
+"""What opens the file with a kept motion, and the group in there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +77,7 @@ class BlockResult:
         drawn: names of the quantities that samples draw; the values are in the columns NAME_drawn.
         columns: name → values.
         origin: what it was computed from.
-        kept_motions: opens the kept motions.
+        motions: place of a walk in a flat column → where its kept motion is, file by file.
     """
 
     name: str
@@ -84,7 +86,7 @@ class BlockResult:
     drawn: tuple[str, ...]
     columns: dict[str, Array]
     origin: Origin
-    kept_motions: KeptMotions
+    motions: Mapping[int, Motion]
 
     @property
     def dims(self) -> tuple[str, ...]:
@@ -137,25 +139,21 @@ class BlockResult:
 
     def filled_from(self, other: "BlockResult") -> "BlockResult":
         """The same block with the walks that only another result of it has."""
-
-        def kept_motions(places: Iterable[int]) -> "Iterator[tuple[int, h5py.Group]]":
-            wanted, there = np.array(list(places), np.int64), self.is_there.ravel()
-            for block, own in ((self, there[wanted]), (other, ~there[wanted])):
-                yield from block.kept_motions(wanted[own])
-
         columns = {name: np.where(self.is_there, values, other.columns[name]) for name, values in self.columns.items()}
-        return replace(self, columns=columns, kept_motions=kept_motions)
+        return replace(self, columns=columns, motions={**other.motions, **self.motions})
 
     @cached_property
     def kept(self) -> NDArray[np.bool_]:
         """Whether the motion of a walk was kept and is there, shape `shape`."""
-        series = [sweep.recording.series for sweep in self.origin.sweeps]
-        chosen = [
-            (choice := series[number]) is not None and choice.includes(sample)
-            for number, sample in self.origin.samples(self.number)
-        ]
-        kept: NDArray[np.bool_] = np.array(chosen) & self.is_there
-        return kept
+        return np.isin(np.arange(self.columns["index"].size), list(self.motions)).reshape(self.shape)
+
+    def kept_motions(self, places: Iterable[int]) -> "Iterator[tuple[int, h5py.Group]]":
+        """Places in a flat column, of those given, and groups of kept motions, file by file; errors as of `series`."""
+        wanted = set(places)
+        here = ((*self.motions[place], place) for place in self.motions if place in wanted)
+        for opened, walks in itertools.groupby(here, lambda walk: walk[0]):
+            with opened() as file:
+                yield from ((place, file[group]) for _, group, place in walks)
 
     def series(self, *, sample: int = 0, **at: float | str | None) -> WalkResult:
         """One walk whose motion was kept: `series(links=60, frequency=15, sample=2).time`.
@@ -229,10 +227,25 @@ class BlockResult:
         elif at:
             raise InputError(f"{', '.join(at)}: given together with index; leave one out")
         else:
-            _, place = place_of_index([self.columns["index"]], index)
+            _, place = located([self], index)
+        from warpchain.walks.one_walk import run_walk
+
         recording = {"frame_interval": frame_interval, "record_before": record_before, "record_loads": record_loads}
-        row = {name: values[place] for name, values in self.columns.items()}
-        return repeat(self.setup_at(place), self.sweep_at(place).seed, row, **recording)
+        walk = run_walk(self.setup_at(place), seed=self.sweep_at(place).seed, **recording)  # type: ignore[arg-type]
+        dx, number = self.columns["dx"][place], self.columns["index"][place]
+        if self.is_there[place] and not self.has_same(walk, place):
+            warnings.warn(
+                f"walk {number}: Δx is {walk.dx:g} m, and {dx:g} m in the sweep; it is repeated to the bit by the "
+                "version that ran it, on the same kind of processor",
+                InputWarning,
+                stacklevel=2,
+            )
+        return walk
+
+    def has_same(self, walk: WalkResult, place: tuple[int, ...]) -> bool:
+        """Whether a walk has the status and Δx of that at a place."""
+        status, dx = self.columns["status"][place], self.columns["dx"][place]
+        return bool(walk.status == status and (walk.dx == dx or (math.isnan(walk.dx) and math.isnan(dx))))
 
     def walk_motion(self, place: tuple[int, ...]) -> WalkResult:
         """The walk at a place along the axes and samples, if its motion was kept; errors as of `series`."""
@@ -243,10 +256,8 @@ class BlockResult:
             raise InputError(f"the motion of walk {self.columns['index'][place]} is not there; {remedy}")
         values = {name: column[place] for name, column in self.columns.items()}
         setup = self.setup_at(place)
-        ((_, motion),) = (
-            (at, read_motion(group, setup.scene.links))
-            for at, group in self.kept_motions([int(np.ravel_multi_index(place, self.shape))])
-        )
+        at = [int(np.ravel_multi_index(place, self.shape))]
+        (motion,) = (read_motion(group, setup.scene.links) for _, group in self.kept_motions(at))
         return WalkResult(
             status=Status(int(values["status"])),
             **numbers_of(values),
@@ -289,17 +300,10 @@ class BlockResult:
 
         Values of parameter sets (`points`) and those that samples drew; NaN of a walk that is not there.
         """
-        import xarray
-
-        points = self.origin.sweeps[0].blocks[self.number].points
-        values = {name: self._along_points(given) for name, given in points.items()}
-        values |= {name: self.columns[drawn_column(name)] for name in self.drawn}
-        whole = np.stack([np.broadcast_to(each, self.shape).astype(float) for each in values.values()], axis=-1)
-        return xarray.DataArray(whole, {**self.axes, "quantity": list(values)}, (*self.dims, "quantity"))
-
-    def _along_points(self, values: Sequence[Any]) -> Array:
-        """Values of the parameter sets as an array that goes with the columns."""
-        return np.reshape(np.array(values), [len(values) if dim == POINT else 1 for dim in self.dims])
+        points = [*self.origin.sweeps[0].blocks[self.number].points]
+        whole = self.to_xarray().reset_coords(points)[[*points, *map(drawn_column, self.drawn)]]
+        array = whole.to_dataarray("quantity").astype(float).assign_coords(quantity=[*points, *self.drawn])
+        return array.transpose(*self.dims, "quantity")
 
     def to_xarray(self) -> "xarray.Dataset":
         """The block as a data set with named coordinates, units and meanings."""
@@ -315,21 +319,16 @@ class BlockResult:
         return table.assign(status=table["status"].map(labels))
 
     def variables(self) -> tuple[_Variables, _Variables]:
-        """Coordinates and variables."""
-        coordinates: _Variables = {name: ((name,), values, self.notes(name)) for name, values in self._places().items()}
-        for name, values in self.origin.sweeps[0].blocks[self.number].points.items():
-            numbers = np.array(values)
-            coordinates[name] = (
-                (POINT,),
-                numbers.astype(float) if numbers.dtype.kind == "O" else numbers,
-                self.notes(name),
-            )
+        """Coordinates and variables; null among numbers is NaN."""
+        points = self.origin.sweeps[0].blocks[self.number].points
+        along = {name: (name, values) for name, values in self.axes.items()}
+        along |= {"sample": ("sample", np.arange(self.shape[-1]))}
+        along |= {name: (POINT, np.array(values)) for name, values in points.items()}
+        coordinates: _Variables = {
+            name: ((dim,), values.astype(float) if values.dtype.kind == "O" else values, self.notes(name))
+            for name, (dim, values) in along.items()
+        }
         return coordinates, {name: (self.dims, values, self.notes(name)) for name, values in self.columns.items()}
-
-    def _places(self) -> dict[str, Array]:
-        """Values of each axis and numbers of the samples; an axis with null has numbers, and NaN for it."""
-        numbers = {name: given.astype(float) if given.dtype.kind == "O" else given for name, given in self.axes.items()}
-        return {**numbers, "sample": np.arange(self.shape[-1])}
 
     def notes(self, name: str) -> dict[str, Any]:
         """Attributes of a variable."""
@@ -353,3 +352,20 @@ def status_counts(status: Array) -> dict[str, int]:
 def counted(summary: Mapping[str, int]) -> str:
     """Numbers of walks by status, in words."""
     return ", ".join(f"{count} {label}" for label, count in summary.items() if count)
+
+
+def located(blocks: Sequence[BlockResult], index: object) -> tuple[BlockResult, tuple[int, ...]]:
+    """Block and place along axes and samples of the walk with a number; an `InputError` if there is not just one."""
+    number = plain(index, "index")
+    if isinstance(number, bool) or not isinstance(number, int):
+        raise InputError(f"index: {shown(number)} is not the number of a walk; give a whole number")
+    found = [(block, tuple(map(int, at))) for block in blocks for at in np.argwhere(block.columns["index"] == number)]
+    if not found:
+        largest = max(int(block.columns["index"].max()) for block in blocks)
+        raise InputError(f"index: the sweep has no walk {number}; give one of its column index, at most {largest}")
+    if len(found) > 1:
+        samples = ", ".join(str(place[-1]) for _, place in found)
+        raise InputError(
+            f"index: {len(found)} merged sweeps have a walk {number}; give the values of its axes, and sample={samples}"
+        )
+    return found[0]

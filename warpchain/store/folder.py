@@ -147,31 +147,27 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
             warnings.warn(f"{problem}; its walks are computed again", InputWarning, stacklevel=4)
 
     def _describe(self) -> None:
-        """Write what the folder says of its sweep, if that is new; sweep.yaml is never older than sweep.json.
-
-        Lines of comments that somebody has added to sweep.yaml stay, at its head.
-        """
+        """Write what the folder says of its sweep, if that is new; sweep.yaml is never older than sweep.json."""
         description = self.directory / "sweep.yaml"
-        old = description.read_text("utf-8", "replace").splitlines() if description.is_file() else []
-        comments = [line + "\n" for line in old if line.startswith("#") and line not in _YAML_HEAD]
         if read_manifest(self.directory).growth != self.manifest.growth:
             remove_output(description)
             write_whole(self.directory / "sweep.json", self.manifest.text())
         if not description.exists():
             sweep = self.manifest.sweep.canonical()
             text = yaml.safe_dump(sweep, sort_keys=False, allow_unicode=True)
-            write_whole(description, _YAML_HEAD + "".join(comments) + text)
+            write_whole(description, _YAML_HEAD + text)
 
 
-def read_rows(directory: Folder, manifest: Manifest) -> Rows:
-    """Rows of all walks that are in a folder, shape (walks,); needs no lock, at any moment.
+def read_rows(directory: Folder, manifest: Manifest) -> tuple[list[Shard], Rows]:
+    """The shards that are in a folder, and the rows of all their walks, shape (walks,); needs no lock, at any moment.
 
     Raises:
         OSError: the folder or a shard cannot be read.
         InputError: a shard is damaged or foreign.
     """
     shards = present_shards(directory, manifest)
-    return np.concatenate([np.empty(0, manifest.row_type), *(read_shard(directory, shard) for shard in shards)])
+    rows = [np.empty(0, manifest.row_type), *(read_shard(directory, shard) for shard in shards)]
+    return shards, np.concatenate(rows)
 
 
 def running_rate(directory: Folder) -> float | None:

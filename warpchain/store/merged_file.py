@@ -50,70 +50,76 @@ def merge(sources: Folder | Sequence[Folder], path: str | os.PathLike[str]) -> N
     folders = [sources] if isinstance(sources, str | os.PathLike) else list(sources)
     target = given_path(path)
     checked_output(target, _MERGED)
-    results = _overlaid(folders, [load(folder) for folder in folders])
-    if len(results) > 1:
-        _check_fit(results)
-    image = hdf5_image(KIND, partial(_fill, results=list(results.values())))
-    write_whole(target, image, _MERGED)
-    if missing := sum(result.missing_count for result in results.values()):
-        walks = sum(result.walk_count for result in results.values())
+    whole = _joined(_by_seed({folder: load(folder) for folder in folders}, folders))
+    write_whole(target, hdf5_image(KIND, partial(_fill, whole=whole)), _MERGED)
+    if missing := whole.missing_count:
         warnings.warn(
-            f"{path}: {missing:,} of {walks:,} walks are missing; merge again with all parts, once they have run",
+            f"{path}: {missing:,} of {whole.walk_count:,} walks are missing; merge again with all parts, once they "
+            "have run",
             InputWarning,
             stacklevel=2,
         )
 
 
-def _overlaid(folders: Sequence[Folder], results: Sequence[SweepResult]) -> dict[Folder, SweepResult]:
-    """Results by the folder of each, those of one sweep put together by the first of their folders.
+def _by_seed(results: Mapping[Folder, SweepResult], folders: Sequence[Folder]) -> list[SweepResult]:
+    """Results of different seeds: each is filled in with the walks of those that have its seed.
 
     Raises:
-        InputError: walks of one sweep are in two of the folders, or sweeps of one seed differ.
+        InputError: walks of one sweep are in two of the folders, or sweeps differ in more than seed, samples and names,
+            or their samples draw nothing.
     """
     whole: dict[Folder, SweepResult] = {}
-    for folder, result in zip(folders, results, strict=True):
+    for folder in folders:
+        result = results[folder]
         seeds = {sweep.seed for sweep in result.origin.sweeps}
         other = next((one for one in whole if seeds & {sweep.seed for sweep in whole[one].origin.sweeps}), None)
         if other is None:
             whole[folder] = result
             continue
-        first = whole[other]
-        digests = [[sweep.digest() for sweep in each.origin.sweeps] for each in (first, result)]
-        pairs = list(zip(first.blocks.values(), result.blocks.values(), strict=False))
-        if os.path.samefile(other, folder):
-            raise InputError(f"{folder}: given twice; give each folder once")
+        digests = [[sweep.digest() for sweep in each.origin.sweeps] for each in (whole[other], result)]
+        pairs = list(zip(whole[other].blocks.values(), result.blocks.values(), strict=False))
         if digests[0] != digests[1] or any((a.is_there & b.is_there).any() for a, b in pairs):
             raise InputError(
                 f"{folder}: has walks that {other} has, of seed {result.seed}; give each folder once, parts of one "
                 "sweep, or sweeps with different seeds"
             )
-        blocks = {a.name: a.filled_from(b) for a, b in pairs}
-        whole[other] = replace(first, blocks=blocks)
-    return whole
-
-
-def _check_fit(results: Mapping[Folder, SweepResult]) -> None:
-    """Refuse results whose samples are not independent samples of the same cells.
-
-    Raises:
-        InputError: sweeps differ in more than seed, samples and names, or draw nothing.
-    """
-    expected = None
-    first = next(iter(results))
-    for folder, result in results.items():
+        whole[other] = replace(whole[other], blocks={a.name: a.filled_from(b) for a, b in pairs})
+    kinds = set()
+    for folder, result in whole.items() if len(whole) > 1 else ():
         for sweep in result.origin.sweeps:
-            for block in sweep.blocks:
-                if not block.drawn:
-                    raise InputError(
-                        f"{folder}: block {block.name} draws nothing, so that more samples are the same walks"
-                    )
-            digest = replace(sweep, seed=0).digest([1] * len(sweep.blocks)), result.provenance["numerics_version"]
-            expected = expected or digest
-            if digest != expected:
-                raise InputError(
-                    f"{folder}: is not the sweep of {first} with another seed; give folders that differ in nothing "
-                    "but seed, samples and names"
-                )
+            if still := [block.name for block in sweep.blocks if not block.drawn]:
+                raise InputError(f"{folder}: block {still[0]} draws nothing, so that more samples are the same walks")
+            kinds.add((replace(sweep, seed=0).digest([1] * len(sweep.blocks)), result.provenance["numerics_version"]))
+        if len(kinds) > 1:
+            raise InputError(
+                f"{folder}: is not the sweep of {folders[0]} with another seed; give folders that differ in nothing "
+                "but seed, samples and names"
+            )
+    return list(whole.values())
+
+
+def _joined(results: Sequence[SweepResult]) -> SweepResult:
+    """One result with the samples of all."""
+    if len(results) == 1:
+        return results[0]
+    sweeps = tuple(sweep for result in results for sweep in result.origin.sweeps)
+    software = [result.provenance["versions"] for result in results]
+    provenance = {
+        **results[0].provenance,
+        "digest": ", ".join(result.provenance["digest"] for result in results),
+        "versions": {name: ", ".join(dict.fromkeys(each[name] for each in software)) for name in software[0]},
+    }
+    origin, blocks = Origin(sweeps, provenance), {}
+    for parts in zip(*(result.blocks.values() for result in results), strict=True):
+        columns = {name: np.concatenate([part.columns[name] for part in parts], axis=-1) for name in parts[0].columns}
+        samples, first, motions = columns["index"].shape[-1], 0, {}
+        for part in parts:
+            for place, motion in part.motions.items():
+                cell, sample = divmod(place, part.shape[-1])
+                motions[cell * samples + first + sample] = motion
+            first += part.shape[-1]
+        blocks[parts[0].name] = replace(parts[0], columns=columns, origin=origin, motions=motions)
+    return SweepResult(blocks=blocks, origin=origin)
 
 
 def _is_merged(path: Path) -> bool:
@@ -132,26 +138,8 @@ _MERGED: Final = Kind("merged sweep", _is_merged)
 """All that a merged file replaces."""
 
 
-def _joined(results: Sequence[SweepResult]) -> SweepResult:
-    """One result with the samples of all, without their motions."""
-    blocks = {}
-    for first, *others in zip(*(result.blocks.values() for result in results), strict=True):
-        columns = {
-            name: np.concatenate([values, *(other.columns[name] for other in others)], axis=-1)
-            for name, values in first.columns.items()
-        }
-        blocks[first.name] = replace(first, columns=columns)
-    sweeps = tuple(sweep for result in results for sweep in result.origin.sweeps)
-    digests = ", ".join(result.provenance["digest"] for result in results)
-    software = [result.provenance["versions"] for result in results]
-    versions = {name: ", ".join(dict.fromkeys(each[name] for each in software)) for name in software[0]}
-    origin = Origin(sweeps, results[0].provenance | {"digest": digests, "versions": versions})
-    return SweepResult(blocks={name: replace(block, origin=origin) for name, block in blocks.items()}, origin=origin)
-
-
-def _fill(file: "h5py.File", results: Sequence[SweepResult]) -> None:
+def _fill(file: "h5py.File", whole: SweepResult) -> None:
     """Fill the empty file."""
-    whole = _joined(results)
     file.attrs.update(whole.notes())
     for name, block in whole.blocks.items():
         group = file if len(whole.blocks) == 1 else file.create_group(name, track_order=True)
@@ -165,14 +153,8 @@ def _fill(file: "h5py.File", results: Sequence[SweepResult]) -> None:
             variables["seed"] = (("sample",), np.array(seeds, object), notes)
         for name, (dims, values, notes) in {**coordinates, **variables}.items():
             _put(group, name, values, notes, () if dims == (name,) else dims)
-        first = 0
-        for result in results:
-            part = list(result.blocks.values())[block.number]
-            places = np.arange(block.columns["index"].size).reshape(block.shape)[..., first : first + part.shape[-1]]
-            for place, motion in part.kept_motions(np.flatnonzero(part.kept)):
-                kept = group.require_group("motion")
-                group.copy(motion, kept, str(places.ravel()[place]))
-            first += part.shape[-1]
+        for place, motion in block.kept_motions(block.motions):
+            group.copy(motion, group.require_group("motion"), str(place))
 
 
 def _put(group: "h5py.Group", name: str, values: NDArray[Any], notes: Mapping[str, Any], dims: Sequence[str]) -> None:

@@ -5,7 +5,7 @@ A folder can be read while its sweep runs: walks that are not there yet are miss
 
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -16,18 +16,15 @@ from numpy.typing import NDArray
 
 from warpchain.hdf5_files import reading_hdf5
 from warpchain.inputs.validation import InputError, shown, suggestion
-from warpchain.store.block_result import BlockResult, KeptMotions, Origin, counted, status_counts
+from warpchain.store.block_result import BlockResult, Motion, Origin, counted, located, status_counts
 from warpchain.store.cell_statistics import CellStatistics
 from warpchain.store.folder import read_rows
-from warpchain.store.manifest import Folder, Manifest, read_manifest, stored_sweep
-from warpchain.store.repeated import place_of_index
+from warpchain.store.manifest import Folder, read_manifest, stored_sweep
 from warpchain.store.shards import opened_motions, stamp
-from warpchain.sweeps.block import Block
-from warpchain.walks.rows import COLUMNS, MISSING, STORED_COLUMNS, Rows, derived_columns, drawn_column, quantity_of
+from warpchain.walks.rows import COLUMNS, KEYS, STORED_COLUMNS, derived_columns, drawn_column, missing_rows, quantity_of
 from warpchain.walks.walk_result import WalkResult
 
 if TYPE_CHECKING:
-    import h5py
     import pandas
     import xarray
     from matplotlib.axes import Axes
@@ -98,11 +95,9 @@ class SweepResult:
 
     def _repr_html_(self) -> str:
         """Walks by status, axes of each block, and the main figure."""
-        from warpchain.pictures.inline import axes_text, page
+        from warpchain.pictures.inline import fragment
 
-        blocks = [(f"block {name}", axes_text(each.axes, each.shape[-1])) for name, each in self.blocks.items()]
-        walks = f"{self.walk_count:,}: {counted(self.summary())}"
-        return page(f"Sweep {self.name}", [("walks", walks), ("seed", str(self.seed)), *blocks], self._repr_png_())
+        return fragment(repr(self), self._repr_png_())
 
     @property
     def walk_count(self) -> int:
@@ -151,17 +146,13 @@ class SweepResult:
 
         Its other arguments, without a number, say which walk of the only block it is.
         """
-        if index is None:
-            walk: WalkResult = self.__getattr__("walk")(**words)
-            return walk
-        block, _ = self.located(index)
-        return block.walk(index, **words)
+        repeat = self.__getattr__("walk") if index is None else self.located(index)[0].walk
+        walk: WalkResult = repeat(index, **words)
+        return walk
 
     def located(self, index: object) -> tuple[BlockResult, tuple[int, ...]]:
         """Block and place of the walk with a number; an `InputError` if there is none."""
-        blocks = list(self.blocks.values())
-        number, place = place_of_index([block.columns["index"] for block in blocks], index)
-        return blocks[number], place
+        return located(list(self.blocks.values()), index)
 
     def plot(
         self,
@@ -240,95 +231,62 @@ def _load_folder(directory: Folder) -> SweepResult:
     while True:
         manifest, begun = read_manifest(directory), stamp(directory)
         try:
-            present = read_rows(directory, manifest)
+            shards, rows = read_rows(directory, manifest)
             break
         except (OSError, InputError):
             if stamp(directory) == begun:  # else a run has begun anew or added samples meanwhile
                 raise
+    sweep, series = manifest.sweep, manifest.sweep.recording.series
+    motions: list[dict[int, Motion]] = [{} for _ in sweep.blocks]
+    for shard in shards:
+        opened = partial(opened_motions, folder, shard)
+        for row, (number, cell, sample) in enumerate(shard.keys.tolist() if shard.keeps_motion else ()):
+            if series is not None and series.includes(sample):
+                motions[number][cell * sweep.blocks[number].samples + sample] = opened, str(row)
 
-    def columns(block: Block) -> dict[str, Array]:
-        here = np.flatnonzero(present["block"] == manifest.sweep.blocks.index(block))
-        places = _places(present, block)[here]
-        found = {"index": block.indices}
-        for name in ("status", *STORED_COLUMNS, *map(drawn_column, block.drawn)):
-            kind = present.dtype[name]
-            values = np.full(block.walk_count, np.nan if kind.kind == "f" else MISSING, kind)
-            values[places] = present[name][here]
-            found[name] = values.reshape(block.shape)
-        return found
+    def column(number: int, name: str) -> Array:
+        block, here = sweep.blocks[number], rows[rows["block"] == number]
+        if name == "index":
+            return block.indices
+        values = missing_rows(rows.dtype, np.empty(1, KEYS))[name].repeat(block.walk_count)
+        values[here["cell"].astype(np.int64) * block.samples + here["sample"]] = here[name]
+        return values.reshape(block.shape)
 
     provenance = {name: getattr(manifest, name) for name in ("digest", "numerics_version", "versions")}
-    origin = Origin((manifest.sweep,), provenance)
-    return _result(origin, columns, lambda block: partial(_motions_in_folder, folder, manifest, block))
-
-
-def _places(keys: Rows, block: Block) -> NDArray[np.int64]:
-    """Places of walks in a flat column of a block, given their keys; of no meaning for walks of other blocks."""
-    places: NDArray[np.int64] = keys["cell"].astype(np.int64) * block.samples + keys["sample"]
-    return places
-
-
-def _motions_in_folder(
-    folder: Path, manifest: Manifest, block: Block, places: Iterable[int]
-) -> "Iterator[tuple[int, h5py.Group]]":
-    """`BlockResult.kept_motions` of a block of a folder."""
-    number, wanted = manifest.sweep.blocks.index(block), list(places)
-    for shard in manifest.shards if wanted else ():
-        there = _places(shard.keys, block)
-        rows = np.flatnonzero((shard.keys["block"] == number) & np.isin(there, wanted)) if shard.keeps_motion else ()
-        if len(rows):
-            with opened_motions(folder, shard) as file:
-                yield from ((int(there[row]), file[str(row)]) for row in rows)
+    return _result(Origin((sweep,), provenance), column, motions)
 
 
 def _load_merged(path: Folder) -> SweepResult:
+    opened = partial(reading_hdf5, Path(path).absolute(), KIND, REMEDY, WANTED)
     with reading_hdf5(path, KIND, REMEDY, WANTED) as file:
-        given, versions = json.loads(file.attrs["sweep"]), json.loads(file.attrs["versions"])
-        provenance = {
-            "digest": file.attrs["digest"],
-            "numerics_version": int(file.attrs["numerics_version"]),
-            "versions": versions,
-        }
-        origin = Origin(
-            tuple(stored_sweep(path, each) for each in (given if isinstance(given, list) else [given])), provenance
-        )
-        several = len(origin.sweeps[0].blocks) > 1
-
-        def columns(block: Block) -> dict[str, Array]:
-            group = file[block.name] if several else file
-            names = ("index", "status", *STORED_COLUMNS, *map(drawn_column, block.drawn))
-            return {name: group[name][()] for name in names}
-
-        whole = Path(path).absolute()
-        return _result(origin, columns, lambda block: partial(_motions_in_file, whole, block.name if several else "/"))
-
-
-def _motions_in_file(path: Path, group: str, places: Iterable[int]) -> "Iterator[tuple[int, h5py.Group]]":
-    """`BlockResult.kept_motions` of a block of a merged file, given its group."""
-    with reading_hdf5(path, KIND, REMEDY, WANTED) as file:
-        yield from ((place, file[f"{group}/motion/{place}"]) for place in places)
+        given = json.loads(file.attrs["sweep"])
+        sweeps = tuple(stored_sweep(path, each) for each in (given if isinstance(given, list) else [given]))
+        provenance = {"digest": file.attrs["digest"], "numerics_version": int(file.attrs["numerics_version"])}
+        origin = Origin(sweeps, provenance | {"versions": json.loads(file.attrs["versions"])})
+        groups = [block.name if len(sweeps[0].blocks) > 1 else "/" for block in sweeps[0].blocks]
+        motions: list[dict[int, Motion]] = [
+            {int(place): (opened, f"{group}/motion/{place}") for place in file[group].get("motion", ())}
+            for group in groups
+        ]
+        return _result(origin, lambda number, name: file[groups[number]][name][()], motions)
 
 
 def _result(
-    origin: Origin, columns: Callable[[Block], dict[str, Array]], motion: Callable[[Block], KeptMotions]
+    origin: Origin, column: Callable[[int, str], Array], motions: Sequence[Mapping[int, Motion]]
 ) -> SweepResult:
-    """A result, given the stored columns of each block and what reads its motions."""
-    blocks = {
-        block.name: BlockResult(
+    """A result, given what returns a stored column of a block by its number, and the motions of each block."""
+    blocks = {}
+    for number, block in enumerate(origin.sweeps[0].blocks):
+        drawn = [*map(drawn_column, block.drawn)]
+        columns = {name: column(number, name) for name in ("index", "status", *STORED_COLUMNS, *drawn)}
+        columns |= derived_columns(columns)
+        blocks[block.name] = BlockResult(
             name=block.name,
             number=number,
             axes={name: np.array(values) for name, values in block.axes.items()},
             drawn=block.drawn,
-            columns=_in_order(columns(block)),
+            columns={name: columns[name] for name in (*COLUMNS, *drawn)},
             origin=origin,
-            kept_motions=motion(block),
+            motions=motions[number],
         )
-        for number, block in enumerate(origin.sweeps[0].blocks)
-    }
     return SweepResult(blocks=blocks, origin=origin)
-
-
-def _in_order(stored: dict[str, Array]) -> dict[str, Array]:
-    """The columns of a block, those that follow from others among them."""
-    columns = stored | derived_columns(stored)
-    return {name: columns[name] for name in [*COLUMNS, *(name for name in columns if name not in COLUMNS)]}

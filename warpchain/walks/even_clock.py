@@ -44,41 +44,30 @@ def between(samples: Array, times: Array) -> Array:
     return rows
 
 
-class EvenClock:
-    """Rows at whole multiples of an interval, from samples that come in pieces.
+def even_rows(samples: Array, interval: float, after: float | None = None) -> Array:
+    """Rows at whole multiples of an interval from the first to the last of some samples, and these two as they are.
 
-    Attributes:
-        last: The latest sample, shape (1, columns), or (0, columns) before the first.
+    Args:
+        samples: shape (t, columns of a sample), times rising.
+        interval: time [s] between two marks.
+        after: time [s] in a walk that goes on, to which the first sample does not belong: marks begin after it.
     """
+    clock = samples[:, layout.TIME]
+    if not len(samples):
+        return samples
+    first, last = (_passed(time, interval) for time in (clock[0] if after is None else after, clock[-1]))
+    marks = np.arange(first, last, dtype=np.float64) * interval
+    rows = between(samples, marks) if len(marks) else samples[:0]
+    begin = samples[: after is None]
+    is_row = clock[-1] in (*marks[-1:], *begin[:, layout.TIME])
+    return np.concatenate([begin, rows, samples[len(samples) - (not is_row) :]])
 
-    def __init__(self, interval: float, columns: int) -> None:
-        """Begin before the first sample; interval [s]: between two marks."""
-        self.last: Array = np.empty((0, columns))
-        self._interval = interval
-        self._next = 0
 
-    def go_on(self, last: Array, time: float) -> None:
-        """Begin between two samples, the first of which was `last`, (columns,), with the mark after a time [s]."""
-        self.last, self._next = last[None, : self.last.shape[1]].copy(), self._passed(time)
-
-    def rows(self, samples: Array) -> Array:
-        """Rows at the marks up to the last of some more samples; the very first sample is a row as it is."""
-        if not len(samples):
-            return samples
-        start = samples[:0] if len(self.last) else samples[:1]
-        known = np.concatenate([self.last, samples])
-        if len(start):
-            self._next = self._passed(start[0, layout.TIME])
-        end = self._passed(known[-1, layout.TIME])
-        marks = np.arange(self._next, end, dtype=np.float64) * self._interval
-        self._next, self.last = max(self._next, end), samples[-1:].copy()
-        return np.concatenate([start, between(known, marks)]) if len(marks) else start
-
-    def _passed(self, time: float) -> int:
-        """Number of the first mark after a time [s]."""
-        mark = int(time / self._interval)
-        while mark * self._interval <= time:
-            mark += 1
-        while (mark - 1) * self._interval > time:
-            mark -= 1
-        return mark
+def _passed(time: float, interval: float) -> int:
+    """Number of the first mark after a time [s]."""
+    mark = int(time / interval)
+    while mark * interval <= time:
+        mark += 1
+    while (mark - 1) * interval > time:
+        mark -= 1
+    return mark

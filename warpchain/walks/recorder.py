@@ -1,7 +1,6 @@
 """Takes the time series and frames of a walk out of its world, between launches."""
 
-from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +8,7 @@ from numpy.typing import NDArray
 from warpchain.engine.batch import Batch
 from warpchain.kernels import layout
 from warpchain.loop.before_release import BEFORE, BeforeRelease
-from warpchain.walks.even_clock import EvenClock
+from warpchain.walks.even_clock import even_rows
 from warpchain.walks.motion import Keep
 from warpchain.walks.moving_plane import angles, frame_axes
 
@@ -28,16 +27,15 @@ SERIES: Final[dict[str, int | list[int]]] = {
 """Arrays of a `WalkResult` that are columns of the samples."""
 
 
-@dataclass(kw_only=True)
-class _Piece:
+class _Piece(NamedTuple):
     """What one launch has recorded: t samples and f frames of a chain of n links.
 
     Attributes:
-        samples: Shape (t, columns of a sample).
-        times: Of the frames [s], shape (f,).
-        frames: Joints [m], shape (f, n, 2).
-        loads: Forces [N] and moment [N m] of each joint, shape (f, n, 3); f is 0 if they are not kept.
-        planes: Of the frames, shape (f, PLANE_VALUES).
+        samples: shape (t, columns of a sample).
+        times: of the frames [s], shape (f,).
+        frames: joints [m], shape (f, n, 2).
+        loads: forces [N] and moment [N m] of each joint, shape (f, n, 3); f is 0 if they are not kept.
+        planes: of the frames, shape (f, PLANE_VALUES).
     """
 
     samples: Array
@@ -65,19 +63,16 @@ class Recorder:
             tilts: Whether the plane of the chain moves; the batch then keeps it.
         """
         self.before: BeforeRelease | None = None
-        self._batch, self._world, self.keep = batch, world, keep
-        self._has_samples, self._has_frames = batch.record.samples.size > 0, batch.record.frames.size > 0
-        self._width = batch.record.samples.shape[2]
-        self._clock = EvenClock((keep.series_every or 1) * batch.options.record_interval, self._width)
-        self._tilts = tilts
-        self._drive: list[_Piece] = []
+        self._batch, self._world, self.keep, self._tilts = batch, world, keep, tilts
+        self._drive: list[tuple[float, _Piece]] = []  # with the time at which the launch ended [s]
         self._pieces: list[_Piece] = []
+        self._after: float | None = None
 
     def _nothing(self) -> _Piece:
         """What a launch has recorded that recorded nothing."""
-        links = self._batch.links[self._world]
+        links, width = self._batch.links[self._world], self._batch.record.samples.shape[2]
         return _Piece(
-            samples=np.empty((0, self._width)),
+            samples=np.empty((0, width)),
             times=np.empty(0),
             frames=np.empty((0, links, 2)),
             loads=np.empty((0, links, 3)),
@@ -87,31 +82,25 @@ class Recorder:
     def drain(self, released: bool) -> None:
         """Take what the last launch wrote; before the release only what `release` may want is kept."""
         piece, keep, batch, world = self._nothing(), self.keep, self._batch, self._world
-        if self._has_samples:
+        if batch.record.samples.size > 0:
             samples = batch.drain_samples(world)
-            if not released:
-                piece.samples = samples
-            elif keep.series_every is not None:
-                piece.samples = self._clock.rows(samples)
-        if self._has_frames:
-            if self._tilts and released:
-                piece.planes = batch.frame_planes(world)
-            if keep.loads or not released:
-                piece.loads = batch.frame_loads(world)
-            piece.times, piece.frames = batch.drain_frames(world)
-        if keep.frame_every is None:
-            piece = replace(self._nothing(), samples=piece.samples)
+            if keep.series_every is not None or not released:
+                piece = piece._replace(samples=samples)
+        if batch.record.frames.size > 0:
+            planes = batch.frame_planes(world) if self._tilts and released else piece.planes
+            loads = batch.frame_loads(world) if keep.loads or not released else piece.loads
+            times, frames = batch.drain_frames(world)
+            if keep.frame_every is not None:
+                piece = piece._replace(times=times, frames=frames, loads=loads, planes=planes)
         if released:
             self._pieces.append(piece)
         elif keep.before > 0:
-            self._drive.append(piece)
-            oldest = batch.time(world) - keep.before
-            while self._drive and _ends_before(self._drive[0], oldest):
-                del self._drive[0]
+            until = batch.time(world)
+            self._drive = [*(each for each in self._drive if each[0] >= until - keep.before), (until, piece)]
 
-    def _joined(self, pieces: list[_Piece], *names: str) -> list[Array]:
-        """Attributes of pieces, each of all one behind the other."""
-        return [np.concatenate([getattr(piece, name) for piece in (self._nothing(), *pieces)]) for name in names]
+    def _joined(self, pieces: list[_Piece]) -> _Piece:
+        """All pieces, one behind the other."""
+        return _Piece(*map(np.concatenate, zip(self._nothing(), *pieces, strict=True)))
 
     def release(self, moment: float, raised: float, earliest: float) -> None:
         """Keep what was recorded in the last moments of the drive, all of which has been drained.
@@ -123,7 +112,7 @@ class Recorder:
         """
         if not self._drive:
             return
-        samples, times, frames, loads = self._joined(self._drive, "samples", "times", "frames", "loads")
+        samples, times, frames, loads, _ = self._joined([piece for _, piece in self._drive])
         oldest = max(moment - self.keep.before, earliest)
         samples = samples[(samples[:, layout.TIME] >= oldest) & (samples[:, layout.TIME] < moment)]
         wanted = (times >= oldest) & (times < moment)
@@ -140,15 +129,15 @@ class Recorder:
 
     def go_on(self, last: Array, time: float) -> None:
         """Begin within a walk at a time [s], with the sample before, (columns,)."""
-        if last[layout.TIME] >= 0:
-            self._clock.go_on(last, time)
+        if last[layout.TIME] >= 0 and self.keep.series_every is not None:
+            nothing = self._nothing()
+            self._pieces.append(nothing._replace(samples=last[None, : nothing.samples.shape[1]].copy()))
+            self._after = time
 
     def motion(self) -> dict[str, Any]:
         """The arrays of a `WalkResult` by name, and its `before_release`."""
-        names = ("samples", "times", "frames", "loads", "planes")
-        samples, frame_time, joints, loads, planes = self._joined(self._pieces, *names)
-        last = self._clock.last
-        samples = np.concatenate([samples, last[~np.isin(last[:, layout.TIME], samples[-1:, layout.TIME])]])
+        samples, times, frames, loads, planes = self._joined(self._pieces)
+        samples = even_rows(samples, (self.keep.series_every or 1) * self._batch.options.record_interval, self._after)
         tilting = samples if self._tilts else np.empty((0, layout.ALL_COLUMNS))
         tilt, yaw = angles(tilting[:, layout.PLANE_COLUMN :])
         return {
@@ -156,17 +145,11 @@ class Recorder:
             "center_z": tilting[:, layout.CENTER_Z],
             "tilt": tilt,
             "yaw": np.unwrap(yaw),
-            "frame_time": frame_time,
-            "frame_joints": joints,
+            "frame_time": times,
+            "frame_joints": frames,
             "frame_forces": loads[:, :, :2],
             "frame_moments": loads[:, :, 2],
             "frame_origin": planes[:, layout.ORIGIN : layout.ORIGIN + 3],
             "frame_axes": frame_axes(planes),
             BEFORE: self.before,
         }
-
-
-def _ends_before(piece: _Piece, moment: float) -> bool:
-    """Whether all of a piece is older than a moment [s]."""
-    ends = [times[-1] for times in (piece.samples[:, layout.TIME], piece.times) if len(times)]
-    return all(end < moment for end in ends)

@@ -234,21 +234,6 @@ class WalkResult:
         lengths = (self.greatest_opening, deepest, parameters.link_length, parameters.circle_radius)
         return [FAULTS[name] for name, found in faults(self.energy_error, *lengths).items() if found]
 
-    def facts(self) -> list[tuple[str, str]]:
-        """Names and values that a notebook shows beside the picture."""
-        return [
-            ("status", self.status.label if self.status.ok else f"{self.status.label}: {self.status.sentence}"),
-            ("distance Δx", f"{self.dx:.4g} m"),
-            ("chain", f"{self.setup.described}, preset {self.setup.preset}"),
-            ("walk time", f"{self.walk_time:.4g} s"),
-            ("seed", "none, nothing was drawn" if self.seed is None else str(self.seed)),
-            ("bounces", str(self.bounces)),
-            ("steps", f"{self.steps_accepted:,} accepted, {self.steps_rejected:,} rejected"),
-            ("energy unaccounted for", f"{self.energy['residual']:.1e} J"),
-            *(("warning", remedy) for remedy in self.warnings()),
-            *([] if np.isnan(self.wall_time) else [("computed in", f"{self.wall_time:.1f} s")]),
-        ]
-
     def state(self, t: float) -> State:
         """The chain at the end of its first step at or after a time, as samples and frames are taken.
 
@@ -329,10 +314,10 @@ class WalkResult:
         return first_png(partial(self.plot, kind) for kind in ("film_strip", "height_and_speed"))
 
     def _repr_html_(self) -> str:
-        """The most important numbers, and the picture."""
-        from warpchain.pictures.inline import page
+        """The most important numbers, why the walk is inaccurate if it is, and the picture."""
+        from warpchain.pictures.inline import fragment
 
-        return page(type(self).__name__, self.facts(), self._repr_png_())
+        return fragment("\n".join([repr(self), *self.warnings()]), self._repr_png_())
 
     def unit(self, name: str) -> str:
         """SI unit of a field; a `KeyError` if there is none of that name."""

@@ -6,6 +6,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from studies.stationary_loop.theory import MeanLoop
+
 Array = NDArray[np.float64]
 
 POINTS: Final = 801
@@ -13,7 +15,7 @@ POINTS: Final = 801
 
 
 class Catenary(NamedTuple):
-    """A hanging chain, as functions of the arc length at g points; signs as of a `StationaryLoop`.
+    """A hanging chain, as functions of the arc length at g points; signs as of `walk.mean_loop()`.
 
     Attributes:
         s: arc length from the lowest point [m], shape (g,).
@@ -28,6 +30,13 @@ class Catenary(NamedTuple):
     angle: Array
     curvature: Array
     effective_tension: Array
+
+
+def catenary_of(loop: MeanLoop) -> Catenary:
+    """The catenary between the ends of the free part of a mean loop and as long as it; errors as below."""
+    first, last = (np.array([np.interp(s, loop.s, column) for column in loop.position.T]) for s in loop.free)
+    weight = loop.parameters.density * loop.parameters.gravity
+    return catenary_between(first, last, loop.free[1] - loop.free[0], weight)
 
 
 def catenary_between(first: Array, last: Array, length: float, weight: float) -> Catenary:
