@@ -2,6 +2,7 @@
 
 import dataclasses
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -110,21 +111,25 @@ def test_errors_are_those_of_chains_alike() -> None:
     assert sigma(0.31) > 1.1 * sigma(0.23)
 
 
-def test_an_answer_at_the_edge_of_the_bank_is_refused() -> None:
-    """Friction 2.2 standard deviations off the middle, where few chains are; the line has the parameter's name."""
-    film = motion(0.38).seen(CAMERA, np.zeros(8), np.random.default_rng(0))
-    with pytest.raises(
-        InputError, match=r"outside of the bank, floor_friction 0\.3\d* is at the edge; .* a bank about it"
-    ):
+@pytest.mark.parametrize(
+    ("friction", "lower", "wrong"),
+    [
+        (0.38, 0.0, r"floor_friction 0\.3\d* is at the edge; .* a bank about it"),
+        (0.27, 0.03, r".* times as far off as its furthest chain; check unit, floor"),
+    ],
+)
+def test_an_answer_outside_of_the_bank_is_refused(friction: float, lower: float, wrong: str) -> None:
+    """Friction 2.2 standard deviations off the middle, where few chains are; an outline that no chain has."""
+    exact = motion(friction)
+    exact = dataclasses.replace(exact, outline=exact.outline - np.array([0, 0, lower, 0]))
+    film = exact.seen(CAMERA, np.zeros(8), np.random.default_rng(0))
+    with pytest.raises(InputError, match=f"outside of the bank, {wrong}"):
         made_bank(160, seed=1).posterior([film])
 
 
-def test_films_outside_of_the_bank_are_refused() -> None:
-    """Too slippery a floor, another experiment, more films than repetitions, and none."""
+def test_films_that_are_not_the_bank_s_are_refused() -> None:
+    """Another experiment, more films than repetitions, none, and a bank too small to hold chains out."""
     bank = made_bank(160, seed=1)
-    slippery = motion(0.75).seen(CAMERA, np.zeros(8), np.random.default_rng(0))
-    with pytest.raises(InputError, match="films: outside of the bank"):
-        bank.posterior([slippery])
     (film,) = films_of(bank, 0, 1, CAMERA, 0)
     for wrong in ([dataclasses.replace(film, frequency=15.0)], [film] * 5, []):
         with pytest.raises(InputError, match=r"films: they are not .*; give 1 to 4 of each of 60 links at 20 Hz$"):
@@ -171,23 +176,18 @@ def test_a_bank_has_the_walks_of_its_sweep(folder: Path) -> None:
 
 def test_a_sweep_that_is_no_bank_is_refused(tmp_path: Path) -> None:
     """Chains must be the same in all experiments, and the axes links and frequency."""
-    settings = {
-        "samples": 2,
-        "preset": "soft",
-        "scene": {"start": "spinning", "walk_limit": 0.01},
-        "record": {"series": True, "frames": True},
-        "progress": False,
-    }
-    other = warpchain.sweep(grid={"links": [40], "frequency": [15, 20]}, out=tmp_path / "a", **settings)
+
+    def bank(folder: str, grid: dict[str, Any], **more: Any) -> films.Bank:
+        scene, record = {"start": "spinning", "walk_limit": 0.01}, {"series": True, "frames": True}
+        settings = {"samples": 2, "preset": "soft", "scene": scene, "record": record, "progress": False, **more}
+        return films.Bank.of(warpchain.sweep(grid=grid, out=tmp_path / folder, **settings))
+
     with pytest.raises(InputError, match=r"same_samples_along: \[links, frequency\]"):
-        films.Bank.of(other)
-    phases = warpchain.sweep(
-        grid={"links": [40], "frequency": [15], "phase": [0.1, 0.2]},
-        out=tmp_path / "c",
-        same_samples_along=["links", "frequency"],
-        **settings,
-    )
+        bank("a", {"links": [40], "frequency": [15, 20]})
+    along = ["links", "frequency"]
     with pytest.raises(InputError, match=r"same_samples_along: \[links, frequency, phase\]"):
-        films.Bank.of(phases)
+        bank("b", {"links": [40], "frequency": [15], "phase": [0.1, 0.2]}, same_samples_along=along)
     with pytest.raises(InputError, match="grid: its axes are frequency"):
-        films.Bank.of(warpchain.sweep(grid={"frequency": [15]}, out=tmp_path / "b", **settings))
+        bank("c", {"frequency": [15]})
+    with pytest.raises(InputError, match="bank: no motion was recorded"):
+        bank("d", {"links": [40], "frequency": [15]})  # too short

@@ -39,9 +39,9 @@ NEAR: Final = 0.5
 FEW: Final = 16.0
 """With so many alike (chains times draws) errors are half theirs, half those of all."""
 EDGE: Final = 2.0
-"""An answer so many standard deviations off the middle of the bank, where few chains are, is refused …"""
+"""An answer so many standard deviations off the middle of the bank, where few chains are, is refused, …"""
 IDENTIFIED: Final = 0.8
-"""… if its error is smaller than so many of them."""
+"""… of a parameter whose error is larger than so many of them one that is another standard deviation off."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -132,7 +132,7 @@ class Bank:
         sigma, prior, residuals = _widths(trained, found)[0], self.values.std(axis=0), trained.residuals
         mean = self.values.mean(axis=0) + prior * found[0]
         scale = prior * sigma / np.sqrt(np.mean(residuals**2, axis=0))
-        edge = np.abs(found[0]) > np.where(sigma < IDENTIFIED, EDGE, np.inf)
+        edge = np.abs(found[0]) > np.where(sigma < IDENTIFIED, EDGE, EDGE + 1)
         if distance > 1 or edge.any():
             thin = " and ".join(f"{self.names[k]} {mean[k]:.3g}" for k in np.flatnonzero(edge))
             where = f"{thin} is at the edge" if thin else f"{distance:.2g} times as far off as its furthest chain"
@@ -222,13 +222,13 @@ def _features(groups: Iterable[Iterable[Film]], outline: bool, speed: bool) -> A
 
 
 def _regression(rows: Array, values: Array, to: Array) -> tuple[Array, Array]:
-    """Ridge regressions, one for each penalty: values at other features, and squared distances from the middle."""
+    """Ridge regressions, one for each penalty: values at other features; their distance along the oddest direction."""
     middle, spread, level = rows.mean(axis=0), rows.std(axis=0), values.mean(axis=0)
     scaled, to = (rows - middle) / spread, (to - middle) / spread
     power, axes = np.linalg.eigh(scaled.T @ scaled / len(scaled))
-    weighted = to @ axes / (np.maximum(power, 0) + PENALTIES[:, None])[:, None]
+    turned, sizes = to @ axes, (np.maximum(power, 0) + PENALTIES[:, None])[:, None]
     slopes = axes.T @ (scaled.T @ (values - level)) / len(scaled)
-    return level + weighted @ slopes, (weighted * (to @ axes)).sum(axis=-1)
+    return level + turned / sizes @ slopes, np.abs(turned / np.sqrt(sizes)).max(axis=-1)
 
 
 def _chosen(found: Array, penalties: NDArray[np.intp]) -> Array:

@@ -105,9 +105,15 @@ class Film:
             needed = f"−{BEFORE:g} to {CLOCK[-1] + 0.02:g} s"
             raise InputError(f"film: it shows {first:.3f} to {last:.3f} s after the release; give {needed}")
         if abs(rate / camera.fps - 1) > 0.05:
-            raise InputError(f"camera.fps: {camera.fps:g}, but the film has {rate:.4g} frames a second; give that")
+            wrong = f"{camera.fps:g}, but the film has {rate:.4g} frames a second"
+            raise InputError(f"camera.fps: {wrong}; give that or, if it plays in slow motion, fps to read")
         if self.noise > 1.5 * camera.noise:
-            raise InputError(f"camera.noise: {camera.noise} m, but the film scatters by {self.noise:.2g} m; give that")
+            wrong = f"{camera.noise} m, but before the release the film scatters by {self.noise:.2g} m"
+            raise InputError(f"camera.noise: {wrong}; give that, or check unit and release")
+        near, y = (self.time > 0.02) & (self.time < 0.03), self.center[:, 1] - self.center[self.time < 0, 1].mean()
+        off = (y + GRAVITY * self.time**2 / 2)[near]
+        if not near.any() or abs(off.mean()) > 5e-4 + 3 * np.hypot(0.03 * GRAVITY * camera.release, camera.noise):
+            raise InputError("film: 20 to 30 ms after the release nothing falls freely; check unit, fps and release")
 
 
 def film_of(walk: WalkResult, camera: Camera | None = CAREFUL, seed: int = 0) -> Film:

@@ -96,7 +96,10 @@ def _fitted_release(time: Array, y: Array) -> float:
     starts = np.arange(time[0] + BEFORE / 2, time[-1] - 0.1, 2.5e-4)
     if not len(starts):
         raise InputError("release: the film is too short to fit it; give it")
-    return float(min(starts, key=misfit))
+    release = float(min(starts, key=misfit))
+    if misfit(release) > 4 * y[(time > release - BEFORE) & (time < release)].var():
+        raise InputError("release: nothing begins to fall freely; check unit and fps, or give it")
+    return release
 
 
 def _cells(line: str) -> list[str]:
