@@ -53,11 +53,10 @@ def set_of_films(
     bank: films.Bank, chain: int, wanted: Wanted, camera: films.Camera, errors: Array, random: np.random.Generator
 ) -> list[films.Film]:
     """Films of a chain of a bank by one camera, whose errors they share."""
-    at = {(int(links), float(frequency)): k for k, (links, frequency) in enumerate(bank.experiments)}
     return [
-        bank.film(chain, at[experiment], number).seen(camera, errors, random)
+        film.seen(camera, errors, random)
         for experiment, count in wanted.items()
-        for number in range(count)
+        for film in bank.films[chain][bank.experiments.index(experiment)][:count]
     ]
 
 
@@ -101,5 +100,5 @@ def calibrate(
         }
         answer = answer.given(**known)
         found.append((answer.mean - values, answer.sigma, values))
-    errors, sigmas, values = (np.array(each) for each in zip(*found, strict=True))
+    errors, sigmas, values = np.reshape(found, (-1, 3, len(bank.names))).swapaxes(0, 1)
     return Calibration(tuple(bank.names), errors, sigmas, values, refused / len(truths.values))

@@ -33,7 +33,7 @@ def main() -> None:
         walk = warpchain.walk(
             links=60, frequency=frequency, start="spinning", preset="soft", walk_limit=0.45, phase=0.3, **CHAIN
         )
-        film = films.Film.of(walk).seen(camera, errors, random)
+        film = films.film_of(walk, None).seen(camera, errors, random)
         assert film.outline is not None and film.speed is not None
         delay, mm = 0.35 + random.uniform(0, 0.1), 1e3
         rows = [

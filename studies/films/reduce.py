@@ -22,18 +22,35 @@ def main(folders: list[str], to: Path = Path("film-banks")) -> None:
         for name, block in result.blocks.items():
             bank = films.Bank.of(block)
             save(bank, to / f"{result.name}_{name}.npz")
-            print(f"{result.name}_{name}: {len(bank.values)} chains, {bank.speed.size} walks")
+            print(f"{result.name}_{name}: {bank}")
 
 
 def save(bank: films.Bank, path: Path) -> None:
     """Write a bank to a file, motions in single precision."""
-    np.savez_compressed(path, **{k: v.astype("f4") if v.ndim > 2 else v for k, v in vars(bank).items()})
+    first = bank.films[0][0][0]
+    arrays = {
+        name: np.array([[[getattr(film, name) for film in row] for row in chain] for chain in bank.films])
+        for name in ("center", "outline", "speed")
+    }
+    known = {"names": bank.names, "values": bank.values, "experiments": bank.experiments, "time": first.time}
+    np.savez_compressed(path, **known, **{name: array.astype("f4") for name, array in arrays.items()})
 
 
 def load(path: Path) -> films.Bank:
     """Read what `save` wrote."""
     with np.load(path) as file:
-        return films.Bank(**{name: file[name] if name == "names" else file[name].astype(float) for name in file.files})
+        center, outline, speed = (file[name].astype(float) for name in ("center", "outline", "speed"))
+        experiments, time, values = file["experiments"], file["time"], file["values"]
+        names = tuple(file["names"].tolist())
+
+    def film(at: tuple[int, int, int]) -> films.Film:
+        links, frequency = experiments[at[1]].tolist()
+        seen = {"center": center[at], "outline": outline[at]}
+        return films.Film(time=time, links=int(links), frequency=frequency, speed=float(speed[at]), **seen)
+
+    chains, count, most = speed.shape
+    walks = [[[film((c, e, r)) for r in range(most)] for e in range(count)] for c in range(chains)]
+    return films.Bank(names, values, walks)
 
 
 if __name__ == "__main__":

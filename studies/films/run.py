@@ -38,13 +38,8 @@ def beside(bank: films.Bank, other: films.Bank) -> films.Bank:
     """The chains that two banks have in common, with the experiments of both."""
     known = {tuple(values): chain for chain, values in enumerate(other.values)}
     pairs = [(chain, known[tuple(values)]) for chain, values in enumerate(bank.values) if tuple(values) in known]
-    first, second = np.array(pairs).T
-    join = {
-        name: np.concatenate([getattr(bank, name)[first], getattr(other, name)[second]], axis=1)
-        for name in ("center", "outline", "speed")
-    }
-    experiments = np.concatenate([bank.experiments, other.experiments])
-    return replace(bank, values=bank.values[first], experiments=experiments, **join)
+    both = [[*bank.films[first], *other.films[second]] for first, second in pairs]
+    return films.Bank(bank.names, bank.values[[first for first, _ in pairs]], both)
 
 
 def answer_for(bank: films.Bank, wanted: Wanted) -> films.Posterior:
@@ -61,7 +56,7 @@ def percent(share: float) -> str:
 
 def experiments_table(bank: films.Bank) -> str:
     """Widths for each film and each pair of films: μ, β, R, and R if r was measured."""
-    every = [(int(n), float(f)) for n, f in bank.experiments]
+    every = bank.experiments
     sets: list[Wanted] = [*({one: 1} for one in every), *({one: 1, two: 1} for one, two in combinations(every, 2))]
     middle = bank.values.mean(axis=0)
 
@@ -113,7 +108,7 @@ def lines_table(banks: Mapping[str, films.Bank]) -> str:
         for at, (links, frequency) in enumerate(bank.experiments):
             found = []
             for chain, values in enumerate(bank.values[:256]):
-                film = bank.film(chain, at, chain % 4).seen(CAMERA, CAMERA.errors(random), random)
+                film = bank.films[chain][at][chain % 4].seen(CAMERA, CAMERA.errors(random), random)
                 line = films.friction_line(film, CAMERA)
                 found.append((line.friction - values[0], line.error, values[0]))
             error, sigma, friction = np.array(found).T

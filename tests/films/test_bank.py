@@ -2,6 +2,7 @@
 
 import dataclasses
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -93,39 +94,48 @@ def test_other_measurements_condition_the_gaussian() -> None:
 def test_errors_are_those_of_chains_alike() -> None:
     """On rough floors speeds of these loops were misread: the radius is known less there than on smooth ones."""
     bank, random = made_bank(160, seed=1), np.random.default_rng(5)
-    rough = (bank.values[:, 0] > 0.27)[:, None, None]
-    misread = dataclasses.replace(bank, speed=bank.speed * (1 + 0.01 * rough * random.normal(size=bank.speed.shape)))
+
+    def misread(chain: int, film: films.Film) -> films.Film:
+        return dataclasses.replace(
+            film, speed=film.speed * (1 + 0.01 * (bank.values[chain, 0] > 0.27) * random.normal())
+        )
+
+    walks = [[[misread(chain, film) for film in row] for row in rows] for chain, rows in enumerate(bank.films)]
+    other = dataclasses.replace(bank, films=walks)
 
     def sigma(friction: float) -> float:
         chain = int(np.abs(bank.values[:, 0] - friction).argmin())
         (film,) = films_of(bank, chain, 1, CAMERA, 0)
-        return float(misread.posterior([dataclasses.replace(film, outline=None)]).sigma[1])
+        return float(other.posterior([dataclasses.replace(film, outline=None)]).sigma[1])
 
     assert sigma(0.31) > 1.1 * sigma(0.23)
 
 
-def test_an_answer_at_the_edge_of_the_bank_is_refused() -> None:
-    """Friction 2.2 standard deviations off the middle, where few chains are; the line has the parameter's name."""
-    film = motion(0.38).seen(CAMERA, np.zeros(8), np.random.default_rng(0))
-    with pytest.raises(
-        InputError, match=r"outside of the bank, floor_friction 0\.3\d* is at the edge; .* a bank about it"
-    ):
+@pytest.mark.parametrize(
+    ("friction", "lower", "wrong"),
+    [
+        (0.38, 0.0, r"floor_friction 0\.3\d* is at the edge; .* a bank about it"),
+        (0.27, 0.03, r".* times as far off as its furthest chain; check unit, floor"),
+    ],
+)
+def test_an_answer_outside_of_the_bank_is_refused(friction: float, lower: float, wrong: str) -> None:
+    """Friction 2.2 standard deviations off the middle, where few chains are; an outline that no chain has."""
+    exact = motion(friction)
+    exact = dataclasses.replace(exact, outline=exact.outline - np.array([0, 0, lower, 0]))
+    film = exact.seen(CAMERA, np.zeros(8), np.random.default_rng(0))
+    with pytest.raises(InputError, match=f"outside of the bank, {wrong}"):
         made_bank(160, seed=1).posterior([film])
 
 
-def test_films_outside_of_the_bank_are_refused() -> None:
-    """Too slippery a floor, another experiment, more films than repetitions, and none."""
+def test_films_that_are_not_the_bank_s_are_refused() -> None:
+    """Another experiment, more films than repetitions, none, and a bank too small to hold chains out."""
     bank = made_bank(160, seed=1)
-    slippery = motion(0.75).seen(CAMERA, np.zeros(8), np.random.default_rng(0))
-    with pytest.raises(InputError, match="films: outside of the bank"):
-        bank.posterior([slippery])
     (film,) = films_of(bank, 0, 1, CAMERA, 0)
-    with pytest.raises(InputError, match="films: 60 links at 15 Hz, but the bank has 4 of each of 60 links at 20 Hz"):
-        bank.posterior([dataclasses.replace(film, frequency=15.0)])
-    with pytest.raises(InputError, match="the bank has 4 of each"):
-        bank.posterior([film] * 5)
-    with pytest.raises(InputError, match="films: 0 films"):
-        bank.posterior([])
+    for wrong in ([dataclasses.replace(film, frequency=15.0)], [film] * 5, []):
+        with pytest.raises(InputError, match=r"films: they are not .*; give 1 to 4 of each of 60 links at 20 Hz$"):
+            bank.posterior(wrong)
+    with pytest.raises(InputError, match="32 chains or more in the bank"):
+        made_bank(20, seed=1).posterior([film])
 
 
 @pytest.fixture(scope="module")
@@ -150,15 +160,15 @@ def test_a_bank_has_the_walks_of_its_sweep(folder: Path) -> None:
     """Each motion is that of the walk of this chain, experiment and repetition."""
     result = warpchain.load(folder)
     bank = films.Bank.of(result)
-    assert bank.center.shape[:3] == (3, 4, 2)
+    assert (len(bank.films), bank.experiments) == (3, [(40, 15.0), (40, 20.0), (60, 15.0), (60, 20.0)])
     for chain, experiment, repetition in np.ndindex(3, 4, 2):
         links, frequency = bank.experiments[experiment]
         phase = result.axes["phase"][repetition]
         walk = result.series(links=links, frequency=frequency, phase=phase, sample=chain)
-        film = bank.film(chain, experiment, repetition)
-        expected = [np.interp(bank.time, walk.time, walk.center[:, k]) for k in (0, 1)]
-        assert film.center.T == pytest.approx(np.array(expected), abs=1e-7)
-        assert film.outline == pytest.approx(films.Film.of(walk).outline, abs=1e-6)
+        film = bank.films[chain][experiment][repetition]
+        count = len(film.time)
+        assert (film.time == walk.time[:count]).all() and film.center == pytest.approx(walk.center[:count], abs=1e-7)
+        assert film.outline == pytest.approx(films.film_of(walk, None).outline, abs=1e-6)
         assert film.speed == pytest.approx(walk.rms_speed[0], rel=1e-6)
         place = list(bank.names).index("floor_friction")
         assert bank.values[chain, place] == walk.setup.parameters.floor_friction
@@ -166,23 +176,18 @@ def test_a_bank_has_the_walks_of_its_sweep(folder: Path) -> None:
 
 def test_a_sweep_that_is_no_bank_is_refused(tmp_path: Path) -> None:
     """Chains must be the same in all experiments, and the axes links and frequency."""
-    settings = {
-        "samples": 2,
-        "preset": "soft",
-        "scene": {"start": "spinning", "walk_limit": 0.01},
-        "record": {"series": True, "frames": True},
-        "progress": False,
-    }
-    other = warpchain.sweep(grid={"links": [40], "frequency": [15, 20]}, out=tmp_path / "a", **settings)
+
+    def bank(folder: str, grid: dict[str, Any], **more: Any) -> films.Bank:
+        scene, record = {"start": "spinning", "walk_limit": 0.01}, {"series": True, "frames": True}
+        settings = {"samples": 2, "preset": "soft", "scene": scene, "record": record, "progress": False, **more}
+        return films.Bank.of(warpchain.sweep(grid=grid, out=tmp_path / folder, **settings))
+
     with pytest.raises(InputError, match=r"same_samples_along: \[links, frequency\]"):
-        films.Bank.of(other)
-    phases = warpchain.sweep(
-        grid={"links": [40], "frequency": [15], "phase": [0.1, 0.2]},
-        out=tmp_path / "c",
-        same_samples_along=["links", "frequency"],
-        **settings,
-    )
+        bank("a", {"links": [40], "frequency": [15, 20]})
+    along = ["links", "frequency"]
     with pytest.raises(InputError, match=r"same_samples_along: \[links, frequency, phase\]"):
-        films.Bank.of(phases)
+        bank("b", {"links": [40], "frequency": [15], "phase": [0.1, 0.2]}, same_samples_along=along)
     with pytest.raises(InputError, match="grid: its axes are frequency"):
-        films.Bank.of(warpchain.sweep(grid={"frequency": [15]}, out=tmp_path / "b", **settings))
+        bank("c", {"frequency": [15]})
+    with pytest.raises(InputError, match="bank: no motion was recorded"):
+        bank("d", {"links": [40], "frequency": [15]})  # too short

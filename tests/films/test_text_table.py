@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import warpchain
 from tests.support.made_films import motion
 from warpchain import InputError, films
 
@@ -32,6 +33,7 @@ def write(folder: Path, text: str) -> Path:
         TRACKER.format(table(FILM.time, FILM.center) + "\n9.0\t\t\n"),
         "t;x;y\n" + table(FILM.time, FILM.center, ";").replace(".", ","),
         "frame,t,x,y\n" + "\n".join(f"7,{line}" for line in table(FILM.time, FILM.center, ",").splitlines()),
+        '"t (s)" "x (mm)" "y (mm)"\n'.replace(" (", "(") + table(FILM.time, FILM.center, " "),
         "\ufeffy,x,t\n" + table(FILM.center[:, 1], np.column_stack([FILM.center[:, 0], FILM.time]), ","),
     ],
 )
@@ -76,6 +78,7 @@ def test_the_release_is_found(tmp_path: Path) -> None:
     [
         ("time,x,y\n1,2,3\n", "no line with the column heads t, x and y"),
         ("#multi:\n\tcm A\t\tcm B\nt\tx\ty\tx\ty\n", "several columns x"),
+        ("t,x,y\n0,1,0,2,0,3\n", "line 2 has too many cells; part them by tabs or semicolons"),
         ("t,x,y\n1,2,3\n4,five,6\n", "line 3 is not numbers"),
         ("t,x,y\n1,2,3\n", "1 frames; give at least 20"),
         ("t,x,y\n" + "1,2,3\n" * 30, "in order of time"),
@@ -94,3 +97,25 @@ def test_an_unknown_unit_or_a_missing_file_is_refused(tmp_path: Path) -> None:
         films.read(tmp_path / "film.txt", links=60, frequency=20.0, unit="inch")  # type: ignore[arg-type]
     with pytest.raises(OSError, match=r"film\.txt"):
         films.read(tmp_path / "film.txt", links=60, frequency=20.0)
+
+
+def test_from_a_table_to_the_friction(tmp_path: Path) -> None:
+    """A walk to the left in slow motion, spun long before its release, in a German table: μ within its error.
+
+    With a wrong unit or frame rate one line says what to check.
+    """
+    chain, random, camera = {"floor_friction": 0.31}, np.random.default_rng(8), films.Camera()
+    walk = warpchain.walk(links=60, frequency=20.0, start="spinning", preset="soft", walk_limit=0.6, **chain)
+    film = films.film_of(walk, camera, seed=3)
+    spun = film.center[film.time < 0].mean(axis=0) + random.normal(size=(300, 2)) * camera.noise
+    center = np.concatenate([spun, film.center]) * [-100, 100] + [31.7, -12.4]
+    rows = table(np.arange(len(center)) / 30, center, ";").replace(".", ",").splitlines()
+    rows[::97] = [f"{row.split(';')[0]};;" for row in rows[::97]]
+    path = write(tmp_path, "\n".join(["mass A", "t;x;y", *rows]))
+    given = {"links": 60, "frequency": 20.0, "origin": (31.7, -12.4), "direction": "left"}
+    line = films.friction_line(films.read(path, unit="cm", fps=240, **given))
+    assert abs(line.friction - 0.31) < 3 * line.error < 0.02
+    with pytest.raises(InputError, match="check unit and fps"):
+        films.read(path, unit="mm", fps=240, **given)
+    with pytest.raises(InputError, match=r"camera\.fps: .* slow motion"):
+        films.friction_line(films.read(path, unit="cm", **given))

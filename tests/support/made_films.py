@@ -1,5 +1,6 @@
 """Motions of chains by formula, and banks of them: nothing is simulated."""
 
+from dataclasses import replace
 from statistics import NormalDist
 
 import numpy as np
@@ -9,7 +10,7 @@ from warpchain import films
 
 Array = NDArray[np.float64]
 
-TIME = np.arange(0.0, 0.45, 0.004)
+TIME = np.arange(0.0, 0.39, 0.004)
 GRAVITY = 9.809
 
 
@@ -35,27 +36,22 @@ def made_bank(
     normal = [NormalDist().inv_cdf((number + 0.5) / chains) for number in range(chains)]  # so that few are enough
     drawn = np.column_stack([random.permutation(normal) for _ in range(3)])
     values = np.array([0.27, 0.056, 0.05]) + np.array([0.05, 0.0015, 0.01]) * drawn
-    shape = (chains, len(experiments), repetitions)
-    center, outline, speed = np.empty((*shape, len(TIME), 2)), np.empty((*shape, 4)), np.empty(shape)
-    for chain, at, number in np.ndindex(shape):
-        film = motion(values[chain, 0], random.uniform(0.006, 0.014), frequency=experiments[at][1])
-        wider = values[chain, 1] - 0.056 + random.normal() * 1e-4
-        center[chain, at, number] = film.center
-        outline[chain, at, number] = film.outline + wider * np.array([-1, 1, 0, 2])
-        speed[chain, at, number] = 2 * np.pi * experiments[at][1] * (values[chain, 1] + 0.004)
-    return films.Bank(
-        names=np.array(["floor_friction", "sprocket_radius", "floor_restitution"]),
-        values=values,
-        experiments=np.array(experiments, float),
-        time=TIME,
-        center=center,
-        outline=outline,
-        speed=speed,
-    )
+
+    def film(chain: int, frequency: float) -> films.Film:
+        seen = motion(values[chain, 0], random.uniform(0.006, 0.014), frequency=frequency)
+        assert seen.outline is not None
+        outline = seen.outline + (values[chain, 1] - 0.056 + random.normal() * 1e-4) * np.array([-1, 1, 0, 2])
+        return replace(seen, outline=outline, speed=2 * np.pi * frequency * (values[chain, 1] + 0.004))
+
+    walks = [
+        [[film(chain, frequency) for _ in range(repetitions)] for _, frequency in experiments]
+        for chain in range(chains)
+    ]
+    return films.Bank(("floor_friction", "sprocket_radius", "floor_restitution"), values, walks)
 
 
 def films_of(bank: films.Bank, chain: int, count: int, camera: films.Camera, seed: int) -> list[films.Film]:
     """Films of a chain by one camera, whose errors they share."""
     random = np.random.default_rng(seed)
     errors = camera.errors(random)
-    return [bank.film(chain, 0, number).seen(camera, errors, random) for number in range(count)]
+    return [film.seen(camera, errors, random) for film in bank.films[chain][0][:count]]

@@ -10,6 +10,7 @@ from warpchain.engine.tallies import CONTACTS
 from warpchain.inputs.setup import resolve
 from warpchain.loop.before_release import BeforeRelease
 from warpchain.status import Status
+from warpchain.walks.landmarks import RELEASE
 from warpchain.walks.walk_result import ENERGIES, MOTION, NUMBERS, WalkResult
 
 
@@ -49,6 +50,8 @@ def make_walk(links: int = 30, **changes: Any) -> WalkResult:
         "greatest_penetration": dict(zip(CONTACTS, (1e-5, 0.0, 2e-5), strict=True)),
         "energy": {key: 0.1 * number for number, key in enumerate(ENERGIES)} | {"residual": 1e-6},
         "sprocket_height": 0.1,
+        "release": {key: 0.01 * number for number, key in enumerate(RELEASE)},
+        "release_speed": 3.7,
         "setup": resolve("soft", scene={"links": links}, options={"method": "dp5"}, parameters={"floor_friction": 0.3}),
         "seed": 2**100 + 1,
         "versions": {"warpchain": "0.1.0", "warp-lang": "1.19.0"},

@@ -7,15 +7,16 @@ not fitted to are the errors. So what films have in common, errors of the camera
 counts as common: more films do not make it smaller.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, Final, Self
+from itertools import product
+from typing import Final, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.films.film import CLOCK, Array, Camera, Film, edges, summary
+from warpchain.films.film import CAREFUL, CLOCK, Array, Camera, Film, edges, summary
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import InputError
 from warpchain.store.block_result import BlockResult
@@ -23,14 +24,12 @@ from warpchain.store.sweep_result import SweepResult
 from warpchain.walks.rows import MISSING
 
 FOUND: Final = (
-    "floor_friction",
-    "viscous_friction",
-    "coulomb_friction",
-    "sprocket_radius",
-    "circle_radius",
-    "floor_restitution",
+    *("floor_friction", "viscous_friction", "coulomb_friction"),
+    *("sprocket_radius", "circle_radius", "floor_restitution"),
 )
 """Parameters that a posterior has, as far as its bank draws them."""
+DRAWS: Final = 4
+"""Times that each chain of a bank is filmed, with other errors."""
 PENALTIES: Final = 10.0 ** np.arange(-6, 1.5, 0.5)
 """Of the ridge regression; the one with the smallest residuals on held-out chains is taken, for each parameter."""
 FOLDS: Final = 8
@@ -40,32 +39,29 @@ NEAR: Final = 0.5
 FEW: Final = 16.0
 """With so many alike (chains times draws) errors are half theirs, half those of all."""
 EDGE: Final = 2.0
-"""An answer so many standard deviations off the middle of the bank, where few chains are, is refused …"""
+"""An answer so many standard deviations off the middle of the bank, where few chains are, is refused, …"""
 IDENTIFIED: Final = 0.8
-"""… if its error is smaller than so many of them."""
+"""… of a parameter whose error is larger than so many of them one that is another standard deviation off."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Bank:
-    """Chains whose parameters are known, and their walks: chain c, experiment e, repetition r.
+    """Chains whose parameters are known, and films of their walks without errors.
 
     Attributes:
         names: of the parameters.
         values: of each chain, (c, p).
-        experiments: links and frequency [Hz] of each, (e, 2).
-        time: of the motions [s], (t,).
-        center: centre of mass [m], (c, e, r, t, 2).
-        outline: at the release [m], (c, e, r, 4).
-        speed: of the loop [m/s], (c, e, r).
+        films: `films[c][e]` are those of chain c in experiment e, one for each repetition.
     """
 
-    names: NDArray[np.str_]
+    names: tuple[str, ...]
     values: Array
-    experiments: Array
-    time: Array
-    center: Array
-    outline: Array
-    speed: Array
+    films: Sequence[Sequence[Sequence[Film]]]
+
+    @property
+    def experiments(self) -> list[tuple[int, float]]:
+        """Links and frequency [Hz] of each."""
+        return [(films[0].links, films[0].frequency) for films in self.films[0]]
 
     def __repr__(self) -> str:
         """One line."""
@@ -81,105 +77,74 @@ class Bank:
             InputError: walks or motions are missing, axes are others, or the chains differ along them.
         """
         axes, shape = list(result.axes), result.shape
+        names = tuple(name for name in FOUND if name in result.drawn)
         if axes[:2] != ["links", "frequency"]:
             raise InputError(f"grid: its axes are {', '.join(axes)}; give links, frequency and then repetitions")
-        names = [name for name in FOUND if name in result.drawn]
         if not names or np.any(result.columns["status"] == MISSING):
             raise InputError("bank: walks are missing, or their chains are all the same; run the sweep to its end")
-        drawn = np.stack([result.columns[f"{name}_drawn"] for name in names], axis=-1).reshape(
-            -1, shape[-1], len(names)
-        )
+        drawn = np.stack([result.columns[f"{name}_drawn"].reshape(-1, shape[-1]) for name in names], axis=-1)
         if np.any(drawn != drawn[0]):
             raise InputError(f"bank: its chains differ along the axes; give same_samples_along: [{', '.join(axes)}]")
-        found: dict[int, tuple[Array, ...]] = {}
+        walks, end = {}, CLOCK[-1] + 0.03
         for place, group in result.kept_motions(np.flatnonzero(result.kept)):  # in the order of the files
-            if "series/time" in group and "frames/joints" in group:  # a walk that failed early has none
-                parts = (group[f"series/{name}"][()] for name in ("time", "center", "rms_speed"))
-                found[place] = *parts, edges(group["frames/joints"][0].astype(float))
-        if not found:
+            if "frames/joints" in group and (time := group["series/time"][()])[-1] >= end:  # else it failed early
+                links, frequency, *_ = np.unravel_index(place, shape)
+                walks[place] = Film(
+                    time=time[time < end],
+                    center=group["series/center"][time < end],
+                    links=int(result.axes["links"][links]),
+                    frequency=float(result.axes["frequency"][frequency]),
+                    outline=edges(group["frames/joints"][0].astype(float)),
+                    speed=float(group["series/rms_speed"][0]),
+                )
+        places = np.moveaxis(np.arange(drawn[..., 0].size).reshape(shape[0] * shape[1], -1, shape[-1]), 2, 0)
+        chains = np.flatnonzero(np.isin(places, list(walks)).all(axis=(1, 2)))
+        if not len(chains):
             raise InputError("bank: no motion was recorded; give record: {series: true, frames: true}")
-        step = round(float(np.median(np.diff(next(iter(found.values()))[0]))), 4)
-        time = np.arange(0.0, CLOCK[-1] + 0.03, step)
-        motions = {place: each for place, each in found.items() if each[0][-1] >= time[-1]}
-        cells = np.arange(result.columns["index"].size).reshape(shape[0] * shape[1], -1, shape[-1])
-        chains = np.flatnonzero(np.isin(cells, list(motions)).all(axis=(0, 1)))
-        places = np.moveaxis(cells[..., chains], 2, 0)
+        films = [[[walks[place] for place in row] for row in chain] for chain in places[chains].tolist()]
+        return cls(names, drawn[0, chains], films)
 
-        def by_chain(value: Callable[[Array, Array, Array, Array], Any]) -> Array:
-            values = np.array([value(*motions[place]) for place in places.ravel().tolist()])
-            return values.reshape(*places.shape, *values.shape[1:])
-
-        return cls(
-            names=np.array(names),
-            values=drawn[0, chains],
-            experiments=np.array([(n, f) for n in result.axes["links"] for f in result.axes["frequency"]], float),
-            time=time,
-            center=by_chain(lambda t, center, *_: np.column_stack([np.interp(time, t, x) for x in center.T])),
-            outline=by_chain(lambda *motion: motion[3]),
-            speed=by_chain(lambda *motion: motion[2][0]),
-        )
-
-    def film(self, chain: int, experiment: int, repetition: int) -> Film:
-        """A walk as a film without errors."""
-        at, (links, frequency) = (chain, experiment, repetition), self.experiments[experiment]
-        return Film(
-            time=self.time,
-            center=self.center[at],
-            links=int(links),
-            frequency=float(frequency),
-            outline=self.outline[at],
-            speed=float(self.speed[at]),
-        )
-
-    def posterior(self, films: Sequence[Film], camera: Camera | None = None, draws: int = 4) -> "Posterior":
+    def posterior(self, films: Sequence[Film], camera: Camera = CAREFUL) -> "Posterior":
         """The parameters of the chain in some films, and how well they would be known of chains of the bank.
 
         Args:
             films: one or more, of any experiments of the bank, at most as many of each as the bank has repetitions.
+                Outline and speed count if all of them have these.
             camera: of all films.
-            draws: number of times each chain of the bank is filmed, with other errors.
 
         Raises:
             InputError: a film is of no experiment of the bank, or not as the camera says, or lies outside of the bank.
         """
-        camera, groups = camera or Camera(), dict[int, list[Film]]()
+        groups: dict[tuple[int, float], list[Film]] = {}
         for film in films:
             film.check(camera)
-            at = np.flatnonzero((self.experiments == [film.links, film.frequency]).all(axis=1))
-            most = self.speed.shape[2]
-            if not len(at) or len(groups.setdefault(int(at[0]), [])) == most:
-                known = ", ".join(f"{n:g} links at {f:g} Hz" for n, f in self.experiments)
-                wrong = f"{film.links} links at {film.frequency:g} Hz"
-                raise InputError(f"films: {wrong}, but the bank has {most} of each of {known}; give these, or a bank")
-            groups[int(at[0])].append(film)
-        if not groups or len(self.values) < 4 * FOLDS:
-            wrong = f"{len(films)} films, a bank of {len(self.values)} chains"
-            raise InputError(f"films: {wrong}; give at least one film, and {4 * FOLDS} chains")
-        design = tuple(
-            (at, len(group), all(film.outline is not None for film in group), all(film.speed for film in group))
-            for at, group in groups.items()
-        )
-        fitted, residuals, sizes, furthest = _regression(self, design, camera, draws)
-        mean, distance = fitted(_features(design, lambda at, number: groups[at][number])[None])
-        middle, prior = self.values.mean(axis=0), self.values.std(axis=0)
-        found = np.tile(self.values, (draws, 1)) - residuals
-        sigma, common = _widths(residuals, found / prior, mean / prior)[0], np.sqrt((residuals**2).mean(axis=0))
-        edge = np.abs(mean[0] - middle) > np.where(sigma < IDENTIFIED * prior, EDGE * prior, np.inf)
-        if distance[0] > furthest or edge.any():
-            far = f"{distance[0] / furthest:.2g} times as far from its middle as its furthest chain"
-            thin = " and ".join(
-                f"{name} {value:.3g}" for name, value in zip(self.names[edge], mean[0, edge], strict=True)
-            )
-            where = f"{thin} is at the edge" if edge.any() else far
+            groups.setdefault((film.links, film.frequency), []).append(film)
+        counts, most = [len(group) for group in groups.values()], len(self.films[0][0])
+        if not counts or max(counts) > most or set(groups) - set(self.experiments) or len(self.values) < 4 * FOLDS:
+            known = ", ".join(f"{n} links at {f:g} Hz" for n, f in self.experiments)
+            few = f", {4 * FOLDS} chains or more in the bank" if len(self.values) < 4 * FOLDS else ""
+            raise InputError(f"films: they are not those of the bank; give 1 to {most} of each of {known}{few}")
+        design = tuple((self.experiments.index(one), len(group)) for one, group in groups.items())
+        has = all(film.outline is not None for film in films), all(film.speed is not None for film in films)
+        trained = _trained(self, design, has, camera)
+        found, distances = _regression(trained.rows, trained.values, _features(groups.values(), *has)[None])
+        found, distance = _chosen(found, trained.penalties), distances[trained.penalties.min(), 0] / trained.furthest
+        sigma, prior, residuals = _widths(trained, found)[0], self.values.std(axis=0), trained.residuals
+        mean = self.values.mean(axis=0) + prior * found[0]
+        scale = prior * sigma / np.sqrt(np.mean(residuals**2, axis=0))
+        edge = np.abs(found[0]) > np.where(sigma < IDENTIFIED, EDGE, EDGE + 1)
+        if distance > 1 or edge.any():
+            thin = " and ".join(f"{self.names[k]} {mean[k]:.3g}" for k in np.flatnonzero(edge))
+            where = f"{thin} is at the edge" if thin else f"{distance:.2g} times as far off as its furthest chain"
             raise InputError(
                 f"films: outside of the bank, {where}; check unit, floor, release, or give a bank about it"
             )
         return Posterior(
-            names=tuple(self.names),
-            mean=mean[0],
-            covariance=residuals.T @ residuals / len(residuals) * np.outer(sigma / common, sigma / common),
+            names=self.names,
+            mean=mean,
+            covariance=residuals.T @ residuals / len(residuals) * np.outer(scale, scale),
             prior_sigma=prior,
-            coverage=np.array([(sizes < 1).mean(axis=0), (sizes < 1.96).mean(axis=0)]),
+            coverage=trained.coverage,
             films=len(films),
             chains=len(self.values),
         )
@@ -237,80 +202,65 @@ class Posterior:
         return "\n".join(lines)
 
 
-_Design = tuple[tuple[int, int, bool, bool], ...]
-"""Of each experiment that was filmed its number in the bank, how many films there are, and what all of them have."""
-_Fitted = Callable[[Array], tuple[Array, Array]]
-"""Features of some sets of films → values, and squared distances from the middle of the bank."""
+class _Trained(NamedTuple):
+    """A bank that was filmed: features (k, m), parameters in standard deviations of the bank (k, p), best penalties.
+
+    Residuals are those of each set of films, fitted without its chain; `furthest` from the middle is the last one.
+    """
+
+    rows: Array
+    values: Array
+    penalties: NDArray[np.intp]
+    residuals: Array
+    furthest: float
+    coverage: Array
 
 
-def _features(design: _Design, film_at: Callable[[int, int], Film]) -> Array:
+def _features(groups: Iterable[Iterable[Film]], outline: bool, speed: bool) -> Array:
     """What a set of films says: of each experiment the mean of the summaries."""
-    means = [np.mean([summary(film_at(at, k), *has) for k in range(count)], axis=0) for at, count, *has in design]
-    return np.concatenate(means)
+    return np.concatenate([np.mean([summary(film, outline, speed) for film in films], axis=0) for films in groups])
+
+
+def _regression(rows: Array, values: Array, to: Array) -> tuple[Array, Array]:
+    """Ridge regressions, one for each penalty: values at other features; their distance along the oddest direction."""
+    middle, spread, level = rows.mean(axis=0), rows.std(axis=0), values.mean(axis=0)
+    scaled, to = (rows - middle) / spread, (to - middle) / spread
+    power, axes = np.linalg.eigh(scaled.T @ scaled / len(scaled))
+    turned, sizes = to @ axes, (np.maximum(power, 0) + PENALTIES[:, None])[:, None]
+    slopes = axes.T @ (scaled.T @ (values - level)) / len(scaled)
+    return level + turned / sizes @ slopes, np.abs(turned / np.sqrt(sizes)).max(axis=-1)
+
+
+def _chosen(found: Array, penalties: NDArray[np.intp]) -> Array:
+    """Of each parameter what the regression with its penalty found, (penalties, k, p) → (k, p)."""
+    return found[penalties, :, np.arange(len(penalties))].T
 
 
 @lru_cache(16)
-def _regression(bank: Bank, design: _Design, camera: Camera, draws: int) -> tuple[_Fitted, Array, Array, float]:
-    """Ridge regression of the parameters on the films of a chain.
-
-    Returns:
-        What was fitted; residuals of each chain in each draw, fitted without that chain; their sizes relative to the
-        errors that the other chains would have given; and the greatest distance.
-    """
-    random, repetitions = np.random.default_rng(0), bank.speed.shape[2]
-
-    def row(draw: int, chain: int) -> Array:
+def _trained(bank: Bank, design: tuple[tuple[int, int], ...], has: tuple[bool, bool], camera: Camera) -> _Trained:
+    """Film all chains of a bank, so many films of each experiment, and learn each from the others."""
+    random, rows = np.random.default_rng(0), []
+    for draw, films in product(range(DRAWS), bank.films):
         errors = camera.errors(random)
-        return _features(
-            design, lambda at, k: bank.film(chain, at, (draw + k) % repetitions).seen(camera, errors, random)
-        )
-
-    rows = np.array([row(draw, chain) for draw in range(draws) for chain in range(len(bank.values))])
-    chains = np.tile(np.arange(len(bank.values)), draws)
-    values = bank.values[chains]
-
-    def fit(train: NDArray[np.bool_]) -> Callable[[Array, Array], tuple[Array, Array]]:
-        """What gives values and distances of features, given a penalty for each parameter."""
-        middle, spread, level = rows[train].mean(axis=0), rows[train].std(axis=0), values[train].mean(axis=0)
-        scaled = (rows[train] - middle) / spread
-        power, axes = np.linalg.eigh(scaled.T @ scaled / len(scaled))
-        slopes = axes.T @ (scaled.T @ (values[train] - level)) / len(scaled)
-
-        def fitted(to: Array, penalties: Array) -> tuple[Array, Array]:
-            turned, sizes = (to - middle) / spread @ axes, np.maximum(power, 0)[:, None] + penalties
-            return level + turned @ (slopes / sizes), (turned**2 / sizes.min(axis=1)).sum(axis=-1)
-
-        return fitted
-
-    folds = [(chains % FOLDS == fold, fit(chains % FOLDS != fold)) for fold in range(FOLDS)]
-
-    def held_out(penalties: Array) -> tuple[Array, Array]:
-        """Residuals and distances."""
-        found, distances = np.empty_like(values), np.empty(len(rows))
-        for out, fitted in folds:
-            found[out], distances[out] = fitted(rows[out], penalties)
-        return values - found, distances
-
-    width, whole = np.ones(values.shape[1]), fit(np.ones(len(rows), bool))
-    squares = [(held_out(penalty * width)[0] ** 2).mean(axis=0) for penalty in PENALTIES]
-    best = PENALTIES[np.argmin(squares, axis=0)]
-    residuals, distances = held_out(best)
-    found, same = (values - residuals) / values.std(axis=0), chains[:, None] == chains
-    sizes = np.abs(residuals) / _widths(residuals, found, found, same)
-    return lambda features: whole(features, best), residuals, sizes, float(distances.max())
+        walks = [[films[at][(draw + k) % len(films[at])] for k in range(count)] for at, count in design]
+        rows.append(_features([[walk.seen(camera, errors, random) for walk in group] for group in walks], *has))
+    features, chains = np.array(rows), np.tile(np.arange(len(bank.values)), DRAWS)
+    values = ((bank.values - bank.values.mean(axis=0)) / bank.values.std(axis=0))[chains]
+    found, distances = np.empty((len(PENALTIES), *values.shape)), np.empty((len(PENALTIES), len(rows)))
+    for fold in range(FOLDS):
+        out = chains % FOLDS == fold
+        found[:, out], distances[:, out] = _regression(features[~out], values[~out], features[out])
+    penalties = ((values - found) ** 2).mean(axis=1).argmin(axis=0)
+    residuals, furthest = values - _chosen(found, penalties), float(distances[penalties.min()].max())
+    trained = _Trained(features, values, penalties, residuals, furthest, np.empty(0))
+    sizes = np.abs(residuals) / _widths(trained, values - residuals, chains[:, None] == chains)
+    return trained._replace(coverage=np.array([(sizes < size).mean(axis=0) for size in (1, 1.96)]))
 
 
-def _widths(residuals: Array, found: Array, at: Array, but: NDArray[np.bool_] | None = None) -> Array:
-    """Errors at some places, (m, p): those of chains nearby, and at least those of all.
-
-    Args:
-        residuals: of all chains, (k, p).
-        found: where these were found, in standard deviations of the bank, (k, p).
-        at: the places, likewise, (m, p).
-        but: chains that do not count, (m, k).
-    """
-    squares = (at**2).sum(axis=1)[:, None] + (found**2).sum(axis=1) - 2 * at @ found.T
-    weights = np.exp(-squares / (2 * NEAR**2)) * (1.0 if but is None else ~but)
-    common = (residuals**2).mean(axis=0)
-    nearby = (weights @ residuals**2 + FEW * common) / (weights.sum(axis=1, keepdims=True) + FEW)
+def _widths(trained: _Trained, at: Array, but: Array | bool = False) -> Array:
+    """Errors at some places, (m, p): those of chains found nearby, and at least those of all; `but`: not of these."""
+    found, squares = trained.values - trained.residuals, trained.residuals**2
+    away = (at**2).sum(axis=1)[:, None] + (found**2).sum(axis=1) - 2 * at @ found.T
+    weights, common = np.exp(-away / (2 * NEAR**2)) * np.logical_not(but), squares.mean(axis=0)
+    nearby = (weights @ squares + FEW * common) / (weights.sum(axis=1, keepdims=True) + FEW)
     return np.asarray(np.sqrt(np.maximum(nearby, common)))

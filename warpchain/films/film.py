@@ -47,8 +47,10 @@ class Camera:
 
     def errors(self, random: np.random.Generator) -> Array:
         """Errors that all films of a chain have: scale, floor, origin, roll, four edges."""
-        sigma = [self.scale, self.floor, self.origin, self.roll, *[self.outline] * 4]
-        return random.normal(size=8) * sigma
+        return random.normal(size=8) * [self.scale, self.floor, self.origin, self.roll, *[self.outline] * 4]
+
+
+CAREFUL: Final = Camera()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -75,26 +77,11 @@ class Film:
         """One line."""
         return f"<Film of {self.links} links at {self.frequency:g} Hz, {len(self.time)} frames>"
 
-    @classmethod
-    def of(cls, walk: WalkResult) -> Self:
-        """A simulated walk with series and frames, without errors; it begins at the release."""
-        if not len(walk.time) or not len(walk.frame_time):
-            raise InputError("walk: it has no series or no frames; record both")
-        scene, speed = walk.setup.scene, float(walk.rms_speed[0])
-        return cls(
-            time=walk.time,
-            center=walk.center,
-            links=scene.links,
-            frequency=scene.frequency,
-            outline=edges(walk.frame_joints[0]),
-            speed=speed,
-        )
-
     def seen(self, camera: Camera, errors: Array, random: np.random.Generator) -> Self:
         """A film without errors as a camera shows it, given the errors that other films of the chain share."""
         scale, floor, origin, roll = errors[:4]
         time = np.arange(-BEFORE + random.uniform() / camera.fps, self.time[-1], 1 / camera.fps)
-        center = np.column_stack([np.interp(time, self.time, self.center[:, k]) for k in (0, 1)])
+        center = np.column_stack([np.interp(time, self.time, x) for x in self.center.T])
         turned = roll * np.column_stack([center[:, 1] - center[0, 1], -center[:, 0]])
         shift, noise = np.array([origin, floor]), random.normal(size=center.shape) * camera.noise
         delay, slip = random.normal(size=2) * [camera.release, camera.speed]
@@ -118,21 +105,36 @@ class Film:
             needed = f"−{BEFORE:g} to {CLOCK[-1] + 0.02:g} s"
             raise InputError(f"film: it shows {first:.3f} to {last:.3f} s after the release; give {needed}")
         if abs(rate / camera.fps - 1) > 0.05:
-            raise InputError(f"camera.fps: {camera.fps:g}, but the film has {rate:.4g} frames a second; give that")
+            wrong = f"{camera.fps:g}, but the film has {rate:.4g} frames a second"
+            raise InputError(f"camera.fps: {wrong}; give that or, if it plays in slow motion, fps to read")
         if self.noise > 1.5 * camera.noise:
-            raise InputError(f"camera.noise: {camera.noise} m, but the film scatters by {self.noise:.2g} m; give that")
+            wrong = f"{camera.noise} m, but before the release the film scatters by {self.noise:.2g} m"
+            raise InputError(f"camera.noise: {wrong}; give that, or check unit and release")
+        near, y = (self.time > 0.02) & (self.time < 0.03), self.center[:, 1] - self.center[self.time < 0, 1].mean()
+        off = (y + GRAVITY * self.time**2 / 2)[near]
+        if not near.any() or abs(off.mean()) > 5e-4 + 3 * np.hypot(0.03 * GRAVITY * camera.release, camera.noise):
+            raise InputError("film: 20 to 30 ms after the release nothing falls freely; check unit, fps and release")
 
 
-def film_of(walk: WalkResult, camera: Camera | None = None, seed: int = 0) -> Film:
-    """A film of a simulated walk with series and frames, with the errors of a camera."""
-    camera, random = camera or Camera(), np.random.default_rng(seed)
-    return Film.of(walk).seen(camera, camera.errors(random), random)
+def film_of(walk: WalkResult, camera: Camera | None = CAREFUL, seed: int = 0) -> Film:
+    """A film of a simulated walk with series and frames, with the errors of a camera; None: without any."""
+    if not len(walk.time) or not len(walk.frame_time):
+        raise InputError("walk: it has no series or no frames; record both")
+    scene, random = walk.setup.scene, np.random.default_rng(seed)
+    exact = Film(
+        time=walk.time,
+        center=walk.center,
+        links=scene.links,
+        frequency=scene.frequency,
+        outline=edges(walk.frame_joints[0]),
+        speed=float(walk.rms_speed[0]),
+    )
+    return exact if camera is None else exact.seen(camera, camera.errors(random), random)
 
 
 def edges(joints: Array) -> Array:
     """Outline of joints, (n, 2)."""
-    x, y = joints.T
-    return np.array([x.min(), x.max(), y.min(), y.max()])
+    return np.stack([joints.min(axis=0), joints.max(axis=0)], axis=1).ravel()
 
 
 def summary(film: Film, outline: bool, speed: bool) -> Array:
@@ -142,7 +144,7 @@ def summary(film: Film, outline: bool, speed: bool) -> Array:
     """
     start = film.center[film.time < 0].mean(axis=0)
     fine = np.add.outer(CLOCK, np.arange(-0.0095, 0.01, 1e-3))
-    way = np.stack([np.interp(fine, film.time, film.center[:, k]).mean(axis=1) for k in (0, 1)]) - start[:, None]
-    lift = way[1] + GRAVITY * CLOCK**2 / 2
-    slopes = [way[0, :stop] @ lift[:stop] / (lift[:stop] @ lift[:stop]) for stop in (5, 7, 10)]
-    return np.concatenate([start, way.ravel(), slopes, film.outline if outline else [], [film.speed] if speed else []])
+    x, y = (np.interp(fine, film.time, film.center[:, k]).mean(axis=1) - start[k] for k in (0, 1))
+    lift = y + GRAVITY * CLOCK**2 / 2
+    slopes = [x[:stop] @ lift[:stop] / (lift[:stop] @ lift[:stop]) for stop in (5, 7, 10)]
+    return np.concatenate([start, x, y, slopes, film.outline if outline else [], [film.speed] if speed else []])

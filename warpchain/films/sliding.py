@@ -5,7 +5,8 @@ from typing import Final
 
 import numpy as np
 
-from warpchain.films.film import CLOCK, GRAVITY, Array, Camera, Film
+from warpchain.films.film import CAREFUL, CLOCK, GRAVITY, Array, Camera, Film
+from warpchain.inputs.validation import InputError
 
 RELEASE_SPEED: Final = 2e-3
 """Standard deviation of either speed of the centre of mass at the release [m/s]: links pass the sprocket one by one."""
@@ -42,16 +43,15 @@ class FrictionLine:
         return f"floor_friction {self.friction:.4f} ± {self.error:.4f}, to {self.end:.3f} s after the release"
 
 
-def friction_line(film: Film, camera: Camera | None = None) -> FrictionLine:
+def friction_line(film: Film, camera: Camera = CAREFUL) -> FrictionLine:
     """The friction of the floor while all that touches it slides: m x″ = μ m (y″ + g), whatever happens in the chain.
 
     Friction, place, height, moment of the release, speed at the release and roll of the camera are fitted together,
     the last four within their errors. The fit ends early for slow loops, whose links soon stick, and its error grows.
 
     Raises:
-        InputError: the film is too short, or not as the camera says.
+        InputError: the film is too short, not as the camera says, falls otherwise, or goes backwards.
     """
-    camera = camera or Camera()
     film.check(camera)
     x, y = (film.center - film.center[film.time < -2 * camera.release].mean(axis=0)).T
     time, noise = np.maximum(film.time, 0), film.noise
@@ -70,6 +70,8 @@ def friction_line(film: Film, camera: Camera | None = None) -> FrictionLine:
         covariance = np.linalg.inv(matrix.T @ matrix + np.diag(prior**-2.0))
         found = covariance @ (matrix.T @ np.concatenate([lift[falls], x[slides] / size])) / noise
         friction = float(found[0])
+    if friction < -3 * covariance[0, 0] ** 0.5:
+        raise InputError(f"direction: the chain goes backwards, friction {friction:.2f}; give the other direction")
     sticks = STICKS * np.clip((friction / speed - 0.05) / 0.04, 0, 1)
     after = film.time > 0
     return FrictionLine(

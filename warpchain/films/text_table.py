@@ -1,6 +1,7 @@
 """Films out of text tables, as Tracker and other programs that follow points in videos export them."""
 
 import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final, Literal
@@ -28,8 +29,8 @@ def read(
 ) -> Film:
     """Read a film: a text table with columns t, x and y of the centre of mass, as Tracker exports it.
 
-    Lines above the heads of the columns and other columns are passed over. Columns are parted by tabs, semicolons or
-    commas; by the first two, a comma is a decimal point.
+    Lines above the heads of the columns, units in heads, and other columns are passed over. Columns are parted by
+    tabs, semicolons, commas or spaces; a comma that does not part them is a decimal point.
 
     Args:
         path: the file.
@@ -49,37 +50,38 @@ def read(
     """
     if unit not in UNITS or direction not in ("right", "left"):
         raise InputError(f"unit: {shown(unit)}, direction: {shown(direction)}; give m, cm or mm, and right or left")
-    lines = Path(path).read_text(encoding="utf-8-sig", errors="replace").splitlines()
-    marks = [next((mark for mark in "\t;" if mark in line), ",") for line in lines]
-    heads = [[name.strip() for name in line.split(mark)] for line, mark in zip(lines, marks, strict=True)]
+    lines = [_cells(line) for line in Path(path).read_text(encoding="utf-8-sig", errors="replace").splitlines()]
+    heads = [[re.sub(r"[\s(\[].*", "", cell) for cell in cells] for cells in lines]  # without units
     first = next((number for number, names in enumerate(heads) if {"t", "x", "y"} <= set(names)), None)
     if first is None:
         raise InputError(f"{path}: no line with the column heads t, x and y; export these of the centre of mass")
-    names, mark = heads[first], marks[first]
+    names, rows = heads[first], []
     if names.count("x") > 1:
         raise InputError(f"{path}: several columns x; export one track, the centre of mass")
-    rows = []
-    for number, line in enumerate(lines[first + 1 :], first + 2):
-        cells = (line if mark == "," else line.replace(",", ".")).split(mark)
-        chosen = [cell for name, cell in zip(names, cells, strict=False) if name in ("t", "x", "y") and cell.strip()]
-        if len(chosen) == 3:  # Tracker leaves cells empty where nothing was marked
+    for number, cells in enumerate(lines[first + 1 :], first + 2):
+        row = [cells[k] for k in map(names.index, "txy") if k < len(cells) and cells[k]]
+        if any(cells[len(names) :]):
+            raise InputError(f"{path}: line {number} has too many cells; part them by tabs or semicolons")
+        if len(row) == 3:  # Tracker leaves cells empty where nothing was marked
             try:
-                rows.append([float(cell) for cell in chosen])
+                rows.append([float(cell) for cell in row])
             except ValueError:
                 raise InputError(f"{path}: line {number} is not numbers; correct or delete it") from None
-    columns = dict(
-        zip([name for name in names if name in ("t", "x", "y")], np.array(rows).reshape(-1, 3).T, strict=True)
-    )
-    time, forward = columns["t"], UNITS[unit] * (1 if direction == "right" else -1)
-    center = np.column_stack([(columns["x"] - origin[0]) * forward, (columns["y"] - origin[1]) * UNITS[unit]])
+    time, x, y = np.array(rows).reshape(-1, 3).T
     if len(time) < 20 or np.any(np.diff(time) <= 0):
         raise InputError(f"{path}: {len(time)} frames; give at least 20, in order of time")
     if fps is not None:
         time = np.round((time - time[0]) / np.median(np.diff(time))) / fps
+    sign, length = 1 if direction == "right" else -1, UNITS[unit]
+
+    def metres(places: Array) -> Array:
+        return (places - origin) * [sign * length, length]
+
     edges = None
     if outline is not None:
-        x, y = (np.reshape(outline, (2, 2)) - np.array(origin)[:, None]) * [[forward], [UNITS[unit]]]
-        edges = np.array([*sorted(x), *y])
+        (left, right), (low, high) = metres(np.reshape(outline, (2, 2)).T).T
+        edges = np.array([min(left, right), max(left, right), low, high])
+    center = metres(np.column_stack([x, y]))
     release = _fitted_release(time, center[:, 1]) if release is None else release
     return Film(time=time - release, center=center, links=links, frequency=frequency, outline=edges, speed=speed)
 
@@ -89,10 +91,18 @@ def _fitted_release(time: Array, y: Array) -> float:
 
     def misfit(start: float) -> float:
         near = (time > start - BEFORE) & (time < start + 0.03)
-        fall = y[near] + GRAVITY / 2 * np.maximum(time[near] - start, 0) ** 2
-        return float(fall.var())
+        return float((y[near] + GRAVITY / 2 * np.maximum(time[near] - start, 0) ** 2).var())
 
     starts = np.arange(time[0] + BEFORE / 2, time[-1] - 0.1, 2.5e-4)
     if not len(starts):
         raise InputError("release: the film is too short to fit it; give it")
-    return float(starts[np.argmin([misfit(start) for start in starts])])
+    release = float(min(starts, key=misfit))
+    if misfit(release) > 4 * y[(time > release - BEFORE) & (time < release)].var():
+        raise InputError("release: nothing begins to fall freely; check unit and fps, or give it")
+    return release
+
+
+def _cells(line: str) -> list[str]:
+    """Cells of a line, numbers with decimal points."""
+    mark = next((mark for mark in "\t;," if mark in line), None)
+    return [cell.strip(' "') for cell in (line if mark == "," else line.replace(",", ".")).split(mark)]

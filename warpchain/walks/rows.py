@@ -25,7 +25,12 @@ MISSING: Final = -1
 """Status of a walk that has not been computed yet; no code of `Status` is negative."""
 
 _DRAWN: Final = "_drawn"
-_PREFIXES: Final = {"impulses": "impulses", "greatest_penetration": "penetration", "energy": "energy"}
+_PREFIXES: Final = {
+    "impulses": "impulses",
+    "greatest_penetration": "penetration",
+    "energy": "energy",
+    "release": "release",
+}
 """Field that is a dictionary → how the names of its columns begin."""
 _ONLY_OF_A_WALK: Final = ("wall_time",)
 """Fields that are no columns: a number of a sweep is the same however its walk was computed."""

@@ -35,6 +35,7 @@ from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.status import Status
 from warpchain.walks.going_on import go_on
+from warpchain.walks.landmarks import at_release
 from warpchain.walks.motion import NOTHING, Keep
 from warpchain.walks.moving_plane import angles, lowest_point, released_plane
 from warpchain.walks.recorder import Recorder
@@ -296,6 +297,7 @@ class WalkRun:
         """Results of the walk apart from its motion, by the names of the fields of `WalkResult`."""
         counts, extremes = self.counts, self.extremes
         is_at_rest = self.status == Status.AT_REST
+        first = self._batch.first_sample(self._world)
         # Δx is x of the centre of mass, because the sprocket's centre is at x = 0; on a slope, along the floor
         return {
             "status": self.status,
@@ -319,6 +321,7 @@ class WalkRun:
             **self._ending("strands_met_at", "strands_met", layout.STRANDS_MET_AT),
             **self._ending("collapsed_at", "collapse", layout.COLLAPSED_AT),
             "sprocket_height": self.raised if self._has_sprocket else math.nan,
+            **at_release(first if self._released else np.full_like(first, np.nan), self.setup.parameters.circle_radius),
         }
 
     def drain(self) -> None:

@@ -42,6 +42,7 @@ from warpchain.loop.before_release import BEFORE, FIELDS, BeforeRelease
 from warpchain.pictures.walk_shape import Kind
 from warpchain.status import Status
 from warpchain.walks.faults import FAULTS, MOST_ENERGY_ERROR, energy_error, faults
+from warpchain.walks.landmarks import RELEASE, bounces
 from warpchain.walks.moving_plane import in_room
 from warpchain.walks.stored_state import read_state, write_state
 
@@ -120,8 +121,7 @@ class WalkResult:
         int, Stored("1", "1 if it fell over before its loop collapsed, 0 if not; −1 if the plane is fixed")
     ]
     self_contact_at: Annotated[
-        float,
-        Stored("s", "from the release to the sample after the first impulse between links; or NaN"),
+        float, Stored("s", "from the release to the sample after the first impulse between links; or NaN")
     ]
     bounces_before_self_contact: Annotated[int, Stored("1", "bounces begun at self_contact_at; −1 if it never came")]
     flight_before_self_contact: Annotated[float, Stored("s", f"at self_contact_at, {_SINCE_FLOOR}")]
@@ -132,8 +132,7 @@ class WalkResult:
     bounces_before_strands_met: Annotated[int, Stored("1", "bounces begun at strands_met_at; −1 if it never came")]
     flight_before_strands_met: Annotated[float, Stored("s", f"at strands_met_at, {_SINCE_FLOOR}")]
     collapsed_at: Annotated[
-        float,
-        Stored("s", "from the release until the loop enclosed less than half of its area; NaN if it never did"),
+        float, Stored("s", "from the release until the loop enclosed less than half of its area; NaN if it never did")
     ]
     bounces_before_collapse: Annotated[int, Stored("1", "bounces begun at collapsed_at; −1 if it never came")]
     flight_before_collapse: Annotated[float, Stored("s", f"at collapsed_at, {_SINCE_FLOOR}")]
@@ -149,6 +148,8 @@ class WalkResult:
     sprocket_height: Annotated[
         float, Stored("m", "height of the sprocket's centre at the release; NaN without a sprocket or a release")
     ]
+    release: Annotated[dict[str, float], Stored("m", "the loop at the release", keys=RELEASE)]
+    release_speed: Annotated[float, Stored("m/s", "mean speed of the links along the loop at the release")]
     setup: Setup
     seed: int | None
     versions: dict[str, str]
@@ -253,11 +254,7 @@ class WalkResult:
         return state_at(self.setup, t, self.walk_time if is_released else np.nan)
 
     def plot(
-        self,
-        kind: Kind = "height_and_speed",
-        *,
-        figure: "Figure | None" = None,
-        ax: "Axes | None" = None,
+        self, kind: Kind = "height_and_speed", *, figure: "Figure | None" = None, ax: "Axes | None" = None
     ) -> "Figure":
         """Draw the walk.
 
@@ -288,6 +285,17 @@ class WalkResult:
         from warpchain.loop.stationary_loop import average_loop
 
         return average_loop(self.setup, self.before_release, self.sprocket_center)
+
+    def bounce_table(self) -> dict[str, Array]:
+        """The bounces off a flat or sloping floor: columns of equal length, for example for `pandas.DataFrame`.
+
+        `start` and `end` of contact [s], to a sample; `impulse_x`, `impulse_y` of the floor on the chain [N s];
+        `sticks_at` [s], the first sample until which not all that touched slid one way (NaN: all did).
+
+        Raises:
+            InputError: the walk has no series, its plane tilts, or its floor is a profile.
+        """
+        return bounces(self.time, self.center_velocity, self.setup)
 
     def animate(self, path: str | os.PathLike[str], *, fps: float = 30.0, slow: float = 4.0) -> None:
         """Write a moving picture of the walk; the suffix of `path` gives the format: .gif, .mp4 or .html.
@@ -374,13 +382,7 @@ MOTION: Final = {name: stored for name, stored in STORED.items() if stored.shape
 
 
 def write_motion(group: "h5py.Group", values: Mapping[str, Any], joints: type = np.float64) -> None:
-    """Write the arrays of a walk, and `before_release`, into a group.
-
-    Args:
-        group: where to.
-        values: name → value, as in a `WalkResult`.
-        joints: precision of what each joint has in each frame.
-    """
+    """Write the arrays of a walk, and `before_release`, into a group; `joints`: precision of what each joint has."""
     write_fields(group, values, MOTION, joints)
     if (before := values[BEFORE]) is not None:
         write_fields(group.create_group(BEFORE, track_order=True), vars(before), FIELDS, joints)

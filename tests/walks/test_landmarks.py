@@ -1,0 +1,83 @@
+"""The loop at the release and the bounces, against NumPy on the links, and against impulses that were put in."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import warpchain
+from tests.support.made_walks import make_unreleased, make_walk
+from warpchain import InputError, WalkResult
+from warpchain.inputs.setup import resolve
+from warpchain.walks.landmarks import bounces
+
+
+@pytest.fixture(scope="module")
+def walk() -> WalkResult:
+    """A chain that is thrown off its sprocket and bounces."""
+    return warpchain.walk(links=60, frequency=20.0, start="spinning", preset="soft")
+
+
+def test_the_loop_at_the_release_is_that_of_its_links(walk: WalkResult) -> None:
+    """Centre of mass, outline of the joints and mean speed along the links, summed by NumPy."""
+    state, chain = walk.state(0.0), walk.setup.parameters
+    mass = np.resize([chain.inner_mass, chain.outer_mass], 60)
+    along = np.column_stack([np.cos(state.position[:, 2]), np.sin(state.position[:, 2])])
+    center = mass @ state.position[:, :2] / mass.sum()
+    (left, low), (right, high) = state.joints.min(axis=0), state.joints.max(axis=0)
+    expected = {"center_x": center[0], "center_y": center[1], "width": right - left, "height": high - low}
+    assert walk.release == pytest.approx({**expected, "lowest": low}, abs=1e-9)
+    assert walk.release_speed == pytest.approx(np.mean(np.sum(state.velocity[:, :2] * along, axis=1)), rel=1e-12)
+
+
+def test_a_sweep_has_the_release_of_each_walk(tmp_path: Path) -> None:
+    """In columns; a walk that goes on from a state has that of its walk, and one that was never released none."""
+    settings: dict[str, Any] = {"preset": "soft", "scene": {"start": "spinning", "walk_limit": 0.1}}
+    result = warpchain.sweep(
+        grid={"links": [40], "frequency": [15]}, samples=1, out=tmp_path / "s", progress=False, **settings
+    )
+    walk = result.walk(0)
+    for name, value in {**walk.release, "speed": walk.release_speed}.items():
+        assert result.columns[f"release_{name}"].item() == value
+    rest = warpchain.walk(start=walk.state(0.06))
+    assert (rest.release, rest.release_speed) == (walk.release, walk.release_speed)
+    lost = warpchain.walk(links=40, frequency=15.0, preset="soft", start="rest", hold_limit=0.01)
+    assert np.isnan([*lost.release.values(), lost.release_speed]).all()
+
+
+@pytest.mark.parametrize("slope", [0.0, 5.0])
+def test_bounces_have_the_impulses_that_were_put_in(slope: float) -> None:
+    """A body flies, slides for 20 ms, flies, and sticks half-way through its second contact; nothing is simulated."""
+    setup = resolve("paper", scene={"links": 30, "slope": slope}, options={}, parameters={"floor_friction": 0.3})
+    time, angle, mass = np.arange(0, 0.4, 0.001), np.radians(slope), 15 * (3.700e-3 + 3.147e-3)
+    normal = 0.05 * ((time > 0.1) & (time <= 0.12)) + 0.02 * ((time > 0.2) & (time <= 0.24))
+    forward = np.where(time > 0.22, 0.1, 0.3) * normal
+    axes = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    impulse = np.column_stack([forward, normal]) @ axes
+    velocity = np.cumsum(impulse, axis=0) / mass - np.outer(time, [0, 9.809]) + [0.3, 0.1]
+    table = bounces(time, velocity, setup)
+    assert table["start"] == pytest.approx([0.1, 0.2]) and table["end"] == pytest.approx([0.12, 0.24])
+    assert table["sticks_at"] == pytest.approx([np.nan, 0.221], nan_ok=True)
+    expected = [impulse[time < 0.15].sum(axis=0), impulse[time > 0.15].sum(axis=0)]
+    assert np.column_stack([table["impulse_x"], table["impulse_y"]]) == pytest.approx(np.array(expected))
+
+
+def test_bounces_of_a_walk_are_those_that_kernels_count(walk: WalkResult) -> None:
+    """As many, the first while circles are at the floor, and with friction times its pressure, for all slides."""
+    table = walk.bounce_table()
+    assert len(table["start"]) == walk.bounces == 8
+    heights = np.interp([table["start"][0] - 0.001, table["start"][0] + 0.001], walk.time, walk.lowest)
+    assert heights[0] > 2e-4 > heights[1]
+    friction = walk.setup.parameters.floor_friction
+    slid = np.isnan(table["sticks_at"])
+    assert slid[0] and table["impulse_x"][slid] == pytest.approx(friction * table["impulse_y"][slid], rel=1e-9)
+    assert not slid[-1]  # the pile lies
+
+
+def test_walks_without_bounces_have_none() -> None:
+    """One that was never released has an empty table; a profile is refused, because its normal is not one."""
+    assert all(len(column) == 0 for column in make_unreleased().bounce_table().values())
+    setup = resolve("paper", scene={"links": 30, "floor": [[0, 0], [1, 0.1]]}, options={}, parameters={})
+    with pytest.raises(InputError, match=r"bounces: .* give a walk on a flat floor or a slope"):
+        make_walk(setup=setup).bounce_table()

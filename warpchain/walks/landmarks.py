@@ -1,0 +1,65 @@
+"""Landmarks of a walk that its samples tell: the loop at the release, and the bounces off the floor."""
+
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpchain.inputs.floor import slope_points
+from warpchain.inputs.scene import link_values
+from warpchain.inputs.setup import Setup
+from warpchain.inputs.validation import InputError
+from warpchain.kernels import layout
+
+Array = NDArray[np.float64]
+
+RELEASE: Final = {
+    "center_x": "x of the centre of mass",
+    "center_y": "y of the centre of mass",
+    "width": "width of the joints' outline",
+    "height": "height of the joints' outline",
+    "lowest": "y of the lowest joint",
+}
+"""Keys of `WalkResult.release`, see `at_release`."""
+PAUSE: Final = 0.01
+"""A floor impulse so long [s] after the one before begins a new bounce, as kernels count them."""
+SLIDES: Final = 1e-6
+"""By how much less, relative to friction times its normal part, an impulse shows that something sticks …"""
+FAINT: Final = 1e-9
+"""… and how small it is, relative to the momentum of the walk, if nothing touches: rounding is 1e-13."""
+BOUNCE: Final = ("start", "end", "impulse_x", "impulse_y", "sticks_at")
+"""Columns of a table of bounces."""
+
+
+def at_release(sample: Array, radius: float) -> dict[str, Any]:
+    """Fields of a `WalkResult` out of the first sample of a walk and the radius of the circles [m]."""
+    columns = [layout.CENTER_X, layout.CENTER_Y, layout.WIDTH, layout.HEIGHT, layout.LOWEST]
+    values = dict(zip(RELEASE, sample[columns].tolist(), strict=True))
+    speed = float(sample[layout.LOOP_SPEED])
+    return {"release": values | {"lowest": values["lowest"] + radius}, "release_speed": speed}
+
+
+def bounces(time: Array, velocity: Array, setup: Setup) -> dict[str, Array]:
+    """`WalkResult.bounce_table` from times and velocities of the centre of mass.
+
+    Gravity and floor alone push the centre: J = m Δv + m g Δt, and a velocity between two samples is linear in time.
+    """
+    scene, parameters = setup.scene, setup.parameters
+    if scene.plane == "tilting" or scene.floor != "flat":
+        raise InputError("bounces: the plane tilts, or the floor is a profile; give a walk on a flat floor or a slope")
+    free = time >= (scene.release[-1][0] if scene.release else 0.0)  # of a sprocket that moves on after the release
+    time, speed = time[free], np.abs(velocity).max(initial=0.0)
+    mass = link_values(scene, parameters).total_mass
+    gained = mass * (velocity[free] + np.outer(time, [0.0, parameters.gravity]))
+    impulse, (along_x, along_y) = np.diff(gained, axis=0), slope_points(scene.slope)[1]
+    pushed, pressed = impulse @ [along_x, along_y], impulse @ [-along_y, along_x]
+    sticks = np.abs(pushed) < (1 - SLIDES) * parameters.floor_friction * pressed
+    touched = np.flatnonzero(np.hypot(*impulse.T) > FAINT * mass * speed)
+    begins = (np.diff(touched, prepend=-2) > 1) & (np.diff(time[touched], prepend=-np.inf) > PAUSE)
+    parts = np.split(touched, np.flatnonzero(begins)[1:]) if len(touched) else []
+    rows = [
+        (time[part[0]], time[part[-1] + 1], *gained[part[-1] + 1] - gained[part[0]], *time[part[sticks[part]] + 1][:1])
+        for part in parts
+    ]
+    table = np.array([(*row, np.nan)[: len(BOUNCE)] for row in rows]).reshape(-1, len(BOUNCE))
+    return dict(zip(BOUNCE, table.T, strict=True))
