@@ -56,10 +56,7 @@ SLOW: Final = "Slow loops, at 5 Hz and long ones at 10 Hz, collapse in their fir
 
 CLAIMS: Final = (
     Claim(
-        "The chain bounces along the floor; number and size of the bounces vary",
-        STARTS,
-        findings.bounces,
-        {PART: SLOW},
+        "The chain bounces along the floor; number and size of the bounces vary", STARTS, findings.bounces, {PART: SLOW}
     ),
     Claim(
         "The shape of the chain does not change significantly in the collision",
@@ -122,11 +119,7 @@ CLAIMS: Final = (
             for verdict in (AGREES, PART, DIFFERS)
         },
     ),
-    Claim(
-        "The ellipse delays this collision (150 and 180 links)",
-        "`paper_strands`",
-        findings.delay,
-    ),
+    Claim("The ellipse delays this collision (150 and 180 links)", "`paper_strands`", findings.delay),
     Claim(
         "Most simulated points lie within two standard deviations of the measured ones",
         "Figure 6",
@@ -153,11 +146,7 @@ CLAIMS: Final = (
             DIFFERS: "Means of 12 chaotic walks differ by their own standard error, 2 to 4 %, whatever the tolerance.",
         },
     ),
-    Claim(
-        "Δx has the same distribution at both tolerances",
-        "`paper_distributions`",
-        last_findings.same_distributions,
-    ),
+    Claim("Δx has the same distribution at both tolerances", "`paper_distributions`", last_findings.same_distributions),
     Claim(
         "Δx depends highly nonlinearly on the parameters within a standard deviation (footnote 9)",
         "`paper_strands`",
@@ -221,10 +210,7 @@ CLAIMS: Final = (
         },
     ),
     Claim(
-        "… moments of inertia",
-        "`inner_inertia`, `outer_inertia`",
-        _left_open(findings.INERTIAS),
-        {OPEN: "As above."},
+        "… moments of inertia", "`inner_inertia`, `outer_inertia`", _left_open(findings.INERTIAS), {OPEN: "As above."}
     ),
     Claim(
         "The floor's restitution e_fc, over two orders of magnitude: no dependence",
@@ -292,11 +278,7 @@ CLAIMS: Final = (
             "release or are pushed at 1 m/s."
         },
     ),
-    Claim(
-        "A planar chain loses its shape gradually",
-        "`paper_strands`, `paper_shapes`",
-        last_findings.gradual,
-    ),
+    Claim("A planar chain loses its shape gradually", "`paper_strands`, `paper_shapes`", last_findings.gradual),
     Claim(
         "A plane that tilts needs only six more degrees of freedom",
         "[tilting plane](../../docs/tilting-plane.md)",

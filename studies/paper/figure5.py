@@ -64,10 +64,7 @@ def figure5_table() -> str:
     return table(
         head,
         (
-            (
-                f"{row['links']} × {float(row['frequency']):g} Hz",
-                *(row[name] for name in list(row)[2:]),
-            )
+            (f"{row['links']} × {float(row['frequency']):g} Hz", *(row[name] for name in list(row)[2:]))
             for row in rows()
         ),
     )

@@ -101,7 +101,9 @@ def rest_table(numbers: Numbers) -> str:
                 f"{found['chi2']:.1f}, {found['p']:.2g}",
             ]
         )
-    return table(["Δx", "all cells", "120 links", "150 and 180 links", "pairs, cells", "χ² of no difference, p"], rows)
+    return table(
+        ["Δx", "all cells", "60 and 120 links", "150 and 180 links", "pairs, cells", "χ² of no difference, p"], rows
+    )
 
 
 def lengths_table(numbers: Numbers) -> str:
@@ -127,6 +129,38 @@ def lengths_table(numbers: Numbers) -> str:
             cells.append("—" if fixed is None else percent(fixed.mean, fixed.half_width))
         rows.append(cells)
     return table(["ℓ", "Δx, bars of that length", "ℓ alone", "bounces until the collapse, bars", "ℓ alone"], rows)
+
+
+def nonlinear_table(numbers: Numbers) -> str:
+    """What explains the variance of Δx in a cell, by start."""
+    content, rows = numbers["paper_footnote"], []
+    for start, found in content["nonlinear"].items():
+        for i, links in enumerate(content["cells"]["links"]):
+            for j, frequency in enumerate(content["cells"]["frequency"]):
+                shares = (max(0.0, found[name][i][j]) for name in ("linear", "squares", "products", "repeated"))
+                rows.append([start, f"{links} × {frequency:g} Hz", *(f"{100 * share:.0f} %" for share in shares)])
+    head = ["start", "cell", "linear terms", "and squares, turning phase", "and products", "all but chaos"]
+    return table(head, rows)
+
+
+def loops_table(numbers: Numbers) -> str:
+    """How loops at their release differ from those held longest."""
+    content = numbers["paper_loops"]
+    found = content["loops"]
+    height, energy = (np.array(found[name], np.float64) for name in ("height", "energy"))
+    links, rows = np.array(content["cells"]["links"]), []
+    for which, start in enumerate(found["starts"]):
+        for hold, seconds in enumerate(found["holds"]):
+            texts = []
+            for chosen in (links >= 120, links < 120):
+                mm, share = (each[chosen][:, :, which, hold].ravel() for each in (height, energy))
+                texts += [
+                    f"{mm.mean():+.2f} ({mm.min():+.2f} to {mm.max():+.2f})",
+                    f"{100 * np.abs(share).max():.2f} %",
+                ]
+            rows.append([start, f"{seconds:g} s", *(text.replace("-", "−") for text in texts)])
+    head = ["start", "held on for", "height / mm, 120 to 180 links", "energy, at most", "60 links", "energy, at most"]
+    return table(head, rows)
 
 
 def sliding_table(numbers: Numbers) -> str:

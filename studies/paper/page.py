@@ -46,6 +46,8 @@ def page(numbers: Numbers) -> str:
         "through": tables.through_table(numbers),
         "open": tables.open_table(numbers),
         "rest": tables.rest_table(numbers),
+        "loops": tables.loops_table(numbers),
+        "nonlinear": tables.nonlinear_table(numbers),
         "lengths": tables.lengths_table(numbers),
         "sliding": tables.sliding_table(numbers),
         "distributions": tables.distributions_table(numbers),

@@ -17,7 +17,9 @@ from studies.paper.further import (
     at_rest,
     distributions,
     left_open,
+    loops,
     more,
+    nonlinear,
     plain,
     rest_and_hold,
     strands,
@@ -40,6 +42,8 @@ WHOLE: Final[dict[str, tuple[str, Callable[[Mapping[str, Block]], Any]]]] = {
     "paper_through_ellipse": ("through", lambda blocks: through(blocks["main"])),
     "paper_open": ("left_open", left_open),
     "paper_rest": ("rest_and_hold", lambda blocks: rest_and_hold(blocks["main"])),
+    "paper_loops": ("loops", lambda blocks: loops(blocks["main"])),
+    "paper_footnote": ("nonlinear", lambda blocks: nonlinear(blocks["main"])),
     "paper_more": ("more", more),
     "paper_distributions": ("distributions", lambda blocks: distributions(blocks["main"])),
 }
@@ -81,10 +85,7 @@ def reduced(result: SweepResult) -> Numbers:
     if result.name in WHOLE:
         key, reduce = WHOLE[result.name]
         content[key] = reduce(result.blocks)
-    for key, name, reduce in (
-        ("starts", "start", starts),
-        ("friction", "floor_friction", friction),
-    ):
+    for key, name, reduce in (("starts", "start", starts), ("friction", "floor_friction", friction)):
         if name in result.blocks and result.name == "paper_claims":
             content[key] = reduce(result.blocks[name])
     if "link_length" in result.blocks:

@@ -34,8 +34,8 @@ COLUMNS: Final = (
 """Columns of the sweep that are needed."""
 
 
-def walks_by_cell(parts: Sequence[SweepResult]) -> dict[Cell, dict[str, Array]]:
-    """The walks of all parts of a sweep by cell: `COLUMNS`, shape (walks,), missing walks included.
+def walks_by_cell(parts: Sequence[SweepResult], names: Sequence[str] = COLUMNS) -> dict[Cell, dict[str, Array]]:
+    """The walks of all parts of a sweep by cell: columns of these names, shape (walks,), missing walks included.
 
     Raises:
         InputError: a part has other axes than links and frequency, other settings than the first, or its seed.
@@ -50,7 +50,7 @@ def walks_by_cell(parts: Sequence[SweepResult]) -> dict[Cell, dict[str, Array]]:
             raise InputError(f"{part.name}: walks of another part, the seed is the same; leave one out")
         for block in part.blocks.values():
             order = [list(block.axes).index(axis) for axis in ("links", "frequency")] + [2]
-            columns = {name: block.columns[name].transpose(order) for name in COLUMNS}
+            columns = {name: block.columns[name].transpose(order) for name in names}
             for i, links in enumerate(block.axes["links"]):
                 for j, frequency in enumerate(block.axes["frequency"]):
                     walks = {name: column[i, j] for name, column in columns.items()}

@@ -126,12 +126,7 @@ def draw_endings(axes: Axes, grid: Grid, cells: Mapping[str, Array]) -> None:
     grid.map(axes, np.full(len(total), np.nan), "how the loop was lost; paler: a smaller share", vmin=0)
     image = np.ma.masked_invalid(np.stack([grid.table(channel) for channel in colors.T], axis=2))
     opaque = (~np.isnan(image.filled(np.nan)).any(axis=2)).astype(float)
-    axes.imshow(
-        np.dstack([image.filled(0.0), opaque]),
-        origin="lower",
-        aspect="auto",
-        interpolation="nearest",
-    )
+    axes.imshow(np.dstack([image.filled(0.0), opaque]), origin="lower", aspect="auto", interpolation="nearest")
     seen = [way for number, way in enumerate(ways) if np.any((most == number) & (total > 0))]
     handles = [Patch(color=COLORS[way], label=way.meaning) for way in seen]
     if handles:
