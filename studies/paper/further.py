@@ -149,22 +149,15 @@ def predicted(values: Array, terms: list[Array]) -> float:
 
 
 def loops(block: Block) -> Numbers:
-    """Loops at their release less those that spun from the start and were held longest: height [mm], energy."""
-    order = [block.dims.index(name) for name in (*CELLS, "start", "further_hold")]
+    """Height of the sprocket over the floor [µm] and kinetic energy [µJ] at the release, means over the phases."""
+    further = [name for name in ("start", "further_hold") if name in block.dims]
+    order = [block.dims.index(name) for name in (*CELLS, *further)]
     others = [number for number in range(len(block.dims)) if number not in order]
-
-    def means(name: str) -> Array:
-        values = np.transpose(block.columns[name], order + others)
-        return np.mean(values, axis=tuple(range(4, values.ndim)))
-
-    last = block.axes["start"].tolist().index("spinning"), int(np.argmax(block.axes["further_hold"]))
-    height, energy = means("sprocket_height"), means("energy_kinetic_at_release")
-    return {
-        "starts": block.axes["start"].tolist(),
-        "holds": block.axes["further_hold"].tolist(),
-        "height": (1e3 * (height - height[:, :, last[0], last[1], None, None])).tolist(),
-        "energy": (energy / energy[:, :, last[0], last[1], None, None] - 1).tolist(),
-    }
+    found: Numbers = {name: block.axes[name].tolist() for name in further}
+    for name, column in (("height", "sprocket_height"), ("energy", "energy_kinetic_at_release")):
+        values = np.transpose(block.columns[column], order + others)
+        found[name] = np.rint(1e6 * values.mean(axis=tuple(range(len(order), values.ndim)))).astype(int).tolist()
+    return found
 
 
 # --- links that pass through one another ---

@@ -144,23 +144,38 @@ def nonlinear_table(numbers: Numbers) -> str:
 
 
 def loops_table(numbers: Numbers) -> str:
-    """How loops at their release differ from those held longest."""
-    content = numbers["paper_loops"]
-    found = content["loops"]
-    height, energy = (np.array(found[name], np.float64) for name in ("height", "energy"))
-    links, rows = np.array(content["cells"]["links"]), []
-    for which, start in enumerate(found["starts"]):
-        for hold, seconds in enumerate(found["holds"]):
-            texts = []
-            for chosen in (links >= 120, links < 120):
-                mm, share = (each[chosen][:, :, which, hold].ravel() for each in (height, energy))
-                texts += [
-                    f"{mm.mean():+.2f} ({mm.min():+.2f} to {mm.max():+.2f})",
-                    f"{100 * np.abs(share).max():.2f} %",
-                ]
-            rows.append([start, f"{seconds:g} s", *(text.replace("-", "−") for text in texts)])
-    head = ["start", "held on for", "height / mm, 120 to 180 links", "energy, at most", "60 links", "energy, at most"]
+    """How loops at their release differ from those that spun from the start and were held longest."""
+    content, held = numbers["paper_loops"], numbers["paper_held"]
+    found, links = content["loops"], np.array(content["cells"]["links"])
+    height, energy = (np.array(found[name], float) for name in ("height", "energy"))
+    least = (slice(None), slice(None), found["start"].index("spinning"), -1)
+    rows = []
+    for which, start in enumerate(found["start"]):
+        for hold, seconds in enumerate(found["further_hold"]):
+            place = (slice(None), slice(None), which, hold)
+            mm, share = 1e-3 * (height[place] - height[least]), energy[place] / energy[least] - 1
+            rows.append([f"{start}, held on for {seconds:g} s", *_loops_texts(mm, share, links)])
+    there = np.isin(links, held["cells"]["links"])
+    mm = 1e-3 * (np.array(held["loops"]["height"]) - height[least][there])
+    share = np.array(held["loops"]["energy"]) / energy[least][there] - 1
+    rows.append(["spinning, held for 30 s under its own loads", *_loops_texts(mm, share, links[there])])
+    head = ["start", "height / mm, 150 and 180 links", "energy, at most", "60 and 120 links", "energy, at most"]
     return table(head, rows)
+
+
+def _loops_texts(mm: Any, share: Any, links: Any) -> list[str]:
+    """Mean, least and greatest difference of height, and of energy the greatest, of long loops and of short ones."""
+    texts = []
+    for chosen in (links >= 150, links < 150):
+        known, energy = mm[chosen], share[chosen]
+        if known.size:
+            texts += [
+                f"{known.mean():+.2f} ({known.min():+.2f} to {known.max():+.2f})",
+                f"{100 * np.abs(energy).max():.2f} %",
+            ]
+        else:
+            texts += ["", ""]
+    return [text.replace("-", "−") for text in texts]
 
 
 def sliding_table(numbers: Numbers) -> str:

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from studies.paper.figure5 import rows as figure5_rows
+from studies.common import read_rows
+from studies.paper.figure5 import RESULTS as FIGURE5
 from studies.paper.findings import Finding, Numbers, percent
 from studies.paper.reduction import effect_of
 from studies.paper.statistics import summary
@@ -41,7 +42,7 @@ def nonlinear(numbers: Numbers) -> Finding:
 
 def figure5_shape(numbers: Numbers) -> Finding:
     """Curves of other cells bounce, change v_x in impacts only, and do not turn back."""
-    found = figure5_rows()
+    found = read_rows(FIGURE5)
     alike = [
         int(row["rises"]) > 0 and float(row["changes_in_impacts"]) > 0.9 and float(row["backwards"]) < 0.1
         for row in found

@@ -222,12 +222,7 @@ def walks_text(numbers: Numbers) -> str:
     failed = ", ".join(f"{count} {name}" for name, count in total.items() if name != "at_rest" and count)
     inaccurate = sum(content["inaccurate"] for content in numbers.values())
     rest = f"{total.total():,} walks: {total['at_rest']:,} at rest" + (f", {failed}" if failed else "")
-    missing = "".join(
-        f"; {content['walks']['missing']:,} more of `{name}` were not run"
-        for name, content in numbers.items()
-        if content["walks"].get("missing")
-    )
-    return f"{rest}; {inaccurate} with an energy error above 5 %{missing}"
+    return f"{rest}; {inaccurate} with an energy error above 5 %"
 
 
 def _symbol(name: str) -> str:

@@ -43,6 +43,7 @@ WHOLE: Final[dict[str, tuple[str, Callable[[Mapping[str, Block]], Any]]]] = {
     "paper_open": ("left_open", left_open),
     "paper_rest": ("rest_and_hold", lambda blocks: rest_and_hold(blocks["main"])),
     "paper_loops": ("loops", lambda blocks: loops(blocks["main"])),
+    "paper_held": ("loops", lambda blocks: loops(blocks["main"])),
     "paper_footnote": ("nonlinear", lambda blocks: nonlinear(blocks["main"])),
     "paper_more": ("more", more),
     "paper_distributions": ("distributions", lambda blocks: distributions(blocks["main"])),
@@ -50,8 +51,6 @@ WHOLE: Final[dict[str, tuple[str, Callable[[Mapping[str, Block]], Any]]]] = {
 """Sweeps that one function reduces: name → key of its numbers, and the function."""
 SWEEPS: Final = ("paper_claims", "paper_joints", "paper_tolerance", "paper_shapes", *WHOLE)
 """Sweeps that the page is made of."""
-CUT_SHORT: Final = ("paper_rest",)
-"""Sweeps that need not be complete: pairs of walks are compared, and counted."""
 
 DEFAULTS: Final = {"clearance": 0.01, "phase": 0.0}
 """Scene of a walk that is not told otherwise: height of the release [m] and part of a loop period."""
@@ -65,7 +64,7 @@ def reduced(result: SweepResult) -> Numbers:
     """
     if result.name not in SWEEPS:
         raise InputError(f"{result.name}: no sweep of this page; give folders of {', '.join(SWEEPS)}")
-    if result.missing_count and result.name not in CUT_SHORT:
+    if result.missing_count:
         raise InputError(f"{result.name}: {result.missing_count} walks are missing; run the sweep to its end")
     content: Numbers = {
         "sweep": content_digest(result.sweep),

@@ -1,6 +1,5 @@
 """Reduces parts of the sweep ``phase_diagram`` to statistics of its cells: the rows of results/cells.csv."""
 
-import csv
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -9,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.common import write_text
+from studies.common import read_rows
 from studies.phase_diagram.endings import Ending, endings
 from warpchain import InputError, Status, SweepResult
 
@@ -117,22 +116,6 @@ def _sd(values: Array) -> float:
     """Standard deviation of what is not NaN; NaN of fewer than two."""
     known = values[np.isfinite(values)]
     return float(known.std(ddof=1)) if len(known) > 1 else float("nan")
-
-
-def write_csv(rows: Sequence[Mapping[str, float | str]], path: Path) -> None:
-    """Write the rows; numbers that are not whole have six digits."""
-    names = list(rows[0])
-    lines = [",".join(names)]
-    for row in rows:
-        values = (row[name] for name in names)
-        lines.append(",".join(f"{value:.6g}" if isinstance(value, float) else str(value) for value in values))
-    write_text(path, "\n".join(lines) + "\n")
-
-
-def read_rows(path: Path) -> list[dict[str, str]]:
-    """The rows of a file, as texts by column."""
-    with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def read_csv(path: Path = CSV) -> dict[str, Array]:

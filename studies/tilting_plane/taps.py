@@ -5,7 +5,6 @@ python -m studies.tilting_plane.taps taps     # → results/taps.csv, tables of 
 python -m studies.tilting_plane.taps          # that file → tables of the page
 """
 
-import csv
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -80,12 +79,6 @@ def _of_cells(columns: Mapping[str, Any], fixed: Any, rows: slice) -> dict[str, 
     return found
 
 
-def read() -> list[dict[str, str]]:
-    """The rows of the committed file."""
-    with RESULTS.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
-
-
 def table(rows: Sequence[Mapping[str, str]]) -> str:
     """What each tap does, means over the cells."""
     head = ("tap at the release", "fell over", "before the loop collapsed", "Δx over that of a fixed plane")
@@ -122,10 +115,8 @@ def main(folder: Annotated[str | None, typer.Argument()] = None) -> None:
         result = warpchain.load(folder)
         if "fixed" not in result.blocks or "lateral_speed" not in result.blocks:
             raise warpchain.InputError(f"{folder}: no blocks fixed and lateral_speed; give a folder of the sweep taps")
-        found = list(reduced(result))
-        lines = [",".join(found[0]), *(",".join(f'"{row[key]}"' for key in found[0]) for row in found)]
-        common.write_text(RESULTS, "\n".join(lines) + "\n")
-    rows = read()
+        common.write_rows(RESULTS, list(reduced(result)))
+    rows = common.read_rows(RESULTS)
     common.write_tables(FOLDER / "README.md", {"taps": table(rows), "taps by links": by_links(rows)})
 
 

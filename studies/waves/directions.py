@@ -7,7 +7,6 @@ Links turn by δθ cos(2πmj/n + φ), which bends the loop alike for both direct
 runs: a slow one stands in the room, against the motion of the links; a fast one runs with them. φ is drawn.
 """
 
-import csv
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
@@ -16,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import warpchain
-from studies.common import run_study, table, write_tables, write_text
+from studies.common import read_rows, run_study, table, write_rows, write_tables
 from studies.waves.drag import END, PARAMETERS, released
 from studies.waves.wave_drag import RIGID, RUNNING, loop_motions, wave_motion
 
@@ -134,7 +133,7 @@ def run() -> None:
         found = reduced(*distances(links, frequency))
         rows += [{"links": str(links), "frequency": f"{frequency:g}", **row} for row in found]
         print(links, frequency, found, flush=True)
-    write_text(RESULTS, "\n".join([",".join(rows[0]), *(",".join(row.values()) for row in rows)]) + "\n")
+    write_rows(RESULTS, rows)
 
 
 def summary(rows: Sequence[Mapping[str, str]]) -> str:
@@ -160,9 +159,7 @@ def main(command: str = "") -> None:
     """Run the study if told so; write the table of the page."""
     if command == "run":
         run()
-    with RESULTS.open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
-    write_tables(FOLDER / "README.md", {"directions": summary(rows)})
+    write_tables(FOLDER / "README.md", {"directions": summary(read_rows(RESULTS))})
 
 
 if __name__ == "__main__":

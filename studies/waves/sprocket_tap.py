@@ -19,7 +19,7 @@ FREQUENCIES: Final = (15.0, 20.0, 25.0)
 DIP: Final = 0.008
 INTERVAL: Final = 2.5e-4
 LATER: Final = np.array([0.014, 0.016, 0.018, 0.020, 0.022])
-"""Times after the first touch [s] over which speeds are taken: the tap is over, the front is not at the sprocket yet."""
+"""Times after the first touch [s] over which speeds are taken: after the tap, before the sprocket is reached."""
 
 
 def dipping(frequency: float, clearance: float) -> warpchain.WalkResult:
@@ -74,13 +74,7 @@ def found(frequency: float) -> list[str]:
 
 def main() -> None:
     """Print the table."""
-    head = (
-        "",
-        "v / (m/s)",
-        "slow: its curvature's centre",
-        "fast: the front of its velocity",
-        "energy on the other side",
-    )
+    head = ("", "v / (m/s)", "slow: place / cm", "fast: front", "energy across, on the other side")
     print(table(head, map(found, FREQUENCIES)))
 
 
