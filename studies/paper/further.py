@@ -33,13 +33,7 @@ def at_rest(block: Block, quantity: str = "dx") -> Array:
 
 def plain(effect: Effect) -> Numbers:
     """An effect as plain numbers."""
-    return {
-        "relative": effect.relative.tolist(),
-        "half_width": effect.half_width.tolist(),
-        "sign": effect.sign.tolist(),
-        "pairs": effect.pairs.tolist(),
-        "lost": effect.lost,
-    }
+    return {name: np.asarray(values).tolist() for name, values in vars(effect).items()}
 
 
 # --- when strands meet ---

@@ -8,7 +8,7 @@ import numpy as np
 from studies.common import table
 from studies.paper.findings import percent
 from studies.paper.reduction import effect_of
-from studies.paper.statistics import Effect, summary
+from studies.paper.statistics import summary
 
 Numbers = Mapping[str, Any]
 
@@ -213,10 +213,6 @@ def undamped_text(numbers: Numbers) -> str:
     found = numbers["paper_more"]["more"]["undamped"]
     effects = {value: summary(effect_of(each)) for value, each in found.items()}
     return ", ".join(f"b = {value}: {percent(each.mean, each.half_width)}" for value, each in effects.items())
-
-
-def _rows(effect: Effect, rows: slice) -> Effect:
-    return Effect(effect.relative[rows], effect.half_width[rows], effect.sign[rows], effect.pairs[rows], effect.lost)
 
 
 def _text(value: object) -> str:

@@ -31,7 +31,7 @@ def nonlinear(numbers: Numbers) -> Finding:
         medians = {name: percent(float(np.median(each)), sign=False) for name, each in shares.items()}
         linear = shares["linear"]
         texts.append(
-            f"{start}: linear terms {medians['linear']} ({percent(linear.min(), sign=False)} to "
+            f"{'as an ellipse' if start == 'ellipse' else 'from the sprocket'}: linear terms {medians['linear']} ({percent(linear.min(), sign=False)} to "
             f"{percent(linear.max(), sign=False)}), with squares {medians['squares']}, with products "
             f"{medians['products']}, all but chaos {medians['repeated']}"
         )

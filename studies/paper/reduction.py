@@ -103,8 +103,7 @@ def reduced(result: SweepResult) -> Numbers:
         content["tolerance"] = tolerance(result.blocks["main"])
     if result.name == "paper_shapes":
         content["impacts"] = first_impacts(result.blocks["main"])
-    rounded_content: Numbers = rounded(content)
-    return rounded_content
+    return rounded(content)
 
 
 def content_digest(sweep: Mapping[str, Any]) -> str:

@@ -179,8 +179,7 @@ def _standard_error(values: Array, there: NDArray[np.bool_]) -> Array:
 
 def _factor(freedom: Any) -> Array:
     """Half-width of a 95 % interval over the standard error; NaN without a degree of freedom."""
-    factor: Array = t.ppf(_TAIL, np.where(np.asarray(freedom) > 0, freedom, np.nan))
-    return factor
+    return t.ppf(_TAIL, np.where(np.asarray(freedom) > 0, freedom, np.nan))
 
 
 def _sign(difference: Array, half_width: Array) -> NDArray[np.int64]:

@@ -48,8 +48,7 @@ def sum_of_powers(power: float | None) -> Callable[[Points], tuple[Array, Predic
     def distance(numbers: Array, speed: Array, length: Array) -> Array:
         exponent = numbers[2] if power is None else power
         turns = speed * TIME / length
-        value: Array = np.log(length * (np.exp(numbers[0]) * turns + np.exp(numbers[1]) * turns**exponent))
-        return value
+        return np.log(length * (np.exp(numbers[0]) * turns + np.exp(numbers[1]) * turns**exponent))
 
     def fit(points: Points) -> tuple[Array, Prediction]:
         def left(numbers: Array) -> Array:

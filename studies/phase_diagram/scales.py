@@ -131,13 +131,11 @@ class Curve:
 
     def __call__(self, turns: Array) -> Array:
         """Δx/(nℓ) on the curve; beyond its ends it keeps the value there."""
-        lengths: Array = np.exp(self._curve(turns))
-        return lengths
+        return np.exp(self._curve(turns))
 
     def left(self, cells: Cells, exponents: Sequence[float] | Array) -> Array:
         """Residuals of cells, shape (cells,)."""
-        left: Array = np.log(cells.lengths) - self._curve(cells.scaled_turns(exponents))
-        return left
+        return np.log(cells.lengths) - self._curve(cells.scaled_turns(exponents))
 
     def best_exponents(self, cells: Cells, chosen: Array) -> Array:
         """Exponents with the least residuals of some cells; nothing of the curve is fitted to them."""

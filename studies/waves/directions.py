@@ -2,6 +2,7 @@
 
     python -m studies.waves.directions run       # twenty minutes of one core → results/directions.csv
     python -m studies.waves.directions           # that file → the table of the page
+    python -m studies.waves.directions impacts   # prints how large fast waves of this length are about a first impact
 
 Links turn by δθ cos(2πmj/n + φ), which bends the loop alike for both directions. Their rates say which way the wave
 runs: a slow one stands in the room, against the motion of the links; a fast one runs with them. φ is drawn.
@@ -9,14 +10,16 @@ runs: a slow one stands in the room, against the motion of the links; a fast one
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
+import typer
 from numpy.typing import NDArray
 
 import warpchain
 from studies.common import read_rows, run_study, table, write_rows, write_tables
-from studies.waves.drag import END, PARAMETERS, released
+from studies.waves.drag import END, NEAR, PARAMETERS, released
+from studies.waves.fields import normal_velocities
 from studies.waves.wave_drag import RIGID, RUNNING, loop_motions, wave_motion
 
 Array = NDArray[np.float64]
@@ -28,6 +31,10 @@ SAMPLES: Final = 40
 SEED: Final = 3000
 LENGTH: Final = 12
 """Links in a wave, about: a whole number of waves fits around the loop."""
+RIDING: Final = 0.0598
+"""Radius at which joints ride on the sprocket [m]."""
+APART: Final = 0.01
+"""Touches of the floor less apart [s] are one impact."""
 VARIANTS: Final = (("none", 0.0), *((way, size) for size in (0.05, 0.15) for way in ("slow", "fast")))
 """Direction, and the amplitude of the links' angles [rad]."""
 
@@ -155,8 +162,28 @@ def summary(rows: Sequence[Mapping[str, str]]) -> str:
     return table(head, lines)
 
 
-def main(command: str = "") -> None:
+def about_impact(links: int, frequency: float) -> tuple[float, float]:
+    """Amplitude [rad] of fast waves of `LENGTH` links before the first impact, and between it and the next one."""
+    walk = warpchain.walk(
+        links=links, frequency=frequency, preset="soft", start="spinning", frame_interval=2.5e-4, walk_limit=0.4
+    )
+    parameters, time, number = walk.setup.parameters, walk.frame_time, round(links / LENGTH)
+    masses = np.tile([parameters.inner_mass, parameters.outer_mass], links // 2)
+    modes = np.abs(np.fft.rfft(normal_velocities(time, walk.frame_joints, masses), axis=1))[:, number - 1 : number + 2]
+    angles = np.sqrt(np.sum((2 * modes / links) ** 2, axis=1)) / (4 * np.pi * frequency * RIDING)
+    touches = np.flatnonzero(np.interp(time, walk.time, walk.lowest) < NEAR)
+    gaps = np.flatnonzero(np.diff(time[touches]) > APART)
+    last, following = touches[gaps[0]], touches[gaps[0] + 1]
+    return tuple(float(np.sqrt(np.mean(part**2))) for part in (angles[: touches[0]], angles[last + 1 : following]))
+
+
+def main(command: Annotated[str, typer.Argument()] = "") -> None:
     """Run the study if told so; write the table of the page."""
+    if command == "impacts":
+        for links, frequency in CELLS:
+            before, after = about_impact(links, frequency)
+            print(f"{links} links, {frequency:g} Hz: {before:.4f} rad before the first impact, {after:.4f} after it")
+        return
     if command == "run":
         run()
     write_tables(FOLDER / "README.md", {"directions": summary(read_rows(RESULTS))})
