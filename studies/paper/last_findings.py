@@ -30,8 +30,9 @@ def nonlinear(numbers: Numbers) -> Finding:
         shares = {name: np.maximum(np.array(each, np.float64), 0.0) for name, each in found.items()}
         medians = {name: percent(float(np.median(each)), sign=False) for name, each in shares.items()}
         linear = shares["linear"]
+        name = "as an ellipse" if start == "ellipse" else "from the sprocket"
         texts.append(
-            f"{'as an ellipse' if start == 'ellipse' else 'from the sprocket'}: linear terms {medians['linear']} ({percent(linear.min(), sign=False)} to "
+            f"{name}: linear terms {medians['linear']} ({percent(linear.min(), sign=False)} to "
             f"{percent(linear.max(), sign=False)}), with squares {medians['squares']}, with products "
             f"{medians['products']}, all but chaos {medians['repeated']}"
         )

@@ -84,13 +84,18 @@ def test_meetings_of_strands_are_counted(tmp_path: Path) -> None:
     rows = list(strands.reduced([make_sweep(tmp_path / "made", SWEEP | {"name": "strands"}, outcome)]))
     write_rows(tmp_path / "strands.csv", rows)
     made = cells.read_csv(tmp_path / "strands.csv")
-    assert made["at_rest"].tolist() == [4, 4, 4, 4, 4, 0] and made["walks"].tolist() == [5, 5, 5, 5, 5, 5]
+    assert made["at_rest"].tolist() == [4, 4, 4, 4, 4, 0] and made["walks"].tolist() == [5, 5, 5, 5, 5, 6]
     for event in strands.EVENTS:
         assert sum(made[f"{event}_{key}"] for key in strands.BEGUN).tolist() == made["at_rest"].tolist()
     assert sum(made[f"{way.label}_{k}"] for way in strands.WAYS for k in range(3)).sum() == 20
-    made |= {"n_early": np.full(6, 20), "n_late": np.full(6, 20), "dx_early": np.full(6, 0.9), "dx_late": np.ones(6)}
-    ratio, error = strands.early_over_late(made | {"se_early": np.full(6, 0.09), "se_late": np.zeros(6)})
-    assert ratio == pytest.approx(-0.1) and error == pytest.approx(0.09)
+
+
+def test_an_early_meeting_is_told_from_what_is_drawn() -> None:
+    """Of walks that go a tenth less far, and met early where a drawn quantity shortens them, the tenth is found."""
+    drawn, phase, noise = np.random.default_rng(1).normal(size=(3, 4000))
+    early = drawn + noise > 0
+    found = strands._early(1 - 0.1 * early - 0.05 * drawn, early, [drawn, phase])
+    assert found["held"] == pytest.approx(-0.1, rel=0.03) and found["raw"] < -0.14
 
 
 def made_cells(exponent: float, power: float, noise: float = 0.0) -> dict[str, np.ndarray]:
