@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import binom, t
+from scipy.stats import t
 
 Array = NDArray[np.float64]
 
@@ -143,11 +143,6 @@ def within(effect: Effect, bound: float) -> int:
     """Number of cells whose effect is within a bound, up and down, with its whole interval."""
     known = effect.known
     return int((np.abs(effect.relative[known]) + effect.half_width[known] <= bound).sum())
-
-
-def by_chance(cells: int) -> int:
-    """Number of cells that a test at 95 % calls significant by chance alone; in 95 % of all cases not more."""
-    return int(binom.ppf(_TAIL, cells, 1 - CONFIDENCE)) if cells else 0
 
 
 def mean(values: Array) -> Array:

@@ -38,16 +38,11 @@ def reduced(result: warpchain.SweepResult) -> Iterator[dict[str, object]]:
             tap = {**{key: given[key] for key in UNITS if given.get(key)}, **at}
             text = ", ".join(f"{key} {value:g} {UNITS[key]}" for key, value in tap.items())
             for links in (None, *block.axes["links"].tolist()):
-                rows = slice(None) if links is None else slice(*_place(block.axes["links"].tolist(), links))
+                rows = slice(None) if links is None else block.axes["links"] == links
                 yield {"tap": text.replace("_", " "), "links": links or "all", **_of_cells(columns, fixed, rows)}
 
 
-def _place(values: Sequence[float], value: float) -> tuple[int, int]:
-    at = values.index(value)
-    return at, at + 1
-
-
-def _of_cells(columns: Mapping[str, Any], fixed: Any, rows: slice) -> dict[str, object]:
+def _of_cells(columns: Mapping[str, Any], fixed: Any, rows: Any) -> dict[str, object]:
     """Numbers of one tap over some cells, (links, frequency, samples)."""
     rest = columns["status"][rows] == warpchain.Status.AT_REST
     dx, drift = (np.where(rest, columns[name][rows].astype(float), np.nan) for name in ("dx", "lateral_drift"))
@@ -65,6 +60,7 @@ def _of_cells(columns: Mapping[str, Any], fixed: Any, rows: slice) -> dict[str, 
         "least": f"{ratio.min():.2f}",
         "greatest": f"{ratio.max():.2f}",
         "drift": f"{np.sqrt(np.nanmean(drift**2)):.3f}",
+        "yaw": f"{np.degrees(np.sqrt(np.nanmean(columns['final_yaw'][rows].astype(float) ** 2))):.2g}",
         "tilt_at_most": f"{np.degrees(np.nanmedian(columns['greatest_tilt'][rows].astype(float))):.0f}",
     }
     for bound in STRAIGHT:
