@@ -1,7 +1,8 @@
 """What all studies share: their commands, how their figures look, and how their tables get into their pages."""
 
+import csv
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -56,6 +57,20 @@ def write_text(path: Path, text: str) -> None:
     """Write a file; its folder is made."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text, encoding="utf-8")
+
+
+def read_rows(path: Path) -> list[dict[str, str]]:
+    """The rows of a file of comma-separated values, as texts by column."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def write_rows(path: Path, rows: Sequence[Mapping[str, object]]) -> None:
+    """Write them; numbers that are not whole have six digits."""
+    lines = [[f"{value:.6g}" if isinstance(value, float) else value for value in row.values()] for row in rows]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows([list(rows[0]), *lines])
 
 
 def with_tables(text: str, tables: Mapping[str, str]) -> str:

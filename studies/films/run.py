@@ -154,9 +154,7 @@ def main(banks: Path) -> None:
     }
     write_tables(FOLDER / "README.md", tables)
     save_figure(
-        coverage_figure({name: found["same", name] for name in SETS}),
-        FOLDER / "figures" / "coverage.png",
-        dpi=130,
+        coverage_figure({name: found["same", name] for name in SETS}), FOLDER / "figures" / "coverage.png", dpi=130
     )
     hidden = [
         films.read(

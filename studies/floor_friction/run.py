@@ -25,8 +25,7 @@ FIGURE: Final = Path(__file__).parent / "figures" / "distances.png"
 
 def furthest(block: Block) -> Array:
     """The friction with which mean Δx is greatest, (links, frequencies)."""
-    found: Array = block.axes["floor_friction"][np.argmax(block.statistics().mean, axis=-1)]
-    return found
+    return block.axes["floor_friction"][np.argmax(block.statistics().mean, axis=-1)]
 
 
 def ledger(block: Block, links: int, frequency: float) -> str:

@@ -3,8 +3,6 @@
 python -m studies.paper.figure5     # a minute → results/figure5.csv
 """
 
-import csv
-from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Final
@@ -12,7 +10,7 @@ from typing import Final
 import numpy as np
 
 import warpchain
-from studies.common import table, write_text
+from studies.common import read_rows, table, write_rows
 
 RESULTS: Final = Path(__file__).parent / "results" / "figure5.csv"
 CELLS: Final = tuple((links, frequency) for links in (60, 90, 120, 150, 180) for frequency in (10.0, 15.0, 20.0, 30.0))
@@ -49,12 +47,6 @@ def shape(links: int, frequency: float) -> dict[str, object]:
     }
 
 
-def rows() -> Sequence[dict[str, str]]:
-    """The rows of the committed file."""
-    with RESULTS.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
-
-
 def figure5_table() -> str:
     """The numbers of all walks, in Markdown."""
     head = (
@@ -64,20 +56,15 @@ def figure5_table() -> str:
     return table(
         head,
         (
-            (
-                f"{row['links']} × {float(row['frequency']):g} Hz",
-                *(row[name] for name in list(row)[2:]),
-            )
-            for row in rows()
+            (f"{row['links']} × {float(row['frequency']):g} Hz", *(row[name] for name in list(row)[2:]))
+            for row in read_rows(RESULTS)
         ),
     )
 
 
 def main() -> None:
     """Let all chains walk, and write the file."""
-    found = [shape(*cell) for cell in CELLS]
-    lines = [",".join(found[0]), *(",".join(map(str, row.values())) for row in found)]
-    write_text(RESULTS, "\n".join(lines) + "\n")
+    write_rows(RESULTS, [shape(*cell) for cell in CELLS])
 
 
 if __name__ == "__main__":

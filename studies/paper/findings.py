@@ -164,8 +164,7 @@ def underestimate(numbers: Numbers) -> Finding:
 
 def _by_links(numbers: Numbers, start: str) -> list[Any]:
     """What happens to loops, of each number of links of the long chains."""
-    found: list[Any] = numbers["paper_strands"]["strands"]["starts"][start][long_chains(numbers)]
-    return found
+    return numbers["paper_strands"]["strands"]["starts"][start][long_chains(numbers)]
 
 
 def self_collision(numbers: Numbers) -> Finding:

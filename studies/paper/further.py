@@ -33,13 +33,7 @@ def at_rest(block: Block, quantity: str = "dx") -> Array:
 
 def plain(effect: Effect) -> Numbers:
     """An effect as plain numbers."""
-    return {
-        "relative": effect.relative.tolist(),
-        "half_width": effect.half_width.tolist(),
-        "sign": effect.sign.tolist(),
-        "pairs": effect.pairs.tolist(),
-        "lost": effect.lost,
-    }
+    return {name: np.asarray(values).tolist() for name, values in vars(effect).items()}
 
 
 # --- when strands meet ---
@@ -94,47 +88,70 @@ def strands(block: Block) -> Numbers:
             }
             for number, start in enumerate(values)
         },
-        "explained": {start: explained(block, number) for number, start in enumerate(values)},
     }
 
 
+# --- linear or not ---
+
 DRAWN: Final = "_drawn"
 """End of the names of columns with what a sample has drawn."""
+FOLDS: Final = 10
 
 
-def explained(block: Block, start: int) -> Numbers:
-    """Share of the variance of Δx within the cells that linear and quadratic terms of all that is drawn explain.
+def nonlinear(block: Block) -> Numbers:
+    """Shares of the variance of Δx in each cell: of linear and further terms of what is drawn, and of all but chaos.
 
-    Walks are taken relative to their cells. The terms are fitted to one half of the samples and judged by the other.
+    Terms are fitted cell by cell to nine tenths of the samples and judged by the last tenth, in turn. What two walks of
+    a sample share that differ in their tolerance only, is not chaos.
     """
-    distance = at_rest(block)[:, :, start]
-    relative = distance / mean(distance)[..., np.newaxis] - 1
+    starts, tolerances = (block.axes[name].tolist() for name in ("start", "tolerance"))
+    loose, tight = tolerances.index(max(tolerances)), tolerances.index(min(tolerances))
+    distance = at_rest(block)
     names = [name for name in block.columns if name.endswith(DRAWN)]
-    drawn = np.stack([at_rest(block, name)[:, :, start] for name in names], axis=-1)
-    drawn = drawn[..., np.nanstd(drawn, axis=(0, 1, 2)) > 0]
-    middle, scale = np.nanmean(drawn, axis=2, keepdims=True), np.nanstd(drawn, axis=2, keepdims=True)
-    standard = (drawn - middle) / scale
-    phase = next((k for k, name in enumerate(names) if name == f"phase{DRAWN}"), None)
-    kept = np.isfinite(relative)
-    half = np.broadcast_to(np.arange(relative.shape[2]) % 2 == 0, relative.shape)
-    count = standard.shape[-1]
-    squares = [standard[..., i] * standard[..., j] for i in range(count) for j in range(i, count)]
-    turning = [] if phase is None else [f(2 * np.pi * drawn[..., phase]) for f in (np.sin, np.cos)]
-    linear = [standard[..., k] for k in range(count)]
-    shares: Numbers = {"walks": int(kept.sum()), "terms": {}}
-    for name, terms in (
-        ("linear", linear),
-        ("with squares", linear + squares),
-        ("with sine of phase", linear + turning),
-    ):
-        design = np.stack([np.ones(relative.shape), *terms], axis=-1)
-        scores = []
-        for fitted, judged in ((half, ~half), (~half, half)):
-            weights = np.linalg.lstsq(design[kept & fitted], relative[kept & fitted], rcond=None)[0]
-            left = relative[kept & judged] - design[kept & judged] @ weights
-            scores.append(1 - np.sum(left**2) / np.sum((relative[kept & judged]) ** 2))
-        shares["terms"][name] = float(np.mean(scores))
-    return shares
+    drawn = {name: at_rest(block, name)[..., loose, :] for name in names}
+    found: Numbers = {}
+    for number, start in enumerate(starts):
+        one, two = (distance[:, :, number, which] for which in (loose, tight))
+        shares: dict[str, Array] = {}
+        for place in np.ndindex(one.shape[:2]):
+            kept = np.isfinite(one[place]) & np.isfinite(two[place])
+            columns = {name: values[(*place, number)][kept] for name, values in drawn.items()}
+            shape = one.shape[:2]
+            known = {name: values for name, values in columns.items() if values.std() > 0}
+            linear = [(values - values.mean()) / values.std() for values in known.values()]
+            turning = [f(2 * np.pi * known[f"phase{DRAWN}"]) for f in (np.sin, np.cos)]
+            products = [one * two for k, one in enumerate(linear) for two in linear[: k + 1]]
+            for name, terms in (
+                ("linear", linear),
+                ("squares", linear + turning + [each**2 for each in linear]),
+                ("products", linear + turning + products),
+            ):
+                shares.setdefault(name, np.empty(shape))[place] = predicted(one[place][kept], terms)
+            shared = np.corrcoef(one[place][kept], two[place][kept])[0, 1]
+            shares.setdefault("repeated", np.empty(shape))[place] = shared
+        found[start] = {name: values.tolist() for name, values in shares.items()}
+    return found
+
+
+def predicted(values: Array, terms: list[Array]) -> float:
+    """Share of the variance of values (samples,) that terms predict of samples to which they were not fitted."""
+    design, left = np.stack([np.ones(len(values)), *terms], axis=-1), np.empty(len(values))
+    for fold in range(FOLDS):
+        out = np.arange(len(values)) % FOLDS == fold
+        left[out] = values[out] - design[out] @ np.linalg.lstsq(design[~out], values[~out], rcond=None)[0]
+    return float(1 - np.sum(left**2) / np.sum((values - values.mean()) ** 2))
+
+
+def loops(block: Block) -> Numbers:
+    """Height of the sprocket over the floor [µm] and kinetic energy [µJ] at the release, means over the phases."""
+    further = [name for name in ("start", "further_hold") if name in block.dims]
+    order = [block.dims.index(name) for name in (*CELLS, *further)]
+    others = [number for number in range(len(block.dims)) if number not in order]
+    found: Numbers = {name: block.axes[name].tolist() for name in further}
+    for name, column in (("height", "sprocket_height"), ("energy", "energy_kinetic_at_release")):
+        values = np.transpose(block.columns[column], order + others)
+        found[name] = np.rint(1e6 * values.mean(axis=tuple(range(len(order), values.ndim)))).astype(int).tolist()
+    return found
 
 
 # --- links that pass through one another ---
@@ -193,6 +210,10 @@ def rest_and_hold(block: Block) -> Numbers:
     rest, spinning = starts.index("rest"), starts.index("spinning")
     least, most = int(np.argmin(holds)), int(np.argmax(holds))
     pairs = {
+        f"rest, at once, over spinning, {holds[most]:g} s later": (
+            table[:, :, rest, least],
+            table[:, :, spinning, most],
+        ),
         "rest over spinning, released at once": (table[:, :, rest, least], table[:, :, spinning, least]),
         f"rest over spinning, both {holds[most]:g} s later": (table[:, :, rest, most], table[:, :, spinning, most]),
         f"{holds[most]:g} s later over at once, rest": (table[:, :, rest, most], table[:, :, rest, least]),

@@ -8,7 +8,7 @@ import numpy as np
 from studies.common import table
 from studies.paper.findings import percent
 from studies.paper.reduction import effect_of
-from studies.paper.statistics import Effect, summary
+from studies.paper.statistics import summary
 
 Numbers = Mapping[str, Any]
 
@@ -101,7 +101,9 @@ def rest_table(numbers: Numbers) -> str:
                 f"{found['chi2']:.1f}, {found['p']:.2g}",
             ]
         )
-    return table(["Δx", "all cells", "120 links", "150 and 180 links", "pairs, cells", "χ² of no difference, p"], rows)
+    return table(
+        ["Δx", "all cells", "60 and 120 links", "150 and 180 links", "pairs, cells", "χ² of no difference, p"], rows
+    )
 
 
 def lengths_table(numbers: Numbers) -> str:
@@ -127,6 +129,53 @@ def lengths_table(numbers: Numbers) -> str:
             cells.append("—" if fixed is None else percent(fixed.mean, fixed.half_width))
         rows.append(cells)
     return table(["ℓ", "Δx, bars of that length", "ℓ alone", "bounces until the collapse, bars", "ℓ alone"], rows)
+
+
+def nonlinear_table(numbers: Numbers) -> str:
+    """What explains the variance of Δx in a cell, by start."""
+    content, rows = numbers["paper_footnote"], []
+    for start, found in content["nonlinear"].items():
+        for i, links in enumerate(content["cells"]["links"]):
+            for j, frequency in enumerate(content["cells"]["frequency"]):
+                shares = (max(0.0, found[name][i][j]) for name in ("linear", "squares", "products", "repeated"))
+                rows.append([start, f"{links} × {frequency:g} Hz", *(f"{100 * share:.0f} %" for share in shares)])
+    head = ["start", "cell", "linear terms", "and squares, turning phase", "and products", "all but chaos"]
+    return table(head, rows)
+
+
+def loops_table(numbers: Numbers) -> str:
+    """How loops at their release differ from those that spun from the start and were held longest."""
+    content, held = numbers["paper_loops"], numbers["paper_held"]
+    found, links = content["loops"], np.array(content["cells"]["links"])
+    height, energy = (np.array(found[name], float) for name in ("height", "energy"))
+    least = (slice(None), slice(None), found["start"].index("spinning"), -1)
+    rows = []
+    for which, start in enumerate(found["start"]):
+        for hold, seconds in enumerate(found["further_hold"]):
+            place = (slice(None), slice(None), which, hold)
+            mm, share = 1e-3 * (height[place] - height[least]), energy[place] / energy[least] - 1
+            rows.append([f"{start}, held on for {seconds:g} s", *_loops_texts(mm, share, links)])
+    there = np.isin(links, held["cells"]["links"])
+    mm = 1e-3 * (np.array(held["loops"]["height"]) - height[least][there])
+    share = np.array(held["loops"]["energy"]) / energy[least][there] - 1
+    rows.append(["spinning, held for 30 s under its own loads", *_loops_texts(mm, share, links[there])])
+    head = ["start", "height / mm, 150 and 180 links", "energy, at most", "60 and 120 links", "energy, at most"]
+    return table(head, rows)
+
+
+def _loops_texts(mm: Any, share: Any, links: Any) -> list[str]:
+    """Mean, least and greatest difference of height, and of energy the greatest, of long loops and of short ones."""
+    texts = []
+    for chosen in (links >= 150, links < 150):
+        known, energy = mm[chosen], share[chosen]
+        if known.size:
+            texts += [
+                f"{known.mean():+.2f} ({known.min():+.2f} to {known.max():+.2f})",
+                f"{100 * np.abs(energy).max():.2f} %",
+            ]
+        else:
+            texts += ["", ""]
+    return [text.replace("-", "−") for text in texts]
 
 
 def sliding_table(numbers: Numbers) -> str:
@@ -164,10 +213,6 @@ def undamped_text(numbers: Numbers) -> str:
     found = numbers["paper_more"]["more"]["undamped"]
     effects = {value: summary(effect_of(each)) for value, each in found.items()}
     return ", ".join(f"b = {value}: {percent(each.mean, each.half_width)}" for value, each in effects.items())
-
-
-def _rows(effect: Effect, rows: slice) -> Effect:
-    return Effect(effect.relative[rows], effect.half_width[rows], effect.sign[rows], effect.pairs[rows], effect.lost)
 
 
 def _text(value: object) -> str:

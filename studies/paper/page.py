@@ -46,6 +46,8 @@ def page(numbers: Numbers) -> str:
         "through": tables.through_table(numbers),
         "open": tables.open_table(numbers),
         "rest": tables.rest_table(numbers),
+        "loops": tables.loops_table(numbers),
+        "nonlinear": tables.nonlinear_table(numbers),
         "lengths": tables.lengths_table(numbers),
         "sliding": tables.sliding_table(numbers),
         "distributions": tables.distributions_table(numbers),
@@ -220,12 +222,7 @@ def walks_text(numbers: Numbers) -> str:
     failed = ", ".join(f"{count} {name}" for name, count in total.items() if name != "at_rest" and count)
     inaccurate = sum(content["inaccurate"] for content in numbers.values())
     rest = f"{total.total():,} walks: {total['at_rest']:,} at rest" + (f", {failed}" if failed else "")
-    missing = "".join(
-        f"; {content['walks']['missing']:,} more of `{name}` were not run"
-        for name, content in numbers.items()
-        if content["walks"].get("missing")
-    )
-    return f"{rest}; {inaccurate} with an energy error above 5 %{missing}"
+    return f"{rest}; {inaccurate} with an energy error above 5 %"
 
 
 def _symbol(name: str) -> str:

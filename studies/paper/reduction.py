@@ -17,7 +17,9 @@ from studies.paper.further import (
     at_rest,
     distributions,
     left_open,
+    loops,
     more,
+    nonlinear,
     plain,
     rest_and_hold,
     strands,
@@ -40,14 +42,15 @@ WHOLE: Final[dict[str, tuple[str, Callable[[Mapping[str, Block]], Any]]]] = {
     "paper_through_ellipse": ("through", lambda blocks: through(blocks["main"])),
     "paper_open": ("left_open", left_open),
     "paper_rest": ("rest_and_hold", lambda blocks: rest_and_hold(blocks["main"])),
+    "paper_loops": ("loops", lambda blocks: loops(blocks["main"])),
+    "paper_held": ("loops", lambda blocks: loops(blocks["main"])),
+    "paper_footnote": ("nonlinear", lambda blocks: nonlinear(blocks["main"])),
     "paper_more": ("more", more),
     "paper_distributions": ("distributions", lambda blocks: distributions(blocks["main"])),
 }
 """Sweeps that one function reduces: name → key of its numbers, and the function."""
 SWEEPS: Final = ("paper_claims", "paper_joints", "paper_tolerance", "paper_shapes", *WHOLE)
 """Sweeps that the page is made of."""
-CUT_SHORT: Final = ("paper_rest",)
-"""Sweeps that need not be complete: pairs of walks are compared, and counted."""
 
 DEFAULTS: Final = {"clearance": 0.01, "phase": 0.0}
 """Scene of a walk that is not told otherwise: height of the release [m] and part of a loop period."""
@@ -61,7 +64,7 @@ def reduced(result: SweepResult) -> Numbers:
     """
     if result.name not in SWEEPS:
         raise InputError(f"{result.name}: no sweep of this page; give folders of {', '.join(SWEEPS)}")
-    if result.missing_count and result.name not in CUT_SHORT:
+    if result.missing_count:
         raise InputError(f"{result.name}: {result.missing_count} walks are missing; run the sweep to its end")
     content: Numbers = {
         "sweep": content_digest(result.sweep),
@@ -81,10 +84,7 @@ def reduced(result: SweepResult) -> Numbers:
     if result.name in WHOLE:
         key, reduce = WHOLE[result.name]
         content[key] = reduce(result.blocks)
-    for key, name, reduce in (
-        ("starts", "start", starts),
-        ("friction", "floor_friction", friction),
-    ):
+    for key, name, reduce in (("starts", "start", starts), ("friction", "floor_friction", friction)):
         if name in result.blocks and result.name == "paper_claims":
             content[key] = reduce(result.blocks[name])
     if "link_length" in result.blocks:
@@ -103,8 +103,7 @@ def reduced(result: SweepResult) -> Numbers:
         content["tolerance"] = tolerance(result.blocks["main"])
     if result.name == "paper_shapes":
         content["impacts"] = first_impacts(result.blocks["main"])
-    rounded_content: Numbers = rounded(content)
-    return rounded_content
+    return rounded(content)
 
 
 def content_digest(sweep: Mapping[str, Any]) -> str:

@@ -6,7 +6,6 @@ Walks from the sprocket, frames 0.5 ms apart; touches before the collapse, of jo
 growth of an older one: no joint within 4 links of either has touched one within 4 of the other in a frame before.
 """
 
-import csv
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
@@ -15,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import warpchain
-from studies.common import table, write_text
+from studies.common import read_rows, table, write_text
 
 RESULTS: Final = Path(__file__).parent / "results" / "separations.csv"
 LINKS: Final = (60, 90, 120, 150, 180)
@@ -76,8 +75,7 @@ def main() -> None:
 
 def separations_tables() -> str:
     """New touches by links apart and height; and when links at least m apart first touch."""
-    with RESULTS.open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = read_rows(RESULTS)
     links, apart, height, time = (
         np.array([float(row[name]) for row in rows]) for name in ("links", "apart", "height", "time")
     )

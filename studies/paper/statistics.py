@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import binom, t
+from scipy.stats import t
 
 Array = NDArray[np.float64]
 
@@ -145,11 +145,6 @@ def within(effect: Effect, bound: float) -> int:
     return int((np.abs(effect.relative[known]) + effect.half_width[known] <= bound).sum())
 
 
-def by_chance(cells: int) -> int:
-    """Number of cells that a test at 95 % calls significant by chance alone; in 95 % of all cases not more."""
-    return int(binom.ppf(_TAIL, cells, 1 - CONFIDENCE)) if cells else 0
-
-
 def mean(values: Array) -> Array:
     """Mean over the samples of each cell, shape (...,); NaN without a walk."""
     there = np.isfinite(values)
@@ -179,8 +174,7 @@ def _standard_error(values: Array, there: NDArray[np.bool_]) -> Array:
 
 def _factor(freedom: Any) -> Array:
     """Half-width of a 95 % interval over the standard error; NaN without a degree of freedom."""
-    factor: Array = t.ppf(_TAIL, np.where(np.asarray(freedom) > 0, freedom, np.nan))
-    return factor
+    return t.ppf(_TAIL, np.where(np.asarray(freedom) > 0, freedom, np.nan))
 
 
 def _sign(difference: Array, half_width: Array) -> NDArray[np.int64]:

@@ -48,8 +48,7 @@ def sum_of_powers(power: float | None) -> Callable[[Points], tuple[Array, Predic
     def distance(numbers: Array, speed: Array, length: Array) -> Array:
         exponent = numbers[2] if power is None else power
         turns = speed * TIME / length
-        value: Array = np.log(length * (np.exp(numbers[0]) * turns + np.exp(numbers[1]) * turns**exponent))
-        return value
+        return np.log(length * (np.exp(numbers[0]) * turns + np.exp(numbers[1]) * turns**exponent))
 
     def fit(points: Points) -> tuple[Array, Prediction]:
         def left(numbers: Array) -> Array:
@@ -78,6 +77,12 @@ def spline(variable: float | None, power: float | None) -> Callable[[Points], tu
     return fit
 
 
+def hanging_loop(points: Points) -> tuple[Array, Prediction]:
+    """Fits the spline of Δx/H over v²/(g H), H the height of the hanging loop; no further numbers."""
+    curve = laws.master_curve(points.speed**2 / points.hanging, points.distance / points.hanging)
+    return np.array([]), lambda others: curve(others.speed**2 / others.hanging) + np.log(others.hanging)
+
+
 def power_law(points: Points) -> tuple[Array, Prediction]:
     """Fits Δx ∝ ν^p n^q; its numbers are p and q."""
     p, q = laws.power_law(points)
@@ -94,7 +99,13 @@ CANDIDATES: Final = (
     Candidate("spline, c fitted", laws.NUMBERS + 1, spline(None, 1.0)),
     Candidate("spline, c and d fitted", laws.NUMBERS + 2, spline(None, None)),
     Candidate("Δx ∝ ν^p n^q", 3, power_law),
+    Candidate("spline of Δx/(nℓ) over v²/(g nℓ)", laws.NUMBERS, spline(-0.5, 1.0)),
+    Candidate("spline of Δx/(nℓ) over ν²ℓ/g", laws.NUMBERS, spline(0.0, 1.0)),
+    Candidate("spline of Δx/H over v²/(g H)", laws.NUMBERS, hanging_loop),
+    Candidate("spline of Δx/ℓ over v²/(g nℓ)", laws.NUMBERS, spline(-0.5, 0.0)),
+    Candidate("spline of Δx/ℓ over ν²ℓ/g", laws.NUMBERS, spline(0.0, 0.0)),
 )
+"""With a fixed drop h, its Froude number v²/(g h) is ν²ℓ/g but for a constant, and so is v²/(g R)."""
 
 
 def root_mean_square(left: Array) -> float:
@@ -145,14 +156,15 @@ def table(cells: Mapping[str, Array], varied: scales.Cells) -> str:
             row.append(f"{own:.1f} / {others[0]:.1f} / {others[1]:.1f}")
         rows.append(row)
     heads = (f"{name} ({len(points.links)} cells)" for name, points in known.items())
-    lines = [markdown(("law of Δx", "numbers", *heads), rows), "", *errors(known), "", beyond(known["all"], varied)]
-    return "\n".join(lines)
+    curves = "\n".join(f"- {name}: {laws.slopes(points)} {laws.drift(points)}" for name, points in known.items())
+    lines = [markdown(("law of Δx", "numbers", *heads), rows), curves, *errors(known), beyond(known["all"], varied)]
+    return "\n\n".join(lines)
 
 
 def errors(known: Mapping[str, Points]) -> list[str]:
-    """Markdown: numbers of three laws with errors from blocks of links and of frequencies."""
+    """Markdown: numbers of laws with errors from blocks of links and of frequencies."""
     rows = []
-    for candidate in (CANDIDATES[0], CANDIDATES[1], CANDIDATES[3], CANDIDATES[4]):
+    for candidate in (CANDIDATES[0], CANDIDATES[1], *CANDIDATES[3:6]):
         for name, points in known.items():
             numbers = candidate.fit(points)[0]
             of_blocks = [block_errors(points, candidate, block) for block in BLOCKS]
@@ -164,7 +176,7 @@ def errors(known: Mapping[str, Points]) -> list[str]:
             if candidate is CANDIDATES[3]:
                 texts[1] = "1"
             rows.append((candidate.name, name, ", ".join(texts)))
-    return [markdown(("law of Δx", "cells", "a, b, p or c, d ± over links ± over frequencies"), rows)]
+    return [markdown(("law of Δx", "cells", "a, b, p or c, d or p, q ± over links ± over frequencies"), rows)]
 
 
 def beyond(points: Points, varied: scales.Cells) -> str:

@@ -1,6 +1,5 @@
 """Reduces parts of the sweep ``phase_diagram`` to statistics of its cells: the rows of results/cells.csv."""
 
-import csv
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -9,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.common import write_text
+from studies.common import read_rows
 from studies.phase_diagram.endings import Ending, endings
 from warpchain import InputError, Status, SweepResult
 
@@ -34,8 +33,8 @@ COLUMNS: Final = (
 """Columns of the sweep that are needed."""
 
 
-def walks_by_cell(parts: Sequence[SweepResult]) -> dict[Cell, dict[str, Array]]:
-    """The walks of all parts of a sweep by cell: `COLUMNS`, shape (walks,), missing walks included.
+def walks_by_cell(parts: Sequence[SweepResult], names: Sequence[str] = COLUMNS) -> dict[Cell, dict[str, Array]]:
+    """The walks of all parts of a sweep by cell: columns of these names, shape (walks,), missing walks included.
 
     Raises:
         InputError: a part has other axes than links and frequency, other settings than the first, or its seed.
@@ -50,7 +49,7 @@ def walks_by_cell(parts: Sequence[SweepResult]) -> dict[Cell, dict[str, Array]]:
             raise InputError(f"{part.name}: walks of another part, the seed is the same; leave one out")
         for block in part.blocks.values():
             order = [list(block.axes).index(axis) for axis in ("links", "frequency")] + [2]
-            columns = {name: block.columns[name].transpose(order) for name in COLUMNS}
+            columns = {name: block.columns[name].transpose(order) for name in names}
             for i, links in enumerate(block.axes["links"]):
                 for j, frequency in enumerate(block.axes["frequency"]):
                     walks = {name: column[i, j] for name, column in columns.items()}
@@ -117,22 +116,6 @@ def _sd(values: Array) -> float:
     """Standard deviation of what is not NaN; NaN of fewer than two."""
     known = values[np.isfinite(values)]
     return float(known.std(ddof=1)) if len(known) > 1 else float("nan")
-
-
-def write_csv(rows: Sequence[Mapping[str, float | str]], path: Path) -> None:
-    """Write the rows; numbers that are not whole have six digits."""
-    names = list(rows[0])
-    lines = [",".join(names)]
-    for row in rows:
-        values = (row[name] for name in names)
-        lines.append(",".join(f"{value:.6g}" if isinstance(value, float) else str(value) for value in values))
-    write_text(path, "\n".join(lines) + "\n")
-
-
-def read_rows(path: Path) -> list[dict[str, str]]:
-    """The rows of a file, as texts by column."""
-    with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def read_csv(path: Path = CSV) -> dict[str, Array]:

@@ -126,12 +126,7 @@ def draw_endings(axes: Axes, grid: Grid, cells: Mapping[str, Array]) -> None:
     grid.map(axes, np.full(len(total), np.nan), "how the loop was lost; paler: a smaller share", vmin=0)
     image = np.ma.masked_invalid(np.stack([grid.table(channel) for channel in colors.T], axis=2))
     opaque = (~np.isnan(image.filled(np.nan)).any(axis=2)).astype(float)
-    axes.imshow(
-        np.dstack([image.filled(0.0), opaque]),
-        origin="lower",
-        aspect="auto",
-        interpolation="nearest",
-    )
+    axes.imshow(np.dstack([image.filled(0.0), opaque]), origin="lower", aspect="auto", interpolation="nearest")
     seen = [way for number, way in enumerate(ways) if np.any((most == number) & (total > 0))]
     handles = [Patch(color=COLORS[way], label=way.meaning) for way in seen]
     if handles:
@@ -144,15 +139,16 @@ def draw_laws(cells: Mapping[str, Array], path: Path) -> None:
     if len(points.links) < laws.FEWEST:
         print(f"{path.name}: not drawn, {len(points.links)} cells are too few")
         return
-    shown = [law for law in laws.CANDIDATES if law.y(points)[0] == (points.distance / points.length)[0]]
     figure = Figure(figsize=(11, 8.2), layout="constrained")
-    grid: list[Axes] = list(figure.subplots(2, 2).flat)
-    for axes, law in zip(grid, shown, strict=False):
-        x, y = law.x(points), law.y(points)
+    grid, y = list(figure.subplots(2, 2).flat), points.distance / points.length
+    variables = {
+        "ν²ℓ/g": points.frequency**2 * laws.LINK_LENGTH / laws.GRAVITY,
+        "v²/(g nℓ)": points.speed**2 / (laws.GRAVITY * points.length),
+        "v/(nℓ), turns of the loop / s⁻¹": points.speed / points.length,
+    }
+    for axes, (name, x) in zip(grid, variables.items(), strict=False):
         image = draw_law(axes, points.links, x, y, laws.master_curve(x, y))
-        y_name, x_name = law.name.split(" over ")
-        axes.set_xlabel(x_name.replace("turns of the loop per second", "turns of the loop / s⁻¹"))
-        axes.set_ylabel(y_name)
+        axes.set(xlabel=name, ylabel="Δx/(nℓ)")
         axes.set_title(f"residual {laws.rms_residual(x, y):.1f} %", loc="left", color=INK, fontsize="medium")
     figure.colorbar(image, ax=grid[:2], label="links", pad=0.02)
     left = 100 * np.expm1(laws.residuals(x, y))

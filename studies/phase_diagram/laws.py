@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.optimize import minimize, minimize_scalar
 
-from studies.common import table as markdown
 from warpchain import preset
 
 Array = NDArray[Any]
@@ -37,8 +36,6 @@ FAST: Final = 12.0
 """Frequency [Hz] from which most chains survive their second bounce."""
 PLACES: Final = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 """Turns of the loop per second at which a curve is described."""
-ROUNDS: Final = 100
-"""Samples of the bootstrap over cells."""
 
 
 def in_papers_range(links: Array, frequency: Array) -> Array:
@@ -76,40 +73,6 @@ def points_of(cells: Mapping[str, Array]) -> Points:
     used = (cells["at_rest"] > 0) & (failed <= MOST_FAILED * cells["walks"]) & (cells["dx_mean"] > 0)
     frequency = cells["frequency"][used]
     return Points(cells["links"][used], frequency, 2 * np.pi * RADIUS * frequency, cells["dx_mean"][used])
-
-
-@dataclass(frozen=True)
-class Law:
-    """A candidate: y of the cells over x of the cells is one curve.
-
-    Attributes:
-        name: in a table.
-        x: variable of the master curve.
-        y: what is divided by it.
-    """
-
-    name: str
-    x: Callable[[Points], Array]
-    y: Callable[[Points], Array]
-
-
-CANDIDATES: Final = (
-    Law("Δx/(nℓ) over ν²ℓ/g", lambda p: p.frequency**2 * LINK_LENGTH / GRAVITY, lambda p: p.distance / p.length),
-    Law("Δx/(nℓ) over v²/(g nℓ)", lambda p: p.speed**2 / (GRAVITY * p.length), lambda p: p.distance / p.length),
-    Law(
-        "Δx/(nℓ) over v/(nℓ), turns of the loop per second",
-        lambda p: p.speed / p.length,
-        lambda p: p.distance / p.length,
-    ),
-    Law(
-        "Δx/H over v²/(g H), H height of the loop",
-        lambda p: p.speed**2 / (GRAVITY * p.hanging),
-        lambda p: p.distance / p.hanging,
-    ),
-    Law("Δx/ℓ over v²/(g nℓ)", lambda p: p.speed**2 / (GRAVITY * p.length), lambda p: p.distance / LINK_LENGTH),
-    Law("Δx/ℓ over ν²ℓ/g", lambda p: p.frequency**2 * LINK_LENGTH / GRAVITY, lambda p: p.distance / LINK_LENGTH),
-)
-"""With a fixed drop, the Froude number of the drop v²/(g h) is ν²ℓ/g but for a constant, and so is v²/(g R)."""
 
 
 def master_curve(x: Array, y: Array) -> Callable[[Array], Array]:
@@ -170,25 +133,10 @@ def best_powers(points: Points, start: tuple[float, float] | None = None) -> tup
     return float(found.x[0]), float(found.x[1])
 
 
-def bootstrap(points: Points, fit: Callable[[Points], Any], seed: int = 1) -> Array:
-    """Standard errors of what a fit returns, from samples of the cells with replacement."""
-    rng = np.random.default_rng(seed)
-    count = len(points.links)
-    found = [np.atleast_1d(fit(points[rng.integers(0, count, count)])) for _ in range(ROUNDS)]
-    return np.std(found, axis=0, ddof=1)
-
-
 def power_law(points: Points) -> tuple[float, float]:
     """Exponents (p, q) of Δx ∝ ν^p n^q."""
     _, p, q = np.linalg.lstsq(_logarithms(points), np.log(points.distance), rcond=None)[0]
     return float(p), float(q)
-
-
-def power_law_residuals(points: Points) -> Array:
-    """ln Δx less the power law, shape (cells,)."""
-    design, values = _logarithms(points), np.log(points.distance)
-    left: Array = values - design @ np.linalg.lstsq(design, values, rcond=None)[0]
-    return left
 
 
 def _logarithms(points: Points) -> Array:
@@ -198,38 +146,6 @@ def _logarithms(points: Points) -> Array:
 def root_mean_square(left: Array, numbers: int) -> float:
     """Root mean square in per cent of residuals that a fit of so many numbers leaves."""
     return float(100 * np.sqrt(np.sum(left**2) / max(len(left) - numbers, 1)))
-
-
-def worst(points: Points, left: Array, count: int = 3) -> str:
-    """The cells with the greatest residuals, in words."""
-    order = np.argsort(-np.abs(left))[:count]
-    return ", ".join(
-        f"{points.links[i]:g} × {points.frequency[i]:g} Hz {100 * np.expm1(left[i]):+.0f} %" for i in order
-    )
-
-
-def table(cells: Mapping[str, Array]) -> str:
-    """Markdown: for all cells, fast ones and the paper's range, the residual of each law and where it fails."""
-    points = points_of(cells)
-    papers = points[in_papers_range(points.links, points.frequency)]
-    fast = points[points.frequency >= FAST]
-    parts = (
-        (f"all {len(points.links)} cells", points),
-        (f"{len(fast.links)} cells from {FAST:g} Hz on", fast),
-        (f"{len(papers.links)} cells of the paper's range", papers),
-    )
-    lines = []
-    for title, chosen in parts:
-        if len(chosen.links) < FEWEST:
-            lines.append(f"{title}: too few for a curve of {NUMBERS} numbers.\n")
-            continue
-        rows = (
-            (name, f"{root_mean_square(left, numbers):.1f} %", worst(chosen, left))
-            for name, left, numbers in laws_of(chosen)
-        )
-        lines += [markdown((f"law, {title}", "residual", "farthest cells"), rows)]
-        lines += ["", f"{slopes(chosen)} {drift(chosen)}".rstrip(), ""]
-    return "\n".join(lines).rstrip()
 
 
 def slopes(points: Points) -> str:
@@ -256,20 +172,3 @@ def drift(points: Points) -> str:
         return ""
     (low, high), (until, since) = (best_variable(points[part]) for part in (slow, fast)), frequencies[[half - 1, -half]]
     return f"With d = 1 given, c is {low:.2f} up to {until:g} Hz and {high:.2f} from {since:g} Hz on."
-
-
-def laws_of(points: Points) -> list[tuple[str, Array, int]]:
-    """Each law with its exponents and their standard errors, its residuals, and the numbers that it has fitted."""
-    laws = [(law.name, residuals(law.x(points), law.y(points)), NUMBERS) for law in CANDIDATES]
-    (p, q), (p_error, q_error) = power_law(points), bootstrap(points, power_law)
-    name = f"Δx ∝ ν^p n^q, p = {p:.2f} ± {p_error:.2f}, q = {q:.2f} ± {q_error:.2f}"
-    laws.append((name, power_law_residuals(points), 3))
-    c, (error,) = best_variable(points), bootstrap(points, best_variable)
-    left = residuals(points.frequency * points.links**c, points.distance / points.length)
-    laws.append((f"Δx/(nℓ) over ν n^c, d = 1 given, c = {c:.3f} ± {error:.3f}", left, NUMBERS + 1))
-    c, d = both = best_powers(points)
-    c_error, d_error = bootstrap(points, lambda sample: best_powers(sample, both))
-    left = residuals(points.frequency * points.links**c, points.distance / points.links**d)
-    name = f"Δx/n^d over ν n^c, c = {c:.2f} ± {c_error:.2f}, d = {d:.2f} ± {d_error:.2f}"
-    laws.append((name, left, NUMBERS + 2))
-    return laws

@@ -38,6 +38,8 @@ NORMAL_TIME: Final = (laws.RADIUS / laws.GRAVITY) ** 0.5
 """(R/g)^½ there [s]."""
 PLACES: Final = (0.1, 0.3, 1.0, 3.0)
 """Turns in this time at which the curve is described."""
+ROUNDS: Final = 100
+"""Samples of the bootstrap over cells."""
 BLOCKS: Final = {
     "sprocket_radius": ("radius of the sprocket", "#0072B2"),
     "gravity": ("gravity", "#D55E00"),
@@ -129,13 +131,11 @@ class Curve:
 
     def __call__(self, turns: Array) -> Array:
         """Δx/(nℓ) on the curve; beyond its ends it keeps the value there."""
-        lengths: Array = np.exp(self._curve(turns))
-        return lengths
+        return np.exp(self._curve(turns))
 
     def left(self, cells: Cells, exponents: Sequence[float] | Array) -> Array:
         """Residuals of cells, shape (cells,)."""
-        left: Array = np.log(cells.lengths) - self._curve(cells.scaled_turns(exponents))
-        return left
+        return np.log(cells.lengths) - self._curve(cells.scaled_turns(exponents))
 
     def best_exponents(self, cells: Cells, chosen: Array) -> Array:
         """Exponents with the least residuals of some cells; nothing of the curve is fitted to them."""
@@ -157,7 +157,7 @@ def table(cells: Cells, curve: Curve) -> str:
     count = len(cells.names)
     a, b, c = curve.best_exponents(cells, groups["all"])
     rng = np.random.default_rng(1)
-    samples = [curve.best_exponents(cells, rng.integers(0, count, count)) for _ in range(laws.ROUNDS)]
+    samples = [curve.best_exponents(cells, rng.integers(0, count, count)) for _ in range(ROUNDS)]
     errors = np.std(samples, axis=0, ddof=1)
     shares = [f"{value:.2f} ± {error:.2f}" for value, error in zip((a, b, c), errors, strict=True)]
     residual = laws.root_mean_square(curve.left(cells, (a, b, c)), 3)

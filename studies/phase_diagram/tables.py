@@ -117,6 +117,5 @@ TABLES: Final[Mapping[str, Callable[[Mapping[str, Array]], str]]] = {
     "cells": table_of_cells,
     "failures": table_of_failures,
     "endings": table_of_endings,
-    "scaling": laws.table,
 }
 """Tables of the page by the names of their markers."""

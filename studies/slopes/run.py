@@ -26,8 +26,7 @@ LIMIT: Final = 20.0
 
 def share_without_end(block: Block) -> Array:
     """Share of the walks that ended by their distance, in each cell."""
-    share: Array = (block.columns["status"] == warpchain.Status.DISTANCE_LIMIT).mean(axis=-1)
-    return share
+    return (block.columns["status"] == warpchain.Status.DISTANCE_LIMIT).mean(axis=-1)
 
 
 def speed_without_end(block: Block) -> Array:

@@ -66,5 +66,4 @@ def periodic_slope(values: Array, period: float) -> Array:
     if len(values) % 2 == 0:
         waves[-1] = 0.0
     spectrum = np.fft.rfft(values, axis=0) * waves.reshape(-1, *[1] * (values.ndim - 1))
-    slope: Array = np.fft.irfft(spectrum, len(values), axis=0)
-    return slope
+    return np.fft.irfft(spectrum, len(values), axis=0)

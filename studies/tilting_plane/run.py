@@ -1,46 +1,35 @@
-"""Writes the table and draws the figure of studies/tilting_plane/README.md, from the folder of the sweep.
+"""Writes the table of tilts and draws the figure of studies/tilting_plane/README.md, from the folder of the sweep.
 
-    warpchain sweep tilt -o tilt --device cuda
-    python -m studies.tilting_plane.run tilt
-
-The table is also printed.
+warpchain sweep tilt -o tilt --device cuda
+python -m studies.tilting_plane.run tilt      # → results/tilt.csv
 """
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 import warpchain
 from studies import common
+from studies.tilting_plane import taps
 
 FOLDER: Final = Path(__file__).parent
 
 
-def table(result: warpchain.SweepResult) -> str:
+def table(rows: Sequence[Mapping[str, object]]) -> str:
     """What a tilt at the release does, in Markdown: means over the cells, ± standard error; r.m.s. drift and yaw."""
-    fixed, tilted = (result.blocks[name] for name in ("fixed", "tilted"))
-    columns, reference = tilted.columns, fixed.statistics()
-    cells = tilted.statistics()
     head = ("tilt / rad", "fell over", "before the loop collapsed", "Δx, tilting over fixed", "least and greatest cell")
-    rows = []
-    for size, tilt in enumerate(tilted.axes["tilt"]):
-        ratio = cells.mean[:, :, size] / reference.mean
-        errors = np.hypot(
-            cells.standard_error[:, :, size] / cells.mean[:, :, size], reference.standard_error / reference.mean
-        )
-        error = np.sqrt(np.sum((ratio * errors) ** 2)) / ratio.size
-        fell, early = (columns[name][:, :, size].mean() for name in ("fell_over", "fell_before_collapse"))
-        drift, yaw = (
-            np.sqrt(np.nanmean(columns[name][:, :, size].astype(float) ** 2)) for name in ("lateral_drift", "final_yaw")
-        )
-        rows.append(
+    return common.table(
+        (*head, "drift / m", "yaw / °"),
+        (
             (
-                *(f"{tilt:g}", f"{100 * fell:.3g} %", f"{100 * early:.2g} %", f"{ratio.mean():.3f} ± {error:.3f}"),
-                *(f"{ratio.min():.2f}, {ratio.max():.2f}", f"{drift:.3f}", f"{np.degrees(yaw):.2g}"),
+                *(str(row["tap"]).split()[1], f"{row['fell']} %", f"{row['early']} %"),
+                *(f"{row['ratio']} ± {row['error']}", f"{row['least']}, {row['greatest']}", str(row["drift"])),
+                str(row["yaw"]),
             )
-        )
-    return common.table((*head, "drift / m", "yaw / °"), rows)
+            for row in rows
+            if row["links"] == "all"
+        ),
+    )
 
 
 def main(folder: str) -> None:
@@ -48,7 +37,9 @@ def main(folder: str) -> None:
     result = warpchain.load(folder)
     if not {"fixed", "tilted"} <= result.blocks.keys():
         raise warpchain.InputError(f"{folder}: no blocks fixed and tilted; give a folder of the sweep tilt")
-    common.write_tables(FOLDER / "README.md", {"tilt": table(result)})
+    rows = list(taps.reduced(result))
+    common.write_rows(FOLDER / "results" / "tilt.csv", rows)
+    common.write_tables(FOLDER / "README.md", {"tilt": table(rows)})
     common.save_figure(result.plot(quantity="fell_over"), FOLDER / "figures" / "falls.png")
 
 

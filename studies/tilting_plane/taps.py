@@ -5,7 +5,6 @@ python -m studies.tilting_plane.taps taps     # → results/taps.csv, tables of 
 python -m studies.tilting_plane.taps          # that file → tables of the page
 """
 
-import csv
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -39,16 +38,11 @@ def reduced(result: warpchain.SweepResult) -> Iterator[dict[str, object]]:
             tap = {**{key: given[key] for key in UNITS if given.get(key)}, **at}
             text = ", ".join(f"{key} {value:g} {UNITS[key]}" for key, value in tap.items())
             for links in (None, *block.axes["links"].tolist()):
-                rows = slice(None) if links is None else slice(*_place(block.axes["links"].tolist(), links))
+                rows = slice(None) if links is None else block.axes["links"] == links
                 yield {"tap": text.replace("_", " "), "links": links or "all", **_of_cells(columns, fixed, rows)}
 
 
-def _place(values: Sequence[float], value: float) -> tuple[int, int]:
-    at = values.index(value)
-    return at, at + 1
-
-
-def _of_cells(columns: Mapping[str, Any], fixed: Any, rows: slice) -> dict[str, object]:
+def _of_cells(columns: Mapping[str, Any], fixed: Any, rows: Any) -> dict[str, object]:
     """Numbers of one tap over some cells, (links, frequency, samples)."""
     rest = columns["status"][rows] == warpchain.Status.AT_REST
     dx, drift = (np.where(rest, columns[name][rows].astype(float), np.nan) for name in ("dx", "lateral_drift"))
@@ -66,6 +60,7 @@ def _of_cells(columns: Mapping[str, Any], fixed: Any, rows: slice) -> dict[str, 
         "least": f"{ratio.min():.2f}",
         "greatest": f"{ratio.max():.2f}",
         "drift": f"{np.sqrt(np.nanmean(drift**2)):.3f}",
+        "yaw": f"{np.degrees(np.sqrt(np.nanmean(columns['final_yaw'][rows].astype(float) ** 2))):.2g}",
         "tilt_at_most": f"{np.degrees(np.nanmedian(columns['greatest_tilt'][rows].astype(float))):.0f}",
     }
     for bound in STRAIGHT:
@@ -78,12 +73,6 @@ def _of_cells(columns: Mapping[str, Any], fixed: Any, rows: slice) -> dict[str, 
         found[f"kept_{bound:g}"] = f"{kept.mean():.3f}" if len(kept) else "nan"
         found[f"kept_cells_{bound:g}"] = int(enough.sum())
     return found
-
-
-def read() -> list[dict[str, str]]:
-    """The rows of the committed file."""
-    with RESULTS.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def table(rows: Sequence[Mapping[str, str]]) -> str:
@@ -122,10 +111,8 @@ def main(folder: Annotated[str | None, typer.Argument()] = None) -> None:
         result = warpchain.load(folder)
         if "fixed" not in result.blocks or "lateral_speed" not in result.blocks:
             raise warpchain.InputError(f"{folder}: no blocks fixed and lateral_speed; give a folder of the sweep taps")
-        found = list(reduced(result))
-        lines = [",".join(found[0]), *(",".join(f'"{row[key]}"' for key in found[0]) for row in found)]
-        common.write_text(RESULTS, "\n".join(lines) + "\n")
-    rows = read()
+        common.write_rows(RESULTS, list(reduced(result)))
+    rows = common.read_rows(RESULTS)
     common.write_tables(FOLDER / "README.md", {"taps": table(rows), "taps by links": by_links(rows)})
 
 

@@ -234,8 +234,7 @@ def _roots(coefficients: Complex) -> Complex:
     companion = np.zeros((len(scaled), degree, degree), dtype=np.complex128)
     companion[:, np.arange(1, degree), np.arange(degree - 1)] = 1.0
     companion[:, :, -1] = -scaled[:, :-1] / scaled[:, -1:]
-    roots: Complex = scale * np.linalg.eigvals(companion)
-    return roots
+    return scale * np.linalg.eigvals(companion)
 
 
 def _matched(before: Complex, after: Complex) -> Complex:

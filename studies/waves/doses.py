@@ -4,7 +4,6 @@ python -m studies.waves.doses drag60.npz drag90.npz …   # → results/doses.cs
 python -m studies.waves.doses                           # that file → tables of the page
 """
 
-import csv
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Final
@@ -12,7 +11,7 @@ from typing import Annotated, Final
 import numpy as np
 import typer
 
-from studies.common import run_study, table, write_tables, write_text
+from studies.common import read_rows, run_study, table, write_rows, write_tables
 from studies.waves.drag import CELLS, HALVES, RATES, SAMPLES, SEEDS, VARIANTS
 
 FOLDER: Final = Path(__file__).parent
@@ -46,10 +45,9 @@ def reduced(files: Sequence[Path]) -> Iterator[dict[str, object]]:
                 }
 
 
-def read() -> list[Row]:
+def read() -> list[dict[str, str]]:
     """The rows of the committed file."""
-    with RESULTS.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
+    return read_rows(RESULTS)
 
 
 def changes(rows: Sequence[Row], when: str, rate: float, seeds: str = "both") -> tuple[np.ndarray, np.ndarray]:
@@ -107,10 +105,7 @@ def tables(rows: Sequence[Row]) -> dict[str, str]:
 def main(files: Annotated[list[Path] | None, typer.Argument()] = None) -> None:
     """Reduce files that are given, and write the tables."""
     if files:
-        lines = list(reduced(files))
-        write_text(
-            RESULTS, "\n".join([",".join(lines[0]), *(",".join(map(str, line.values())) for line in lines)]) + "\n"
-        )
+        write_rows(RESULTS, list(reduced(files)))
     write_tables(FOLDER / "README.md", tables(read()))
 
 

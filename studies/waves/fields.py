@@ -50,8 +50,7 @@ def tensions(joints: Array, forces: Array) -> Array:
     The direction of the chain at a joint is that of the line between its two neighbours.
     `forces` are those on the link that the joint ends [N], shape (f, n, 2).
     """
-    tension: Array = np.sum(forces * _tangents(joints), axis=2)
-    return tension
+    return np.sum(forces * _tangents(joints), axis=2)
 
 
 def curvatures(joints: Array, link_length: float) -> Array:
@@ -62,8 +61,7 @@ def curvatures(joints: Array, link_length: float) -> Array:
     link = joints - np.roll(joints, 1, axis=1)
     ahead = np.roll(link, -1, axis=1)
     turn = np.arctan2(_cross(link, ahead), np.sum(link * ahead, axis=2))
-    curvature: Array = _turning(joints) * turn / link_length
-    return curvature
+    return _turning(joints) * turn / link_length
 
 
 def normal_velocities(time: Array, joints: Array, masses: Array) -> Array:
@@ -75,14 +73,12 @@ def normal_velocities(time: Array, joints: Array, masses: Array) -> Array:
 def centers(joints: Array, masses: Array) -> Array:
     """Centre of mass of links that lie between joints [m], shape (f, 2)."""
     middle = (joints + np.roll(joints, 1, axis=1)) / 2
-    weighted: Array = np.einsum("fnk,n->fk", middle, masses) / masses.sum()
-    return weighted
+    return np.einsum("fnk,n->fk", middle, masses) / masses.sum()
 
 
 def wave_speeds(tension: Array, link_length: float, mean_mass: float) -> Array:
     """Speed c = √(Tℓ/m̄) of long transverse waves in the chain's frame [m/s] for each T; 0 where T is negative."""
-    speed: Array = np.sqrt(np.maximum(tension, 0.0) * link_length / mean_mass)
-    return speed
+    return np.sqrt(np.maximum(tension, 0.0) * link_length / mean_mass)
 
 
 def moving_average(time: Array, values: Array, width: float) -> Array:
@@ -92,8 +88,7 @@ def moving_average(time: Array, values: Array, width: float) -> Array:
     span = last - first
     if not np.all(span > 0):
         return values.copy()
-    mean: Array = (np.interp(last, time, area) - np.interp(first, time, area)) / span
-    return mean
+    return (np.interp(last, time, area) - np.interp(first, time, area)) / span
 
 
 def stacked_power(values: Array, way: Array, modes: tuple[int, int] | None = None) -> float:
@@ -171,14 +166,12 @@ def in_room(values: Array, below: Array, points: int) -> Array:
     behind = np.floor(place)
     share, row = place - behind, np.arange(frames)[:, None]
     first = behind.astype(np.intp) % links
-    mixed: Array = (1 - share) * values[row, first] + share * values[row, (first + 1) % links]
-    return mixed
+    return (1 - share) * values[row, first] + share * values[row, (first + 1) % links]
 
 
 def floor_contacts(joints: Array, radius: float) -> Truths:
     """Whether the circles of a joint are at the floor y = 0, at most `NEAR` of their radius [m] above; shape (f, n)."""
-    touching: Truths = joints[..., 1] <= (1 + NEAR) * radius
-    return touching
+    return joints[..., 1] <= (1 + NEAR) * radius
 
 
 def self_contacts(joints: Array, radius: float) -> Truths:
@@ -219,14 +212,12 @@ def _tangents(joints: Array) -> Array:
     """Directions of the chain at its joints, from the joint behind to the one ahead, shape (f, n, 2)."""
     span = np.roll(joints, -1, axis=1) - np.roll(joints, 1, axis=1)
     length = np.hypot(span[..., 0], span[..., 1])[..., None]
-    tangent: Array = span / np.where(length > 0, length, 1.0)
-    return tangent
+    return span / np.where(length > 0, length, 1.0)
 
 
 def _cross(first: Array, second: Array) -> Array:
     """z of the cross product of vectors, shape (…, 2)."""
-    product: Array = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
-    return product
+    return first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
 
 
 def _turning(joints: Array) -> float:

@@ -17,8 +17,7 @@ def mode_amplitudes(angles: Array, number: int) -> Complex:
     """
     links = angles.shape[1]
     wave = 2 / links * np.exp(-2j * np.pi * number * np.arange(links) / links)
-    both: Complex = np.stack([angles[:, part::2] @ wave[part::2] for part in (0, 1)], axis=1)
-    return both
+    return np.stack([angles[:, part::2] @ wave[part::2] for part in (0, 1)], axis=1)
 
 
 def fit_rates(signals: Complex, interval: float, count: int) -> Complex:

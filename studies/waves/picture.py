@@ -136,10 +136,7 @@ def _draw_characteristics(
     ends = [impact.frame for impact in found[1:]] + [len(time)]
     halo = [withStroke(linewidth=1.8, foreground=look.halo, alpha=0.6)]
     for impact, end in zip(found[:FIRST_IMPACTS], ends, strict=False):
-        for frame, joint, line in (
-            (impact.frame, impact.joint, "-"),
-            (impact.last_frame, impact.last_joint, _DASHES),
-        ):
+        for frame, joint, line in ((impact.frame, impact.joint, "-"), (impact.last_frame, impact.last_joint, _DASHES)):
             for sign in (1.0, -1.0):
                 places = place(characteristic(time, sign * speed, frame, joint, 1.0)[: end - frame], frame)
                 places = np.where(np.abs(np.diff(places, prepend=places[:1])) > half, np.nan, places)

@@ -60,8 +60,7 @@ def tapped(links: int, speed: float, spins: Array, times: Array, chain: Paramete
     motion = warpchain.simulate(chain, position, velocity, float(times[-1]), times=times, tolerance=1e-8, **scene)
     if motion.status != warpchain.Status.FINISHED:
         raise RuntimeError(f"the tapped ring ended as {motion.status.label}")
-    angles: Array = motion.position[:, :, 2] - position[:, 2] - ring_spin(chain, links, speed) * times[:, None]
-    return angles
+    return motion.position[:, :, 2] - position[:, 2] - ring_spin(chain, links, speed) * times[:, None]
 
 
 def from_tap(links: int) -> Array:

@@ -5,7 +5,7 @@ import pytest
 
 import warpchain
 from studies.common import with_tables
-from studies.waves import doses, drag
+from studies.waves import directions, doses, drag, sprocket_tap
 
 
 def test_a_release_is_that_of_its_walk() -> None:
@@ -37,3 +37,31 @@ def test_the_page_has_the_tables_of_the_file() -> None:
     """They are rendered from the committed rows."""
     page = (doses.FOLDER / "README.md").read_text(encoding="utf-8")
     assert with_tables(page, doses.tables(doses.read())) == page, "out of date; run python -m studies.waves.doses"
+
+
+@pytest.mark.parametrize(("way", "slope"), [("slow", 305.0), ("fast", -181.0)])
+def test_a_wave_runs_its_way(way: str, slope: float) -> None:
+    """Five waves around 60 links bend the loop alike and run against the links, or with them; momentum stays."""
+    position, velocity, numbers = drag.released(60, 20.0, 7)
+    parameters = warpchain.Parameters(**dict(zip(drag.PARAMETERS, map(float, numbers), strict=True)))
+    times, angles = np.linspace(0, 0.03, 61), []
+    states = [(position, velocity), directions.with_wave(position, velocity, parameters, way, 0.05, 0.3)]
+    masses = np.tile([parameters.inner_mass, parameters.outer_mass], 30)
+    momenta = [masses @ each[1][:, :2] for each in states]
+    assert np.allclose(*momenta, rtol=0, atol=1e-9)
+    for where, speed in states:
+        found = warpchain.simulate(
+            parameters, where, speed, 0.03, times=times, method="hybrid", gravity=False, floor=False
+        )
+        angles.append(found.position[:, :, 2])
+    mode = np.fft.fft(angles[1] - angles[0], axis=1)[:, 5]
+    assert abs(mode[0]) == pytest.approx(0.05 * 30, rel=0.05)
+    assert np.polyfit(times, np.unwrap(np.angle(mode)), 1)[0] == pytest.approx(slope, rel=0.05)
+
+
+@pytest.mark.slow
+def test_a_tap_on_the_sprocket_starts_two_waves() -> None:
+    """The bend stays near the bottom, the front of the velocity runs at nearly twice the speed of the links."""
+    _, run, slow, fast, behind = sprocket_tap.found(20.0)
+    assert float(run) == pytest.approx(7.5, rel=0.02) and all(4 < float(cm) < 8 for cm in slow.split(" to "))
+    assert 1.6 < float(fast.split()[2]) < 2.1 and float(behind.split()[0]) < 20

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 import warpchain
+from studies.common import read_rows
 from studies.floor_friction import run as friction
 from studies.slopes import run as slopes
 from studies.tilting_plane import run as falls
@@ -110,7 +111,7 @@ def test_taps_are_compared_with_fixed_planes_and_named(tmp_path: Path, monkeypat
     }
     make_sweep(tmp_path / "sweep", content, outcome)
     taps.main(str(tmp_path / "sweep"))
-    rows = taps.read()
+    rows = read_rows(taps.RESULTS)
     assert [row["links"] for row in rows] == ["all", "60", "120"]
     assert rows[0]["tap"] == "tilt 0.1 rad, lateral speed 0.3 m/s" and rows[0]["ratio"] == "1.100"
     assert "1.100 ± 0.005 (1.10 to 1.10)" in (tmp_path / "README.md").read_text(encoding="utf-8")

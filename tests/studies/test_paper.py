@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from studies.paper import impacts, reduction, run, statistics
+from studies.paper import further, impacts, reduction, run, statistics
 from tests.support.made_sweeps import make_sweep
 from warpchain import InputError, Status
 from warpchain.sweeps.plan import PlannedWalk, load_sweep
@@ -80,6 +80,15 @@ def test_reduction_finds_what_was_put_in(tmp_path: Path) -> None:
     assert effect.pairs.tolist() == [[5, 6], [6, 6]]
     assert effect.relative == pytest.approx(0.2) and effect.half_width == pytest.approx(0.0, abs=1e-9)
     assert effect.sign.tolist() == [[1, 1], [1, 1]]
+
+
+def test_terms_predict_what_they_have_not_seen() -> None:
+    """A square is not predicted by linear terms; of half noise half of the variance is; noise terms predict nothing."""
+    random = np.random.default_rng(1)
+    x, noise = random.normal(size=(2, 2000))
+    assert further.predicted(x**2, [x]) < 0.02 and further.predicted(x**2, [x, x**2]) > 0.999
+    assert further.predicted(x + noise, [x]) == pytest.approx(0.5, abs=0.05)
+    assert further.predicted(noise, list(random.normal(size=(50, 2000)))) < 0.01
 
 
 def turning_ellipse(time: float, width: float, height: float, speed: float) -> Any:

@@ -1,0 +1,158 @@
+"""When strands of the loop meet, from parts of the sweep ``strands``: results/strands.csv and its tables.
+
+Walks of one cell are compared: those whose strands met by their second bounce, and the others, as they are and with
+what is drawn held: Δx as a linear function of it, of sine and cosine of the phase, and of the early meeting.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.common import table as markdown
+from studies.phase_diagram import laws
+from studies.phase_diagram.cells import walks_by_cell
+from studies.phase_diagram.endings import Ending, endings
+from warpchain import Status, SweepResult
+
+Array = NDArray[Any]
+Cells = Mapping[str, Array]
+
+CSV: Final = Path(__file__).parent / "results" / "strands.csv"
+EVENTS: Final = {"crease": "self_contact", "strands": "strands_met", "collapse": "collapse"}
+"""What happens to a loop: name → end of the name of its column."""
+BEGUN: Final = ("0", "1", "2", "3", "later", "never")
+"""Bounces begun before an event."""
+DRAWN: Final = "_drawn"
+"""End of the names of columns with what a sample has drawn."""
+FEW: Final = 10
+"""Walks that each of two groups has in a cell in which they are compared, at least."""
+EARLY: Final = 2
+"""Strands that met by this bounce met early."""
+WAYS: Final = (Ending.IN_FLIGHT, Ending.FIRST, Ending.SECOND, Ending.LATER)
+BEFORE: Final = ("a bounce or more before", "in that bounce", "not before")
+"""When strands met, of loops that collapse."""
+GROUPS: Final = ((30, 50), (60, 90), (100, 140), (150, 180), (190, 240))
+"""Numbers of links that are shown together."""
+
+
+def reduced(parts: Sequence[SweepResult]) -> Iterator[dict[str, float | str]]:
+    """Rows of the file, a cell each."""
+    names = [f"bounces_before_{name}" for name in EVENTS.values()]
+    (block, *_) = parts[0].blocks.values()
+    names += sorted((name for name in block.columns if name.endswith(DRAWN)), key=f"phase{DRAWN}".__eq__)
+    names += ["status", "dx", "collapsed_at", "strands_met_at", "flight_before_collapse"]
+    for (links, frequency), walks in walks_by_cell(parts, names).items():
+        rest = walks["status"] == Status.AT_REST
+        at_rest = {name: values[rest] for name, values in walks.items()}
+        met, collapse = at_rest["bounces_before_strands_met"], at_rest["bounces_before_collapse"]
+        before = at_rest["strands_met_at"] <= at_rest["collapsed_at"]
+        when = np.where(before & (met < collapse), 0, np.where(before, 1, 2))
+        ways, early, dx = endings(at_rest), (met >= 0) & (met <= EARLY), at_rest["dx"]
+        row: dict[str, float | str] = {
+            "links": links,
+            "frequency": frequency,
+            "walks": int((walks["status"] >= 0).sum()),
+        }
+        row |= {"at_rest": int(rest.sum()), "dx": float(dx.mean()) if len(dx) else np.nan}
+        row["se"] = float(dx.std(ddof=1) / np.sqrt(len(dx))) if len(dx) > 1 else np.nan
+        row |= _early(dx, early, [values for name, values in at_rest.items() if name.endswith(DRAWN)])
+        for event, name in EVENTS.items():
+            begun = at_rest[f"bounces_before_{name}"]
+            counts = [np.sum(begun == number) for number in range(4)] + [np.sum(begun > 3), np.sum(begun < 0)]
+            row |= {f"{event}_{key}": int(count) for key, count in zip(BEGUN, counts, strict=True)}
+        row |= {f"{way.label}_{k}": int(np.sum((ways == way) & (when == k))) for way in WAYS for k in range(3)}
+        yield row
+
+
+def _early(dx: Array, early: Array, drawn: Sequence[Array]) -> dict[str, float]:
+    """What an early meeting does to Δx, over that of the others, less 1: as it is, and with what is drawn held."""
+    found = {"early": int(early.sum()), "raw": np.nan, "held": np.nan, "held_se": np.nan}
+    if min(early.sum(), (~early).sum()) < FEW:
+        return found
+    late, (*plain, phase) = dx[~early].mean(), [values for values in drawn if values.std() > 0]
+    terms = [f(2 * np.pi * phase) for f in (np.sin, np.cos)] + [(each - each.mean()) / each.std() for each in plain]
+    design = np.stack([early, np.ones(len(dx)), *terms], axis=1)
+    weights, left, *_ = np.linalg.lstsq(design, dx, rcond=None)
+    variance = left[0] / (len(dx) - design.shape[1]) * np.linalg.inv(design.T @ design)[0, 0]
+    held = {"held": float(weights[0] / late), "held_se": float(np.sqrt(variance) / late)}
+    return found | {"raw": float(dx[early].mean() / late - 1)} | held
+
+
+def _over_cells(values: Array, errors: Array) -> tuple[str, str, str]:
+    """Mean over cells ± its standard error in per cent, χ² of no difference, how many rise and fall significantly."""
+    known = np.isfinite(values) & (errors > 0)
+    values, errors = values[known], errors[known]
+    if not len(values):
+        return "", "", ""
+    mean, error, sizes = 100 * values.mean(), 100 * np.sqrt(np.sum(errors**2)) / len(values), values / errors
+    rise, fall = np.sum(sizes > 1.96), np.sum(sizes < -1.96)
+    return f"{mean:+.1f} ± {error:.1f} %", f"{np.sum(sizes**2):.0f} of {len(values)}", f"{rise}, {fall}"
+
+
+def shares(cells: Cells) -> str:
+    """Markdown: after how many bounces loops crease, strands meet and loops collapse, by links; early against late."""
+    inside = (cells["frequency"] >= 5) & (cells["frequency"] <= 30)
+    rows = []
+    for name, frequencies in (("5 to 30 Hz", inside), ("slower or faster", ~inside)):
+        for low, high in GROUPS:
+            chosen = frequencies & (cells["links"] >= low) & (cells["links"] <= high)
+            for event in EVENTS:
+                counts = np.array([cells[f"{event}_{key}"][chosen].sum() for key in BEGUN])
+                texts = (f"{100 * count / max(counts.sum(), 1):.0f} %" for count in counts)
+                compared = ("",) * 4
+                if event == "strands" and np.isfinite(cells["raw"][chosen]).any():
+                    raw = f"{100 * np.nanmean(cells['raw'][chosen]):+.1f} %"
+                    compared = raw, *_over_cells(cells["held"][chosen], cells["held_se"][chosen])
+                rows.append((name, f"{low} to {high}", event, *texts, *compared))
+    head = ("", "links", "", "before", "after 1", "after 2", "after 3", "later", "never")
+    return (
+        markdown((*head, "early over late", "what is drawn held", "χ²", "rise, fall"), rows)
+        .replace("-", "−")
+        .replace("−−−", "---")
+    )
+
+
+def ways(cells: Cells) -> str:
+    """Markdown: each way of ending by when strands met, of all walks, and where it is the most frequent."""
+    counts = {(way, k): cells[f"{way.label}_{k}"] for way in WAYS for k in range(3)}
+    total, most = sum(counts.values()), np.argmax(list(counts.values()), axis=0)
+    papers = laws.in_papers_range(cells["links"], cells["frequency"])
+    rows = []
+    for number, ((way, k), count) in enumerate(counts.items()):
+        if count.sum():
+            parts = (f"{100 * count[where].sum() / total[where].sum():.2g} %" for where in (papers, ~papers))
+            rows.append((way.meaning, BEFORE[k], *parts, f"{np.sum((most == number) & (total > 0))}"))
+    head = ("way of ending", "strands met", "share, paper's range", "elsewhere", "cells where it is the most frequent")
+    return f"{markdown(head, rows)}\n\n{total.sum():,.0f} walks at rest of {cells['walks'].sum():,.0f}."
+
+
+def against_million(cells: Cells, million: Cells) -> str:
+    """Whether these walks, of today's engine, go as far as those of the million, in words."""
+    places = {key: i for i, key in enumerate(zip(million["links"], million["frequency"], strict=True))}
+    at = np.array([places[key] for key in zip(cells["links"], cells["frequency"], strict=True)])
+    failed = 1 - million["at_rest"][at] / million["walks"][at]
+    used = (cells["at_rest"] > 10) & (failed <= laws.MOST_FAILED)
+    ratio = cells["dx"] / million["dx_mean"][at] - 1
+    error = np.hypot(cells["se"] / cells["dx"], million["dx_se"][at] / million["dx_mean"][at])
+    texts = []
+    for name, chosen in (
+        ("all", used),
+        ("the paper's range", used & laws.in_papers_range(cells["links"], cells["frequency"])),
+    ):
+        mean, chi2, ends = _over_cells(ratio[chosen], error[chosen])
+        texts.append(f"in {name} {mean} (χ² {chi2} cells; rise, fall: {ends})")
+    return f"Mean Δx of these walks over that of the million, less 1, mean over cells: {'; '.join(texts)}.".replace(
+        "-", "−"
+    )
+
+
+def tables(cells: Cells, million: Cells) -> dict[str, str]:
+    """The tables of the page by their markers."""
+    return {
+        "strands": shares(cells),
+        "ways with strands": ways(cells),
+        "against the million": against_million(cells, million),
+    }

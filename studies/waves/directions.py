@@ -1,0 +1,193 @@
+"""Waves of either direction given to loops at their release: how far do these walk?
+
+    python -m studies.waves.directions run       # twenty minutes of one core → results/directions.csv
+    python -m studies.waves.directions           # that file → the table of the page
+    python -m studies.waves.directions impacts   # prints how large fast waves of this length are about a first impact
+
+Links turn by δθ cos(2πmj/n + φ), which bends the loop alike for both directions. Their rates say which way the wave
+runs: a slow one stands in the room, against the motion of the links; a fast one runs with them. φ is drawn.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Final
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+
+import warpchain
+from studies.common import read_rows, run_study, table, write_rows, write_tables
+from studies.waves.drag import END, NEAR, PARAMETERS, released
+from studies.waves.fields import normal_velocities
+from studies.waves.wave_drag import RIGID, RUNNING, loop_motions, wave_motion
+
+Array = NDArray[np.float64]
+
+FOLDER: Final = Path(__file__).parent
+RESULTS: Final = FOLDER / "results" / "directions.csv"
+CELLS: Final = tuple((links, frequency) for links in (60, 90, 120, 180) for frequency in (20.0, 30.0))
+SAMPLES: Final = 40
+SEED: Final = 3000
+LENGTH: Final = 12
+"""Links in a wave, about: a whole number of waves fits around the loop."""
+RIDING: Final = 0.0598
+"""Radius at which joints ride on the sprocket [m]."""
+APART: Final = 0.01
+"""Touches of the floor less apart [s] are one impact."""
+VARIANTS: Final = (("none", 0.0), *((way, size) for size in (0.05, 0.15) for way in ("slow", "fast")))
+"""Direction, and the amplitude of the links' angles [rad]."""
+
+
+def with_wave(
+    position: Array, velocity: Array, parameters: warpchain.Parameters, way: str, size: float, phase: float
+) -> tuple[Array, Array]:
+    """The state (n, 3), (n, 3) of a loop with a wave, whose joints are as open as before; its momenta stay."""
+    links, length = len(position), parameters.link_length
+    inertia = np.tile(
+        [
+            [getattr(parameters, f"{kind}_{name}") for name in ("mass", "mass", "inertia")]
+            for kind in ("inner", "outer")
+        ],
+        (links // 2, 1),
+    )
+    motions, _ = loop_motions(position[None], np.array([length]))
+    speed = wave_motion(motions[:, RUNNING], velocity[None], inertia[None])[0][0, -1]
+    number = max(3, round(links / LENGTH))
+    wave = size * np.exp(1j * (2 * np.pi * number * np.arange(links) / links + phase))
+    back = 1.0 if way == "slow" else -(number**2 - 3) / (number**2 + 1)
+    before = position[:, 2]
+    turn = _closing(lambda turn: np.exp(1j * (before + turn)) - np.exp(1j * before), wave.real, before)
+    angle = before + turn
+    rate = _closing(
+        lambda rate: 1j * ((velocity[:, 2] + rate) * np.exp(1j * angle) - velocity[:, 2] * np.exp(1j * before)),
+        back * speed / length * np.sin(2 * np.pi * number / links) * (1j * wave).real,
+        angle,
+    )
+    places = _centers(length * (np.exp(1j * angle) - np.exp(1j * before)))
+    speeds = _centers(
+        length * 1j * ((velocity[:, 2] + rate) * np.exp(1j * angle) - velocity[:, 2] * np.exp(1j * before))
+    )
+    moved = position + np.column_stack([places.real, places.imag, turn])
+    moved[:, :2] += np.average(position[:, :2] - moved[:, :2], axis=0, weights=inertia[:, 0])
+    change = np.column_stack([speeds.real, speeds.imag, rate])
+    rigid = loop_motions(moved[None], np.array([length]))[0][:, RIGID]
+    return moved, velocity + wave_motion(rigid, change[None], inertia[None])[1][0]
+
+
+def _closing(ends: Callable[[Array], NDArray[np.complex128]], values: Array, angle: Array) -> Array:
+    """Values changed as little as may be so that the ends of all links add up to nothing, by Newton's method."""
+    basis = np.stack([-np.sin(angle), np.cos(angle)], axis=1)
+    for _ in range(20):
+        gap = np.sum(ends(values))
+        values = values - basis @ np.linalg.solve(basis.T @ basis, [gap.real, gap.imag])
+    return values
+
+
+def _centers(ends: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Middles of links, from what their ends are moved."""
+    joints = np.cumsum(ends)
+    return joints - ends / 2
+
+
+def distances(links: int, frequency: float) -> tuple[Array, Array]:
+    """Δx (variants, samples), and the phases."""
+    phases = 2 * np.pi * np.random.default_rng(SEED).random(SAMPLES)
+    chains, states = [], []
+    for sample in range(SAMPLES):
+        position, velocity, numbers = released(links, frequency, SEED + sample)
+        parameters = warpchain.Parameters(**dict(zip(PARAMETERS, map(float, numbers), strict=True)))
+        for way, size in VARIANTS:
+            chains.append(parameters)
+            states.append(with_wave(position, velocity, parameters, way, size, phases[sample]))
+    position, velocity = (np.array(each) for each in zip(*states, strict=True))
+    walking = warpchain.Chains(chains, position, velocity)
+    walking.run(END, to_rest=True)
+    mass = np.tile([[each.inner_mass, each.outer_mass] for each in chains], links // 2)
+    dx = np.sum(mass * walking.motions()[0][..., 0], axis=1) / mass.sum(axis=1)
+    dx[walking.status != warpchain.Status.AT_REST] = np.nan
+    return dx.reshape(SAMPLES, -1).T, phases
+
+
+def reduced(dx: Array, phases: Array) -> list[dict[str, str]]:
+    """Of each variant: mean change of Δx in pairs, and its part ∝ cos(φ − φ₀) over that of Δx, in per cent."""
+    rows = []
+    for (way, size), walks in zip(VARIANTS[1:], dx[1:], strict=True):
+        both = np.isfinite(walks) & np.isfinite(dx[0])
+        change = 100 * (walks - dx[0])[both] / dx[0][both].mean()
+        design = np.column_stack([np.ones(both.sum()), np.cos(phases[both]), np.sin(phases[both])])
+        found, left, *_ = np.linalg.lstsq(design, change, rcond=None)
+        variance = left[0] / (both.sum() - 3)
+        explained = change.var() * both.sum() - left[0]
+        rows.append(
+            {
+                "wave": way,
+                "size": f"{size:g}",
+                "pairs": str(both.sum()),
+                "change": f"{change.mean():.3f}",
+                "error": f"{change.std(ddof=1) / np.sqrt(both.sum()):.3f}",
+                "by_phase": f"{np.hypot(*found[1:]):.3f}",
+                "f": f"{explained / 2 / variance:.3f}",
+            }
+        )
+    return rows
+
+
+def run() -> None:
+    """Let all loops walk, and write the file."""
+    rows = []
+    for links, frequency in CELLS:
+        found = reduced(*distances(links, frequency))
+        rows += [{"links": str(links), "frequency": f"{frequency:g}", **row} for row in found]
+        print(links, frequency, found, flush=True)
+    write_rows(RESULTS, rows)
+
+
+def summary(rows: Sequence[Mapping[str, str]]) -> str:
+    """Each wave over the cells, in Markdown."""
+    lines = []
+    for way, size in VARIANTS[1:]:
+        change, error, by_phase, f = np.array(
+            [
+                [float(row[name]) for name in ("change", "error", "by_phase", "f")]
+                for row in rows
+                if (row["wave"], float(row["size"])) == (way, size)
+            ]
+        ).T
+        typical = np.sqrt(max(0.0, float(np.mean(change**2 - error**2))))
+        chi2 = f"{np.sum((change / error) ** 2):.0f} of {len(change)}"
+        mean = f"{change.mean():+.1f} ± {np.sqrt(np.sum(error**2)) / len(error):.1f} %".replace("-", "−")
+        lines.append([way, f"{size:g}", mean, f"{typical:.1f} %", chi2, f"{by_phase.mean():.1f} %", f"{f.mean():.1f}"])
+    head = ("wave", "amplitude / rad", "Δx, mean of cells", "typical", "χ² of none", "∝ cos φ", "F of that")
+    return table(head, lines)
+
+
+def about_impact(links: int, frequency: float) -> tuple[float, float]:
+    """Amplitude [rad] of fast waves of `LENGTH` links before the first impact, and between it and the next one."""
+    walk = warpchain.walk(
+        links=links, frequency=frequency, preset="soft", start="spinning", frame_interval=2.5e-4, walk_limit=0.4
+    )
+    parameters, time, number = walk.setup.parameters, walk.frame_time, round(links / LENGTH)
+    masses = np.tile([parameters.inner_mass, parameters.outer_mass], links // 2)
+    modes = np.abs(np.fft.rfft(normal_velocities(time, walk.frame_joints, masses), axis=1))[:, number - 1 : number + 2]
+    angles = np.sqrt(np.sum((2 * modes / links) ** 2, axis=1)) / (4 * np.pi * frequency * RIDING)
+    touches = np.flatnonzero(np.interp(time, walk.time, walk.lowest) < NEAR)
+    gaps = np.flatnonzero(np.diff(time[touches]) > APART)
+    last, following = touches[gaps[0]], touches[gaps[0] + 1]
+    return tuple(float(np.sqrt(np.mean(part**2))) for part in (angles[: touches[0]], angles[last + 1 : following]))
+
+
+def main(command: Annotated[str, typer.Argument()] = "") -> None:
+    """Run the study if told so; write the table of the page."""
+    if command == "impacts":
+        for links, frequency in CELLS:
+            before, after = about_impact(links, frequency)
+            print(f"{links} links, {frequency:g} Hz: {before:.4f} rad before the first impact, {after:.4f} after it")
+        return
+    if command == "run":
+        run()
+    write_tables(FOLDER / "README.md", {"directions": summary(read_rows(RESULTS))})
+
+
+if __name__ == "__main__":
+    run_study(main)

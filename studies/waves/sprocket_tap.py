@@ -1,0 +1,82 @@
+"""A tap of the running chain on its sprocket: the bottom of the loop touches the floor for some milliseconds.
+
+    python -m studies.waves.sprocket_tap     # ten seconds; prints the table of the page
+
+The sprocket dips by 8 mm and comes back (`release`), 5 mm above a floor, and once more far above it. The difference of
+both is the tap's alone. Places are counted along the loop from its lowest point, positive with the motion of the links.
+"""
+
+from typing import Final
+
+import numpy as np
+
+import warpchain
+from studies.common import table
+from studies.waves.fields import curvatures, in_room, joints_below, normal_velocities
+
+LINKS: Final = 120
+FREQUENCIES: Final = (15.0, 20.0, 25.0)
+DIP: Final = 0.008
+INTERVAL: Final = 2.5e-4
+LATER: Final = np.array([0.014, 0.016, 0.018, 0.020, 0.022])
+"""Times after the first touch [s] over which speeds are taken: after the tap, before the sprocket is reached."""
+
+
+def dipping(frequency: float, clearance: float) -> warpchain.WalkResult:
+    """A loop of `LINKS` on a sprocket that dips within 0.06 s and stays for 0.12 s more."""
+    shares = np.linspace(0, 1, 13)[1:]
+    dip = [[0.05 + 0.06 * s, 0, -DIP * np.sin(np.pi * s) ** 2, frequency] for s in shares.tolist()]
+    return warpchain.walk(
+        links=LINKS,
+        frequency=frequency,
+        preset="soft",
+        start="spinning",
+        further_hold=4,
+        clearance=clearance,
+        release=[[0.05, 0, 0, frequency], *dip, [0.22, 0, 0, frequency]],
+        walk_until=0.2,
+        frame_interval=INTERVAL,
+    )
+
+
+def found(frequency: float) -> list[str]:
+    """A row of the table: speeds of what the tap leaves, as means over the time after it."""
+    plain, tapped = dipping(frequency, 0.5), dipping(frequency, 0.005)
+    parameters, time = plain.setup.parameters, plain.frame_time
+    length, masses = parameters.link_length, np.tile([parameters.inner_mass, parameters.outer_mass], LINKS // 2)
+    below = joints_below(plain.frame_joints, masses)
+    run = abs(np.polyfit(time, below, 1)[0]) * length
+    bend, across = (
+        in_room(field(tapped) - field(plain), below, LINKS)
+        for field in (
+            lambda walk: curvatures(walk.frame_joints, length),
+            lambda walk: normal_velocities(time, walk.frame_joints, masses),
+        )
+    )
+    place = (np.arange(LINKS) + 0.5 - LINKS / 2) * length
+    first = time[np.argmax(np.abs(bend).max(axis=1) > 0.5)]
+    slow, fast, behind = [], [], []
+    for later in LATER:
+        i = int(np.argmin(np.abs(time - first - later)))
+        near, ahead = bend[i] ** 2 * (np.abs(place) < 0.3), across[i] ** 2 * ((place > 0.1) & (place < 0.58))
+        slow.append(np.sum(near * place) / near.sum())
+        fast.append(np.interp(0.95, np.cumsum(ahead) / ahead.sum(), place))
+        behind.append(np.sum(across[i] ** 2 * ((place < -0.1) & (place > -0.58))) / ahead.sum())
+    speed = float(np.polyfit(LATER, fast, 1)[0])
+    return [
+        f"{frequency:g} Hz",
+        f"{run:.2f}",
+        f"{100 * min(slow):.1f} to {100 * max(slow):.1f}",
+        f"{speed:.1f} m/s, {speed / run:.2f} v",
+        f"{100 * np.mean(behind):.0f} %",
+    ]
+
+
+def main() -> None:
+    """Print the table."""
+    head = ("", "v / (m/s)", "slow: place / cm", "fast: front", "energy across, on the other side")
+    print(table(head, map(found, FREQUENCIES)))
+
+
+if __name__ == "__main__":
+    main()
