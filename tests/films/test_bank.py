@@ -37,14 +37,17 @@ def test_intervals_hold_of_chains_that_the_bank_does_not_have(count: int) -> Non
     assert ((answer.coverage[1] > 0.9) & (answer.coverage[0] > 0.6)).all()
 
 
-def test_what_nothing_shows_is_as_before_the_film() -> None:
-    """Restitution leaves no trace in these motions: its error is that of the bank, and the answer says so."""
+def test_what_films_do_not_show_is_as_before() -> None:
+    """Restitution leaves no trace: its error is that of the bank, and the answer says so. Bare films say less."""
     bank = made_bank(160, seed=1)
-    answer = bank.posterior(films_of(bank, 3, 2, CAMERA, 0), CAMERA)
+    seen = films_of(bank, 3, 2, CAMERA, 0)
+    answer = bank.posterior(seen)
     assert answer.sigma[2] == pytest.approx(bank.values[:, 2].std(), rel=0.15)
     lines = str(answer).splitlines()
     assert lines[0].startswith("2 films, a bank of 160 chains")
     assert ["as before the film" in line for line in lines[1:]] == [False, False, True]
+    bare = [dataclasses.replace(film, outline=None, speed=None) for film in seen]
+    assert bank.posterior(bare).sigma[1] > 2 * answer.sigma[1]
 
 
 def test_errors_that_films_share_do_not_average_out() -> None:
@@ -61,14 +64,6 @@ def test_errors_that_films_share_do_not_average_out() -> None:
 
     assert sigma(shared, 8, 1) > 0.85 * sigma(shared, 1, 1)
     assert sigma(noisy, 8, 0) < 0.6 * sigma(noisy, 1, 0)
-
-
-def test_a_film_without_outline_or_speed_says_less() -> None:
-    """The bank is then asked for what the film has."""
-    bank = made_bank(160, seed=1)
-    (film,) = films_of(bank, 5, 1, CAMERA, 0)
-    bare = dataclasses.replace(film, outline=None, speed=None)
-    assert bank.posterior([bare]).sigma[1] > 2 * bank.posterior([film]).sigma[1]
 
 
 def test_other_measurements_condition_the_gaussian() -> None:

@@ -31,6 +31,15 @@ def test_the_loop_at_the_release_is_that_of_its_links(walk: WalkResult) -> None:
     assert walk.release_speed == pytest.approx(np.mean(np.sum(state.velocity[:, :2] * along, axis=1)), rel=1e-12)
 
 
+def test_a_plane_that_tilts_has_them_along_itself() -> None:
+    """Width, height and lowest joint do not know the tilt; the centre of mass is in the room."""
+    settings = {"links": 40, "frequency": 15.0, "start": "spinning", "preset": "soft", "walk_limit": 0.002}
+    upright, leaning = (warpchain.walk(plane="tilting", tilt=tilt, **settings) for tilt in (0.0, 0.3))
+    for name in ("width", "height", "lowest"):
+        assert leaning.release[name] == pytest.approx(upright.release[name], abs=1e-12)
+    assert leaning.release["center_y"] == leaning.center[0, 1] < upright.release["center_y"]
+
+
 def test_a_sweep_has_the_release_of_each_walk(tmp_path: Path) -> None:
     """In columns; a walk that goes on from a state has that of its walk, and one that was never released none."""
     settings: dict[str, Any] = {"preset": "soft", "scene": {"start": "spinning", "walk_limit": 0.1}}

@@ -222,13 +222,13 @@ def _features(groups: Iterable[Iterable[Film]], outline: bool, speed: bool) -> A
 
 
 def _regression(rows: Array, values: Array, to: Array) -> tuple[Array, Array]:
-    """Ridge regressions, one for each penalty: values at other features; their distance along the oddest direction."""
+    """Ridge regressions, one for each penalty: values at other features, and their distances from the middle."""
     middle, spread, level = rows.mean(axis=0), rows.std(axis=0), values.mean(axis=0)
     scaled, to = (rows - middle) / spread, (to - middle) / spread
     power, axes = np.linalg.eigh(scaled.T @ scaled / len(scaled))
     turned, sizes = to @ axes, (np.maximum(power, 0) + PENALTIES[:, None])[:, None]
     slopes = axes.T @ (scaled.T @ (values - level)) / len(scaled)
-    return level + turned / sizes @ slopes, np.abs(turned / np.sqrt(sizes)).max(axis=-1)
+    return level + turned / sizes @ slopes, np.sqrt((turned**2 / sizes).sum(axis=-1))
 
 
 def _chosen(found: Array, penalties: NDArray[np.intp]) -> Array:

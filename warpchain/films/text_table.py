@@ -97,7 +97,7 @@ def _fitted_release(time: Array, y: Array) -> float:
     if not len(starts):
         raise InputError("release: the film is too short to fit it; give it")
     release = float(min(starts, key=misfit))
-    if misfit(release) > 4 * y[(time > release - BEFORE) & (time < release)].var():
+    if misfit(release) > 4 * max(y[(time > release - BEFORE) & (time < release)].var(), 1e-8):
         raise InputError("release: nothing begins to fall freely; check unit and fps, or give it")
     return release
 

@@ -17,8 +17,8 @@ RELEASE: Final = {
     "center_x": "x of the centre of mass",
     "center_y": "y of the centre of mass",
     "width": "width of the joints' outline",
-    "height": "height of the joints' outline",
-    "lowest": "y of the lowest joint",
+    "height": "height of the joints' outline, in their plane",
+    "lowest": "y of the lowest joint, in their plane",
 }
 """Keys of `WalkResult.release`, see `at_release`."""
 PAUSE: Final = 0.01

@@ -149,7 +149,7 @@ class WalkResult:
         float, Stored("m", "height of the sprocket's centre at the release; NaN without a sprocket or a release")
     ]
     release: Annotated[dict[str, float], Stored("m", "the loop at the release", keys=RELEASE)]
-    release_speed: Annotated[float, Stored("m/s", "mean speed of the links along the loop at the release")]
+    release_speed: Annotated[float, Stored("m/s", "mean speed along the loop at the release")]
     setup: Setup
     seed: int | None
     versions: dict[str, str]
