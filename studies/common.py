@@ -32,10 +32,10 @@ def run_study(main: Callable[..., None]) -> None:
         sys.exit(str(error))
 
 
-def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
-    """A table in Markdown."""
-    head = list(head)
-    return "\n".join(f"| {' | '.join(line)} |" for line in (head, ["---"] * len(head), *rows))
+def table(head: str | Iterable[str], rows: Iterable[Iterable[object]]) -> str:
+    """A table in Markdown; the head may be one text with strokes between its cells."""
+    head = head.split(" | ") if isinstance(head, str) else list(head)
+    return "\n".join(f"| {' | '.join(map(str, line))} |" for line in (head, ["---"] * len(head), *rows))
 
 
 def save_figure(figure: Figure, path: Path, dpi: int = 200) -> None:
