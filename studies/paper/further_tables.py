@@ -155,6 +155,20 @@ def _loops_texts(mm: Any, share: Any, links: Any) -> list[str]:
     return [text.replace("-", "−") for text in texts]
 
 
+def same_text(numbers: Numbers) -> str:
+    """How loops of the same samples differ that came to spin in two ways, in words."""
+    found = numbers["paper_starts"]["same"]
+    texts = [
+        f"{words} by {scale * found[name][0]:+.{digits}f} {unit} (greatest {scale * found[name][2]:.{digits}f})"
+        for name, words, scale, digits, unit in (
+            ("height", "in height", 1e-3, 2, "mm"),
+            ("place", "in the place of the centre of mass", 1e-3, 3, "mm"),
+            ("energy", "in energy", 100, 3, "%"),
+        )
+    ]
+    return f"{found['pairs']} pairs of loops differ on average {', '.join(texts)}".replace("-", "−")
+
+
 def sliding_table(numbers: Numbers) -> str:
     """Time from the collapse to rest, and Δx, with other frictions of the floor."""
     rows = []

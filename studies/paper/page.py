@@ -47,6 +47,7 @@ def page(numbers: Numbers) -> str:
         "open": tables.open_table(numbers),
         "rest": tables.rest_table(numbers),
         "loops": tables.loops_table(numbers),
+        "same": tables.same_text(numbers),
         "nonlinear": tables.nonlinear_table(numbers),
         "lengths": tables.lengths_table(numbers),
         "sliding": tables.sliding_table(numbers),
