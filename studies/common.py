@@ -53,6 +53,12 @@ def tidy(axes: Axes, *, grid: Literal["x", "y", "both"] | None = None) -> None:
         axes.set_axisbelow(True)
 
 
+def error_line(axes: Axes, x: Any, cells: Any, place: tuple[Any, ...], **style: Any) -> None:
+    """Mean Δx with its standard error of some cells of a block's `statistics()`, as a thin line with dots."""
+    style = {"linewidth": 1.2, "marker": "o", "markersize": 3} | style
+    axes.errorbar(x, cells.mean[place], cells.standard_error[place], **style)
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a file; its folder is made."""
     path.parent.mkdir(parents=True, exist_ok=True)

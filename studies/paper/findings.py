@@ -278,7 +278,7 @@ def falling(name: str) -> Check:
     """Δx falls as a quantity grows."""
 
     def check(numbers: Numbers) -> Finding:
-        return _monotonic(numbers, name, changes(numbers, name), -1)
+        return monotonic(numbers, name, changes(numbers, name), -1)
 
     return check
 
@@ -289,7 +289,7 @@ def floor_friction(numbers: Numbers) -> Finding:
     reference = numbers["paper_claims"]["effects"]["floor_friction"]["reference"]
     beside = [end(v for v, _ in steps if (v > reference) is above) for end, above in ((max, False), (min, True))]
     every, near = (
-        _monotonic(numbers, "floor_friction", chosen, -1)
+        monotonic(numbers, "floor_friction", chosen, -1)
         for chosen in (steps, [(value, effect) for value, effect in steps if value in beside])
     )
     counts = near.text.rpartition("; ")[2]
@@ -301,7 +301,7 @@ def collapse(numbers: Numbers) -> Finding:
     """Longer links lose their loop after fewer bounces."""
     found = numbers["paper_claims"]["collapse"]
     steps = [(each["value"], effect_of(each)) for each in found["values"]]
-    bounced = _monotonic(numbers, "link_length", steps, -1, "bounces before the collapse")
+    bounced = monotonic(numbers, "link_length", steps, -1, "bounces before the collapse")
     distances = (f"{value:g}: {percent(summary(effect).mean)}" for value, effect in changes(numbers, "link_length"))
     return Finding(f"{bounced.text}; Δx at {', '.join(distances)}", bounced.verdict)
 
@@ -310,10 +310,10 @@ def lost_on_floor(numbers: Numbers) -> Finding:
     """Less friction of the floor takes less energy in collisions with it."""
     found = numbers["paper_claims"]["lost_on_floor"]
     steps = [(each["value"], effect_of(each)) for each in found["values"]]
-    return _monotonic(numbers, "floor_friction", steps, 1, "energy lost in collisions with the floor")
+    return monotonic(numbers, "floor_friction", steps, 1, "energy lost in collisions with the floor")
 
 
-def _monotonic(
+def monotonic(
     numbers: Numbers, name: str, steps: Sequence[tuple[float, Effect]], slope: int, what: str = "Δx"
 ) -> Finding:
     """Whether a quantity has a slope: a greater value changes it one way, a smaller one the other."""
