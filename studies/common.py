@@ -32,10 +32,10 @@ def run_study(main: Callable[..., None]) -> None:
         sys.exit(str(error))
 
 
-def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
-    """A table in Markdown."""
-    head = list(head)
-    return "\n".join(f"| {' | '.join(line)} |" for line in (head, ["---"] * len(head), *rows))
+def table(head: str | Iterable[str], rows: Iterable[Iterable[object]]) -> str:
+    """A table in Markdown; the head may be one text with strokes between its cells."""
+    head = head.split(" | ") if isinstance(head, str) else list(head)
+    return "\n".join(f"| {' | '.join(map(str, line))} |" for line in (head, ["---"] * len(head), *rows))
 
 
 def save_figure(figure: Figure, path: Path, dpi: int = 200) -> None:
@@ -51,6 +51,12 @@ def tidy(axes: Axes, *, grid: Literal["x", "y", "both"] | None = None) -> None:
     if grid is not None:
         axes.grid(axis=grid, color="#E6E6E6", linewidth=0.6)
         axes.set_axisbelow(True)
+
+
+def error_line(axes: Axes, x: Any, cells: Any, place: tuple[Any, ...], **style: Any) -> None:
+    """Mean Δx with its standard error of some cells of a block's `statistics()`, as a thin line with dots."""
+    style = {"linewidth": 1.2, "marker": "o", "markersize": 3} | style
+    axes.errorbar(x, cells.mean[place], cells.standard_error[place], **style)
 
 
 def write_text(path: Path, text: str) -> None:

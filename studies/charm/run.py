@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import warpchain
-from studies.common import DISTANCE, LINE_COLORS, RED, run_study, save_figure, table, tidy, write_tables
+from studies.common import DISTANCE, LINE_COLORS, RED, error_line, run_study, save_figure, table, tidy, write_tables
 
 Block = Any
 """A block of `warpchain.SweepResult.blocks` with the axes links, perhaps frequency, and charm_mass."""
@@ -56,16 +56,8 @@ def draw_distances(panel: Axes, block: Block) -> None:
     cells, masses = block.statistics(), 1e3 * block.axes["charm_mass"]
     for number, place in enumerate(np.ndindex(cells.mean.shape[:-1])):
         values = [block.axes[name][index] for name, index in zip(("links", "frequency"), place, strict=True)]
-        panel.errorbar(
-            masses,
-            cells.mean[place],
-            cells.standard_error[place],
-            color=LINE_COLORS[number],
-            linewidth=1.2,
-            marker="o",
-            markersize=3,
-            label="$n$ = {:g}, {:g} Hz".format(*values),
-        )
+        label = "$n$ = {:g}, {:g} Hz".format(*values)
+        error_line(panel, masses, cells, place, color=LINE_COLORS[number], label=label)
     panel.set_xlabel("mass of the charm / g")
     panel.set_ylabel(DISTANCE)
     panel.set_ylim(0, 1.3 * panel.get_ylim()[1])

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 import warpchain
-from studies.common import DISTANCE, LINE_COLORS, run_study, save_figure, table, tidy
+from studies.common import DISTANCE, LINE_COLORS, error_line, run_study, save_figure, table, tidy
 
 Array = NDArray[np.float64]
 Block = Any
@@ -50,17 +50,9 @@ def draw(blocks: dict[str, Block]) -> Figure:
         for (name, block), style in zip(blocks.items(), ("-", "--"), strict=False):
             cells = block.statistics()
             for row, links in enumerate(axes_of["links"]):
-                panel.errorbar(
-                    axes_of["floor_friction"],
-                    cells.mean[row, column],
-                    cells.standard_error[row, column],
-                    color=LINE_COLORS[row % len(LINE_COLORS)],
-                    linestyle=style,
-                    linewidth=1.2,
-                    marker="o",
-                    markersize=3,
-                    label=f"$n$ = {links}" if style == "-" else None,
-                )
+                color, label = LINE_COLORS[row % len(LINE_COLORS)], f"$n$ = {links}" if style == "-" else None
+                friction = axes_of["floor_friction"]
+                error_line(panel, friction, cells, (row, column), color=color, linestyle=style, label=label)
             if column == len(panels) - 1:
                 panel.plot([], [], style, color="black", linewidth=1, label=name)
         panel.set_title(f"$ν$ = {axes_of['frequency'][column]:g} Hz", loc="left", fontsize="medium")

@@ -10,10 +10,11 @@ from typing import Any, Final
 
 import numpy as np
 
+from studies.common import read_rows
 from studies.paper.reduction import effect_of
 from studies.paper.statistics import Effect, exceeding, summary, within
 from studies.paper.verdicts import Verdict, bounds, direction, share, smallness, together
-from studies.waves import doses
+from studies.waves import directions, doses
 
 Numbers = Mapping[str, Any]
 
@@ -277,7 +278,7 @@ def falling(name: str) -> Check:
     """Δx falls as a quantity grows."""
 
     def check(numbers: Numbers) -> Finding:
-        return _monotonic(numbers, name, changes(numbers, name), -1)
+        return monotonic(numbers, name, changes(numbers, name), -1)
 
     return check
 
@@ -288,7 +289,7 @@ def floor_friction(numbers: Numbers) -> Finding:
     reference = numbers["paper_claims"]["effects"]["floor_friction"]["reference"]
     beside = [end(v for v, _ in steps if (v > reference) is above) for end, above in ((max, False), (min, True))]
     every, near = (
-        _monotonic(numbers, "floor_friction", chosen, -1)
+        monotonic(numbers, "floor_friction", chosen, -1)
         for chosen in (steps, [(value, effect) for value, effect in steps if value in beside])
     )
     counts = near.text.rpartition("; ")[2]
@@ -300,7 +301,7 @@ def collapse(numbers: Numbers) -> Finding:
     """Longer links lose their loop after fewer bounces."""
     found = numbers["paper_claims"]["collapse"]
     steps = [(each["value"], effect_of(each)) for each in found["values"]]
-    bounced = _monotonic(numbers, "link_length", steps, -1, "bounces before the collapse")
+    bounced = monotonic(numbers, "link_length", steps, -1, "bounces before the collapse")
     distances = (f"{value:g}: {percent(summary(effect).mean)}" for value, effect in changes(numbers, "link_length"))
     return Finding(f"{bounced.text}; Δx at {', '.join(distances)}", bounced.verdict)
 
@@ -309,10 +310,10 @@ def lost_on_floor(numbers: Numbers) -> Finding:
     """Less friction of the floor takes less energy in collisions with it."""
     found = numbers["paper_claims"]["lost_on_floor"]
     steps = [(each["value"], effect_of(each)) for each in found["values"]]
-    return _monotonic(numbers, "floor_friction", steps, 1, "energy lost in collisions with the floor")
+    return monotonic(numbers, "floor_friction", steps, 1, "energy lost in collisions with the floor")
 
 
-def _monotonic(
+def monotonic(
     numbers: Numbers, name: str, steps: Sequence[tuple[float, Effect]], slope: int, what: str = "Δx"
 ) -> Finding:
     """Whether a quantity has a slope: a greater value changes it one way, a smaller one the other."""
@@ -373,19 +374,21 @@ def waves(numbers: Numbers) -> Finding:
 
     Its verdict is set by hand: a drag shows an effect, a small one.
     """
-    rows = doses.read()
+    rows = read_rows(doses.RESULTS)
     gentle, strong = (doses.changes(rows, "in flight", rate) for rate in (50.0, 250.0))
     always = doses.changes(rows, "always", 50.0)
     known = [int(np.sum(np.abs(values) > 1.96 * errors)) for values, errors in (gentle, strong, always)]
     nothing, scatter = doses.changes(rows, "always", 1e-9)
     beyond = int(np.sum(np.abs(gentle[0] - nothing) > 1.96 * np.hypot(gentle[1], scatter)))
     ends = [f"{percent(values.min() / 100)} to {percent(values.max() / 100)}" for values, _ in (gentle, strong, always)]
-    count = len(gentle[0])
+    count, waves = len(gentle[0]), read_rows(directions.RESULTS)
+    given = [directions.mean_of_cells(*directions.changes(waves, way, 0.05)[:2]) for way in ("fast", "slow")]
     text = (
         f"a drag of 50/s on fast waves of up to 24 links, in flight alone, changes Δx by {ends[0]}, significantly in "
         f"{known[0]} of {count} cells ({beyond} against a drag of 1e-9/s); "
         f"250/s by {ends[1]}, {known[1]} cells; 50/s in impacts as well by {ends[2]}, "
-        f"{known[2]} cells"
+        f"{known[2]} cells; waves of 12 links and 0.05 rad given at the release change it by {given[0]} on average if "
+        f"they are fast, by {given[1]} if slow"
     )
     return Finding(text, Verdict.PART, is_typed=True)
 

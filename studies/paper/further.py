@@ -154,6 +154,23 @@ def loops(block: Block) -> Numbers:
     return found
 
 
+def same_loops(block: Block) -> Numbers:
+    """Loops at their release, from rest less spinning, pairs of samples: height and place [µm], energy, relative."""
+    order = [block.dims.index(name) for name in (*CELLS, "start", "sample")]
+    rest, spinning = (block.axes["start"].tolist().index(name) for name in ("rest", "spinning"))
+    places = np.empty(block.columns["status"].shape)
+    for at in np.ndindex(places.shape):
+        places[at] = block.walk_motion(at).center[0, 0]
+    height, energy = (block.columns[name] for name in ("sprocket_height", "energy_kinetic_at_release"))
+    found = {}
+    for name, values, unit in (("height", height, 1e6), ("place", places, 1e6), ("energy", energy, 1.0)):
+        table = np.transpose(values, order)
+        change = table[:, :, rest] - table[:, :, spinning]
+        change = (change / table[:, :, spinning] if name == "energy" else unit * change).ravel()
+        found[name] = [float(each) for each in (change.mean(), change.std(ddof=1), np.abs(change).max())]
+    return found | {"pairs": int(change.size)}
+
+
 # --- links that pass through one another ---
 
 

@@ -67,16 +67,8 @@ def open_table(numbers: Numbers) -> str:
             total = summary(effect)
             value, reference = (_text(other) for other in (each["value"], found["reference"]))
             ends = [percent(float(end(effect.relative[effect.known]))) for end in (np.min, np.max)]
-            rows.append(
-                [
-                    first,
-                    f"{value} for {reference}",
-                    percent(total.mean, total.half_width),
-                    percent(total.typical, sign=False),
-                    f"{ends[0]}, {ends[1]}",
-                    walk,
-                ]
-            )
+            mean, typical = percent(total.mean, total.half_width), percent(total.typical, sign=False)
+            rows.append([first, f"{value} for {reference}", mean, typical, ", ".join(ends), walk])
             first = walk = ""
     head = ["left open", "value", "Δx, mean of cells", "typical", "least and greatest cell", "spread of a walk"]
     return table(head, rows)
@@ -91,35 +83,20 @@ def rest_table(numbers: Numbers) -> str:
         effect = effect_of(found)
         error = effect.half_width / 1.96
         long, short = (_weighted(effect.relative[chosen], error[chosen]) for chosen in (links >= 150, links < 150))
-        rows.append(
-            [
-                name,
-                _with_error(found["mean"], found["error"]),
-                _with_error(*short),
-                _with_error(*long),
-                f"{int(effect.pairs[effect.known].sum())} in {found['cells']}",
-                f"{found['chi2']:.1f}, {found['p']:.2g}",
-            ]
-        )
-    return table(
-        ["Δx", "all cells", "60 and 120 links", "150 and 180 links", "pairs, cells", "χ² of no difference, p"], rows
-    )
+        texts = [_with_error(*each) for each in ((found["mean"], found["error"]), short, long)]
+        pairs = f"{int(effect.pairs[effect.known].sum())} in {found['cells']}"
+        rows.append([name, *texts, pairs, f"{found['chi2']:.1f}, {found['p']:.2g}"])
+    head = "Δx | all cells | 60 and 120 links | 150 and 180 links | pairs, cells | χ² of no difference, p"
+    return table(head, rows)
 
 
 def lengths_table(numbers: Numbers) -> str:
     """Links of other lengths with the masses and inertias of their length, and with those of Table 1."""
-    rows = []
+    claims, rows = numbers["paper_claims"], []
+    known = {"dx": claims["effects"]["link_length"], "until_collapse": claims["collapse"]}
     alone = {
-        quantity: {
-            f"{1000 * each['value']:g}": summary(effect_of(each))
-            for each in numbers["paper_claims"]["collapse" if quantity == "until_collapse" else "effects"]["values"]
-        }
-        if quantity == "until_collapse"
-        else {
-            f"{1000 * each['value']:g}": summary(effect_of(each))
-            for each in numbers["paper_claims"]["effects"]["link_length"]["values"]
-        }
-        for quantity in ("dx", "until_collapse")
+        quantity: {f"{1000 * each['value']:g}": summary(effect_of(each)) for each in content["values"]}
+        for quantity, content in known.items()
     }
     for length, found in numbers["paper_more"]["more"]["lengths"].items():
         cells = [f"{length} mm"]
@@ -178,20 +155,28 @@ def _loops_texts(mm: Any, share: Any, links: Any) -> list[str]:
     return [text.replace("-", "−") for text in texts]
 
 
+def same_text(numbers: Numbers) -> str:
+    """How loops of the same samples differ that came to spin in two ways, in words."""
+    found = numbers["paper_starts"]["same"]
+    texts = [
+        f"{words} by {scale * found[name][0]:+.{digits}f} {unit} (greatest {scale * found[name][2]:.{digits}f})"
+        for name, words, scale, digits, unit in (
+            ("height", "in height", 1e-3, 2, "mm"),
+            ("place", "in the place of the centre of mass", 1e-3, 3, "mm"),
+            ("energy", "in energy", 100, 3, "%"),
+        )
+    ]
+    return f"{found['pairs']} pairs of loops differ on average {', '.join(texts)}".replace("-", "−")
+
+
 def sliding_table(numbers: Numbers) -> str:
     """Time from the collapse to rest, and Δx, with other frictions of the floor."""
     rows = []
     for value, found in numbers["paper_more"]["more"]["sliding"].items():
         time, distance = (summary(effect_of(found[name])) for name in ("time", "dx"))
-        rows.append(
-            [
-                value,
-                percent(time.mean, time.half_width),
-                f"{time.rises}, {time.falls}",
-                percent(distance.mean, distance.half_width),
-            ]
-        )
-    return table(["μ_fc", "time from collapse to rest", "cells that rise, fall", "Δx"], rows)
+        texts = [percent(each.mean, each.half_width) for each in (time, distance)]
+        rows.append([value, texts[0], f"{time.rises}, {time.falls}", texts[1]])
+    return table("μ_fc | time from collapse to rest | cells that rise, fall | Δx", rows)
 
 
 def distributions_table(numbers: Numbers) -> str:

@@ -4,10 +4,9 @@ import numpy as np
 
 from studies.common import read_rows
 from studies.paper.figure5 import RESULTS as FIGURE5
-from studies.paper.findings import Finding, Numbers, percent
+from studies.paper.findings import Finding, Numbers, monotonic, percent
 from studies.paper.reduction import effect_of
-from studies.paper.statistics import summary
-from studies.paper.verdicts import Verdict, bounds, direction, share, together
+from studies.paper.verdicts import Verdict, bounds, share, together
 
 
 def gradual(numbers: Numbers) -> Finding:
@@ -56,20 +55,8 @@ def figure5_shape(numbers: Numbers) -> Finding:
 def sliding(numbers: Numbers) -> Finding:
     """Less friction of the floor lets a chain slide for longer after its collapse."""
     found = numbers["paper_more"]["more"]["sliding"]
-    agreeing = against = cells = 0
-    texts = []
-    for value, each in found.items():
-        effect = summary(effect_of(each["time"]))
-        less = float(value) < 0.27
-        agreeing += effect.rises if less else effect.falls
-        against += effect.falls if less else effect.rises
-        cells += effect.cells
-        texts.append(f"{value}: {percent(effect.mean, effect.half_width)}")
-    text = (
-        f"time from the collapse to rest at {'; '.join(texts)}; {agreeing} of {cells} comparisons as claimed, "
-        f"{against} the other way"
-    )
-    return Finding(text, direction(agreeing, against, cells))
+    steps = [(float(value), effect_of(each["time"])) for value, each in found.items()]
+    return monotonic(numbers, "floor_friction", steps, -1, "time from the collapse to rest")
 
 
 def same_distributions(numbers: Numbers) -> Finding:

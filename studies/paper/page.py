@@ -47,6 +47,7 @@ def page(numbers: Numbers) -> str:
         "open": tables.open_table(numbers),
         "rest": tables.rest_table(numbers),
         "loops": tables.loops_table(numbers),
+        "same": tables.same_text(numbers),
         "nonlinear": tables.nonlinear_table(numbers),
         "lengths": tables.lengths_table(numbers),
         "sliding": tables.sliding_table(numbers),
@@ -162,35 +163,18 @@ def effects_table(numbers: Numbers) -> str:
         for name in numbers[sweep]["effects"]
         if name not in ("start", "tolerance")
     ]
-    rows = []
+    rows, cells = [], numbers["paper_claims"]["cells"]
     for name in names:
         first = _symbol(name)
         for value, effect in changes(numbers, name):
             found = summary(effect)
-            rows.append(
-                [
-                    first,
-                    f"{value:g}",
-                    percent(found.mean, found.half_width),
-                    str(found.rises),
-                    str(found.falls),
-                    percent(found.typical, sign=False),
-                    _extremes(effect, numbers["paper_claims"]["cells"]),
-                    str(effect.lost) if effect.lost else "",
-                ]
-            )
+            mean, typical = percent(found.mean, found.half_width), percent(found.typical, sign=False)
+            counts = mean, found.rises, found.falls, typical
+            rows.append([first, f"{value:g}", *counts, _extremes(effect, cells), effect.lost or ""])
             first = ""
-    head = [
-        "quantity",
-        "value",
-        "Δx, mean of cells",
-        "rise",
-        "fall",
-        "typical",
-        "least and greatest cell",
-        "pairs lost",
-    ]
-    return table(head, rows)
+    return table(
+        "quantity | value | Δx, mean of cells | rise | fall | typical | least and greatest cell | pairs lost", rows
+    )
 
 
 def _extremes(effect: Effect, cells: Mapping[str, list[float]]) -> str:

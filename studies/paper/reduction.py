@@ -22,6 +22,7 @@ from studies.paper.further import (
     nonlinear,
     plain,
     rest_and_hold,
+    same_loops,
     strands,
     through,
     until_collapse,
@@ -37,6 +38,8 @@ DIGITS: Final = 4
 """Significant digits that are kept."""
 
 WHOLE: Final[dict[str, tuple[str, Callable[[Mapping[str, Block]], Any]]]] = {
+    "paper_tolerance": ("tolerance", lambda blocks: tolerance(blocks["main"])),
+    "paper_shapes": ("impacts", lambda blocks: first_impacts(blocks["main"])),
     "paper_strands": ("strands", lambda blocks: strands(blocks["start"])),
     "paper_through": ("through", lambda blocks: through(blocks["main"])),
     "paper_through_ellipse": ("through", lambda blocks: through(blocks["main"])),
@@ -44,12 +47,13 @@ WHOLE: Final[dict[str, tuple[str, Callable[[Mapping[str, Block]], Any]]]] = {
     "paper_rest": ("rest_and_hold", lambda blocks: rest_and_hold(blocks["main"])),
     "paper_loops": ("loops", lambda blocks: loops(blocks["main"])),
     "paper_held": ("loops", lambda blocks: loops(blocks["main"])),
+    "paper_starts": ("same", lambda blocks: same_loops(blocks["main"])),
     "paper_footnote": ("nonlinear", lambda blocks: nonlinear(blocks["main"])),
     "paper_more": ("more", more),
     "paper_distributions": ("distributions", lambda blocks: distributions(blocks["main"])),
 }
 """Sweeps that one function reduces: name → key of its numbers, and the function."""
-SWEEPS: Final = ("paper_claims", "paper_joints", "paper_tolerance", "paper_shapes", *WHOLE)
+SWEEPS: Final = ("paper_claims", "paper_joints", *WHOLE)
 """Sweeps that the page is made of."""
 
 DEFAULTS: Final = {"clearance": 0.01, "phase": 0.0}
@@ -77,32 +81,16 @@ def reduced(result: SweepResult) -> Numbers:
         content.setdefault("cells", {name: block.axes[name].tolist() for name in CELLS})
         further = [name for name in block.axes if name not in CELLS]
         if further and result.name in ("paper_claims", "paper_joints", "paper_tolerance"):
-            name = further[0]
-            content.setdefault("effects", {})[name] = effects(
-                at_rest(block), block, name, _reference(result, block, name)
-            )
+            content.setdefault("effects", {})[further[0]] = effects_of(result, block, further[0], at_rest(block))
     if result.name in WHOLE:
         key, reduce = WHOLE[result.name]
         content[key] = reduce(result.blocks)
-    for key, name, reduce in (("starts", "start", starts), ("friction", "floor_friction", friction)):
-        if name in result.blocks and result.name == "paper_claims":
-            content[key] = reduce(result.blocks[name])
-    if "link_length" in result.blocks:
-        block = result.blocks["link_length"]
-        content["collapse"] = effects(
-            until_collapse(block), block, "link_length", _reference(result, block, "link_length")
-        )
-    if "floor_friction" in result.blocks:
-        block = result.blocks["floor_friction"]
-        content["lost_on_floor"] = effects(
-            at_rest(block, "loss_floor"), block, "floor_friction", _reference(result, block, "floor_friction")
-        )
-    if "gravity" in result.blocks:
+    if result.name == "paper_claims":
+        block, lengths = (result.blocks[name] for name in ("floor_friction", "link_length"))
+        content["starts"], content["friction"] = starts(result.blocks["start"]), friction(block)
+        content["collapse"] = effects_of(result, lengths, "link_length", until_collapse(lengths))
+        content["lost_on_floor"] = effects_of(result, block, "floor_friction", at_rest(block, "loss_floor"))
         content["spread"] = spreads(result.blocks)
-    if result.name == "paper_tolerance":
-        content["tolerance"] = tolerance(result.blocks["main"])
-    if result.name == "paper_shapes":
-        content["impacts"] = first_impacts(result.blocks["main"])
     return rounded(content)
 
 
@@ -116,13 +104,13 @@ def content_digest(sweep: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
-def effects(table: Array, block: Block, name: str, reference: float | str) -> Numbers:
+def effects_of(result: SweepResult, block: Block, name: str, table: Array) -> Numbers:
     """What each value of a block's further axis `name` does to a quantity, against a reference on the axis.
 
     Raises:
         InputError: the reference is not on the axis.
     """
-    values = block.axes[name].tolist()
+    values, reference = block.axes[name].tolist(), _reference(result, block, name)
     if reference not in values:
         raise InputError(f"{name}: {reference} is not among {values}; give a sweep that has it")
     before = table[:, :, values.index(reference)]

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 import warpchain
-from studies.common import DISTANCE, LINE_COLORS, run_study, save_figure, table, tidy, write_tables
+from studies.common import DISTANCE, LINE_COLORS, error_line, run_study, save_figure, table, tidy, write_tables
 
 Array = NDArray[np.float64]
 Block = Any
@@ -66,8 +66,7 @@ def draw(block: Block) -> Figure:
         for column, frequency in enumerate(block.axes["frequency"]):
             style = {"color": LINE_COLORS[column], "linestyle": dashes, "linewidth": 1.2}
             label = f"$n$ = {links:g}, $ν$ = {frequency:g} Hz"
-            mean, error = cells.mean[row, column], cells.standard_error[row, column]
-            distance.errorbar(slope, mean, error, marker="o", markersize=3, label=label, **style)
+            error_line(distance, slope, cells, (row, column), label=label, **style)
             share.plot(slope, share_without_end(block)[row, column], **style)
     distance.set(yscale="log", ylabel=DISTANCE)
     distance.legend(frameon=False, fontsize="small")

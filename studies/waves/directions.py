@@ -143,23 +143,30 @@ def run() -> None:
     write_rows(RESULTS, rows)
 
 
+def changes(rows: Sequence[Mapping[str, str]], way: str, size: float) -> Array:
+    """Change of Δx and its error in per cent, its part that follows the phase, and F of that, (4, cells)."""
+    chosen = [row for row in rows if (row["wave"], float(row["size"])) == (way, size)]
+    return np.array([[float(row[name]) for name in ("change", "error", "by_phase", "f")] for row in chosen]).T
+
+
+def mean_of_cells(change: Array, error: Array) -> str:
+    """Mean over the cells ± its standard error."""
+    return f"{change.mean():+.1f} ± {np.sqrt(np.sum(error**2)) / len(error):.1f} %".replace("-", "−")
+
+
 def summary(rows: Sequence[Mapping[str, str]]) -> str:
     """Each wave over the cells, in Markdown."""
     lines = []
     for way, size in VARIANTS[1:]:
-        change, error, by_phase, f = np.array(
-            [
-                [float(row[name]) for name in ("change", "error", "by_phase", "f")]
-                for row in rows
-                if (row["wave"], float(row["size"])) == (way, size)
-            ]
-        ).T
+        change, error, by_phase, f = changes(rows, way, size)
         typical = np.sqrt(max(0.0, float(np.mean(change**2 - error**2))))
+        ends = f"{change.min():+.0f} to {change.max():+.0f} %".replace("-", "−")
         chi2 = f"{np.sum((change / error) ** 2):.0f} of {len(change)}"
-        mean = f"{change.mean():+.1f} ± {np.sqrt(np.sum(error**2)) / len(error):.1f} %".replace("-", "−")
-        lines.append([way, f"{size:g}", mean, f"{typical:.1f} %", chi2, f"{by_phase.mean():.1f} %", f"{f.mean():.1f}"])
-    head = ("wave", "amplitude / rad", "Δx, mean of cells", "typical", "χ² of none", "∝ cos φ", "F of that")
-    return table(head, lines)
+        texts = mean_of_cells(change, error), ends, f"{typical:.1f} %", chi2, f"{by_phase.mean():.1f} %"
+        lines.append([way, f"{size:g}", *texts, f"{f.mean():.1f}"])
+    return table(
+        "wave | amplitude / rad | Δx, mean of cells | cells | typical | χ² of none | ∝ cos φ | F of that", lines
+    )
 
 
 def about_impact(links: int, frequency: float) -> tuple[float, float]:

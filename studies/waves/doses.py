@@ -45,11 +45,6 @@ def reduced(files: Sequence[Path]) -> Iterator[dict[str, object]]:
                 }
 
 
-def read() -> list[dict[str, str]]:
-    """The rows of the committed file."""
-    return read_rows(RESULTS)
-
-
 def changes(rows: Sequence[Row], when: str, rate: float, seeds: str = "both") -> tuple[np.ndarray, np.ndarray]:
     """Changes of Δx in per cent and their standard errors, (cells,)."""
     found = [
@@ -106,7 +101,7 @@ def main(files: Annotated[list[Path] | None, typer.Argument()] = None) -> None:
     """Reduce files that are given, and write the tables."""
     if files:
         write_rows(RESULTS, list(reduced(files)))
-    write_tables(FOLDER / "README.md", tables(read()))
+    write_tables(FOLDER / "README.md", tables(read_rows(RESULTS)))
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import warpchain
-from studies.common import with_tables
+from studies.common import read_rows, with_tables
 from studies.waves import directions, doses, drag, sprocket_tap
 
 
@@ -33,10 +33,11 @@ def test_a_drag_acts_when_it_should(monkeypatch: pytest.MonkeyPatch) -> None:
     assert 0.02 < min(found[2:]) and found[2] + found[3] == pytest.approx(0.2, abs=0.05)
 
 
-def test_the_page_has_the_tables_of_the_file() -> None:
+def test_the_page_has_the_tables_of_the_files() -> None:
     """They are rendered from the committed rows."""
     page = (doses.FOLDER / "README.md").read_text(encoding="utf-8")
-    assert with_tables(page, doses.tables(doses.read())) == page, "out of date; run python -m studies.waves.doses"
+    tables = doses.tables(read_rows(doses.RESULTS)) | {"directions": directions.summary(read_rows(directions.RESULTS))}
+    assert with_tables(page, tables) == page, "out of date; run python -m studies.waves.doses, and directions"
 
 
 @pytest.mark.parametrize(("way", "slope"), [("slow", 305.0), ("fast", -181.0)])

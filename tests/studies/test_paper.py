@@ -70,9 +70,7 @@ def test_reduction_finds_what_was_put_in(tmp_path: Path) -> None:
     """Effects of a made sweep are those that were put in, against the value of Table 1, without the failed walk."""
     result = made(tmp_path / "made")
     block = result.blocks["main"]
-    found = reduction.effects(
-        reduction.at_rest(block), block, "gravity", reduction._reference(result, block, "gravity")
-    )
+    found = reduction.effects_of(result, block, "gravity", reduction.at_rest(block))
     assert found["reference"] == REFERENCE
     (change,) = found["values"]
     effect = reduction.effect_of(reduction.rounded(change))
