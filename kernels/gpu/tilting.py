@@ -56,7 +56,7 @@ from warpchain.kernels.physics.plane import (
     place_terms,
     plane_load,
 )
-from warpchain.kernels.types import Chain, Drive, Ground, Row, Rows, State
+from warpchain.kernels.types import Drive, Ground, Row, Rows, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -282,20 +282,10 @@ def block_tilting(block_dim: int) -> BlockPlane:
             end_plane_step(P, constants(K).gravity, h)
 
     @wp.func
-    def meet(
-        K: Rows,
-        P: Row,
-        M: Row,
-        place: Place,
-        _ground: Ground,
-        own: Chain,
-        _drive: Drive,
-        _world: int,
-        _time: wp.float64,
-    ):
+    def meet(K: Rows, P: Row, M: Row, place: Place, _ground: Ground, _drive: Drive, _world: int, _time: wp.float64):
         lane = place.lane
         barrier()  # the plane and its mass are those of the new state
-        chain = on_plane(own, P, 0)
+        chain = on_plane(constants(K), P, 0)
         slope = steepness(chain)
         link = read_link(K, lane)
         left_x, left_y, right_x, right_y = ends_of(link)

@@ -8,7 +8,7 @@ import warp as wp
 
 from warpchain.kernels.gpu.contacts.proximity import block_contact
 from warpchain.kernels.gpu.stage import Place
-from warpchain.kernels.types import Chain, Drive, Ground, Row, Rows, State
+from warpchain.kernels.types import Drive, Ground, Row, Rows, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -27,7 +27,7 @@ class BlockPlane:
         after_first_stage: ``()`` after a first stage has been evaluated.
         begin_step: ``(K, P, place, h)`` moves the plane to the middle of a step, and the first stage with it.
         end_step: ``(K, P, M, place, h)`` carries the plane to the end of an accepted step.
-        meet: ``(K, P, M, place, ground, chain, drive, world, time)`` applies the impulses of the floor or sprocket →
+        meet: ``(K, P, M, place, ground, drive, world, time)`` applies the impulses of the floor or sprocket →
             number of those of this thread.
     """
 
@@ -70,20 +70,10 @@ def block_upright(fixed_body: str) -> BlockPlane:
         return
 
     @wp.func
-    def meet(
-        K: Rows,
-        _P: Row,
-        _M: Row,
-        place: Place,
-        ground: Ground,
-        chain: Chain,
-        drive: Drive,
-        world: int,
-        time: wp.float64,
-    ):
+    def meet(K: Rows, _P: Row, _M: Row, place: Place, ground: Ground, drive: Drive, world: int, time: wp.float64):
         hits = int(0)
         if place.lane < place.links:
-            hits = meet_body(K, place, ground, chain, drive, world, time)
+            hits = meet_body(K, place, ground, drive, world, time)
         return hits
 
     return BlockPlane(load, store, begin_run, after_first_stage, begin_step, end_step, meet)

@@ -107,13 +107,13 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
         if wp.static(has_fixed):
             if gap < wp.float32(0.0):
                 is_near = bool(True)
-                hits = meet_fixed(K, P, M, place, ground, constants(K), drive, world, time)
+                hits = meet_fixed(K, P, M, place, ground, drive, world, time)
                 if hits > 0:
                     wp.atomic_add(T, wp.static(touch.fixed_hits), hits)
         if wp.static(moves):
             is_near = bool(True)
             if lane < place.links:
-                hits += meet_sprocket(K, place, ground, constants(K), drive, state, world, time)
+                hits += meet_sprocket(K, place, ground, drive, state, world, time)
         if wp.static(has_self):
             is_stale = not slack > wp.float32(0.0)
             if is_stale or pairs > 0:

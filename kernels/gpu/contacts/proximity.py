@@ -127,7 +127,8 @@ def block_contact(fixed_body: str):
     face_of, face_at = BODIES[fixed_body].face, BODIES[fixed_body].motion
 
     @wp.func
-    def meet_body(K: Rows, place: Place, ground: Ground, chain: Chain, drive: Drive, world: int, time: wp.float64):
+    def meet_body(K: Rows, place: Place, ground: Ground, drive: Drive, world: int, time: wp.float64):
+        chain = constants(K)
         link = placed_link(chain, read_link(K, place.lane))
         link.cosine = K[COSINE, place.lane]
         link.sine = K[SINE, place.lane]
@@ -150,10 +151,8 @@ def moving_sprocket_contact():
     meet_sprocket = block_contact("moving sprocket")
 
     @wp.func
-    def meet_and_count(
-        K: Rows, place: Place, ground: Ground, chain: Chain, drive: Drive, state: State, world: int, time: wp.float64
-    ):
-        hits = meet_sprocket(K, place, ground, chain, drive, world, time)
+    def meet_and_count(K: Rows, place: Place, ground: Ground, drive: Drive, state: State, world: int, time: wp.float64):
+        hits = meet_sprocket(K, place, ground, drive, world, time)
         if hits > 0:
             wp.atomic_add(state.counts, world, wp.static(layout.SPROCKET_IMPULSES), wp.int64(hits))
         return hits
