@@ -38,7 +38,7 @@ from warpchain.inputs.setup import Setup
 from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError, json_value, validated
 from warpchain.kernels import layout
-from warpchain.loop.before_release import BEFORE, FIELDS, BeforeRelease
+from warpchain.loop.stationary_loop import BEFORE, FIELDS, BeforeRelease
 from warpchain.pictures.walk_shape import Kind
 from warpchain.status import Status
 from warpchain.walks.faults import FAULTS, MOST_ENERGY_ERROR, energy_error, faults
