@@ -60,6 +60,11 @@ class BeforeRelease:
     frame_forces: Annotated[Array, Stored("N", "force x, y in each joint on the link that it ends", "f n 2")]
     frame_moments: Annotated[Array, Stored("N m", "friction moment in each joint on the link that it ends", "f n")]
 
+    def __repr__(self) -> str:
+        """One line."""
+        span = -float(self.frame_time[0]) if len(self.frame_time) else 0.0
+        return f"<BeforeRelease: {span:.3g} s, {len(self.time)} instants, {len(self.frame_time)} frames>"
+
 
 FIELDS: Final[dict[str, Stored]] = stored_fields(BeforeRelease)
 """Arrays of a `BeforeRelease`: name → unit, meaning and shape."""
