@@ -271,7 +271,7 @@ def _draw_lines(axes: Axes, panel: Panel, palette: Mapping[Any, str]) -> None:
         axes.set_xlim(-0.6, len(values) - 0.4)
     else:
         placed = values.astype(float)
-        if values[0] > 0 and _unevenness(np.log(placed)) < _unevenness(placed):
+        if 0 < 10 * values[0] <= values[-1] and _unevenness(np.log(placed)) < _unevenness(placed):
             axes.set_xscale("log")
             placed = np.log(placed)
         if len(values) <= _MOST_TICKS and np.diff(placed).min() > 0.08 * np.ptp(placed):
