@@ -9,7 +9,7 @@ import pytest
 
 import warpchain
 from warpchain.inputs.validation import InputError
-from warpchain.loop.before_release import FIELDS, BeforeRelease
+from warpchain.loop.stationary_loop import FIELDS, BeforeRelease
 from warpchain.walks.one_walk import run_walk
 from warpchain.walks.walk_result import WalkResult
 

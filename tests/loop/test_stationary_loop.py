@@ -8,8 +8,7 @@ import pytest
 from tests.support.made_walks import make_walk
 from warpchain.inputs.parameters import preset
 from warpchain.inputs.start_shapes import ellipse, lay_chain
-from warpchain.loop.before_release import BeforeRelease
-from warpchain.loop.stationary_loop import LoopParameters, StationaryLoop, average_frames
+from warpchain.loop.stationary_loop import BeforeRelease, LoopParameters, StationaryLoop, average_frames
 
 SOFT = preset("soft")
 LENGTH = SOFT.link_length

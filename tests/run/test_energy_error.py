@@ -69,5 +69,5 @@ def test_a_sweep_counts_inaccurate_walks(tmp_path: Path, capsys: pytest.CaptureF
     assert f"1 inaccurate: {ENERGY_REMEDY}" in " ".join(told.split())
     assert json.loads(told[told.index("{") : told.rindex("}") + 1])["inaccurate"] == 1
     page = (tmp_path / "sweep/report.html").read_text()
-    assert "Inaccurate walks" in page and f"1: {ENERGY_REMEDY}" in page
+    assert "Inaccurate walks" in page and f"energy: 1</h3><p>{ENERGY_REMEDY}" in page
     assert load(tmp_path / "sweep").unit("energy_error") == "1"

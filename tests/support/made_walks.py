@@ -8,7 +8,7 @@ import numpy as np
 
 from warpchain.engine.tallies import CONTACTS
 from warpchain.inputs.setup import resolve
-from warpchain.loop.before_release import BeforeRelease
+from warpchain.loop.stationary_loop import BeforeRelease
 from warpchain.status import Status
 from warpchain.walks.landmarks import RELEASE
 from warpchain.walks.walk_result import ENERGIES, MOTION, NUMBERS, WalkResult

@@ -1,1 +1,1 @@
-"""The stationary loop on the sprocket: its record before the release, averages, theory; waves along the chain."""
+"""The stationary loop on the sprocket: its record before the release, and averages."""

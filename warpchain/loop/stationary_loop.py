@@ -1,4 +1,4 @@
-"""The stationary loop of a chain on its sprocket: its mean shape and the forces in it.
+"""The stationary loop of a chain on its sprocket: what is kept of it, its mean shape and the forces in it.
 
 Every joint follows the same path at the same speed. All joints in all frames are therefore samples of one periodic
 function of q = i + o(t), where i is the number of the joint and o(t) the distance, in links, that the chain has moved.
@@ -12,19 +12,21 @@ length ℓ: T_e t + N n = F − ρ v² (t + ℓ²/12 t'').
 """
 
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Annotated, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.hdf5_files import Stored, stored_fields
 from warpchain.inputs.link_values import LinkValues, alternating, mean_value
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import joint_radius, link_values
 from warpchain.inputs.setup import Setup
-from warpchain.loop.before_release import BeforeRelease
 
 Array = NDArray[np.float64]
 
+BEFORE: Final = "before_release"
+"""Name of the motion before the release, among the arrays of a walk and in its file."""
 FEWEST_FRAMES: Final = 8
 """Number of frames that an average needs."""
 LEAST_WAY: Final = 4.0
@@ -39,6 +41,33 @@ OFF_SPROCKET: Final = 5e-4
 """The loop is free where its joints are this much [m] farther from the centre than on the sprocket."""
 KINK_REACH: Final = 0.35
 """Part of the free length, before and after the lowest point, in which the kink is searched for."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class BeforeRelease:
+    """A chain of n links on its sprocket: t instants and f frames just before its release.
+
+    Unit, meaning and shape stand beside each array. Coordinates are those of the walk, with the sprocket at its
+    height at the release. Forces are F = k C + b dC/dt with the stiffness and damping that the joints had then: they
+    may be softened. Moments are positive counter-clockwise. On the link after a joint both act with the opposite sign.
+    """
+
+    time: Annotated[Array, Stored("s", "time since the release, negative", "t")]
+    center: Annotated[Array, Stored("m", "centre of mass x, y", "t 2")]
+    center_velocity: Annotated[Array, Stored("m/s", "velocity of the centre of mass x, y", "t 2")]
+    frame_time: Annotated[Array, Stored("s", "time of a frame since the release, negative", "f")]
+    frame_joints: Annotated[Array, Stored("m", "joints x, y; joint i ends link i, even links inner", "f n 2")]
+    frame_forces: Annotated[Array, Stored("N", "force x, y in each joint on the link that it ends", "f n 2")]
+    frame_moments: Annotated[Array, Stored("N m", "friction moment in each joint on the link that it ends", "f n")]
+
+    def __repr__(self) -> str:
+        """One line."""
+        span = -float(self.frame_time[0]) if len(self.frame_time) else 0.0
+        return f"<BeforeRelease: {span:.3g} s, {len(self.time)} instants, {len(self.frame_time)} frames>"
+
+
+FIELDS: Final[dict[str, Stored]] = stored_fields(BeforeRelease)
+"""Arrays of a `BeforeRelease`: name → unit, meaning and shape."""
 
 
 @dataclass(frozen=True, kw_only=True)

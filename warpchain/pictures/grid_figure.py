@@ -116,10 +116,10 @@ def draw_grid(
     label = with_unit(quantity_text(quantity), next(iter(blocks.values())).unit)
     are_lines = all(panel.kind == "lines" for panel in panels)
     alike = len({(panel.kind, *map(_signature, (panel.across, panel.along))) for panel in panels}) == 1
+    columns = len(panels) if len(panels) <= 3 else min(4, math.ceil(len(panels) ** 0.5))
     if ax is not None:
         areas, owner = [ax], None
     else:
-        columns = len(panels) if len(panels) <= 3 else min(4, math.ceil(len(panels) ** 0.5))
         owner = InlineFigure(figsize=_size(panels, columns), layout="constrained") if figure is None else figure
         areas, _ = panel_grid(owner, len(panels), columns, sharex=alike, sharey=alike or are_lines)
     palettes = _palettes(panels)
@@ -131,19 +131,10 @@ def draw_grid(
         else:
             means = np.concatenate([each.cells.mean.ravel() for each in panels if each.kind == "map"])
             image = _draw_map(axes, panel, (np.nanmin(means), np.nanmax(means)))
-        across, note = quantity_label(panel.across.name), lost_note([vars(panel.cells)])
-        is_common = owner is not None and alike
-        if is_common:
-            axes.set_xlabel(note, color=RED, fontsize="small")
-        else:
-            axes.set_xlabel(f"{across}\n{note}".strip())
-        if axes is areas[0] or not (is_common or are_lines):
+        note = lost_note([vars(panel.cells)])
+        axes.set_xlabel(f"{quantity_label(panel.across.name)}\n{note}".strip())
+        if not (alike or are_lines) or axes in areas[::columns]:
             axes.set_ylabel(quantity_label(panel.along.name) if panel.kind == "map" and panel.along else label)
-    if owner is not None and alike:
-        owner.supxlabel(across, fontsize="medium")
-    if owner is not None and (alike or are_lines):
-        owner.supylabel(areas[0].get_ylabel(), fontsize="medium")
-        areas[0].set_ylabel("")
     if owner is not None and left_out:
         owner.suptitle(f"{len(panels)} of {len(panels) + left_out} panels", fontsize="medium", color=RED)
     if image is not None:
@@ -280,7 +271,7 @@ def _draw_lines(axes: Axes, panel: Panel, palette: Mapping[Any, str]) -> None:
         axes.set_xlim(-0.6, len(values) - 0.4)
     else:
         placed = values.astype(float)
-        if values[0] > 0 and _unevenness(np.log(placed)) < _unevenness(placed):
+        if 0 < 10 * values[0] <= values[-1] and _unevenness(np.log(placed)) < _unevenness(placed):
             axes.set_xscale("log")
             placed = np.log(placed)
         if len(values) <= _MOST_TICKS and np.diff(placed).min() > 0.08 * np.ptp(placed):

@@ -6,18 +6,20 @@ the software; on demand also one walk in motion. The same folder always gives th
 
 import math
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
-from typing import Any, Final
+from itertools import chain, repeat
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from warpchain.files import checked_output, write_whole
+from warpchain.files import Kind, checked_output, write_whole
 from warpchain.inputs.validation import short
+from warpchain.pictures.inline import image, png
 from warpchain.pictures.labels import axis_symbol, cell_text, cell_values, unit_text, value_text, with_unit
-from warpchain.reports.html_page import REPORTS, page, picture, table
 from warpchain.status import Status
 from warpchain.store.block_result import BlockResult
 from warpchain.store.manifest import Folder
@@ -26,6 +28,9 @@ from warpchain.version import VERSION
 from warpchain.walks.faults import FAULTS
 from warpchain.walks.walk_result import WalkResult
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 Array = NDArray[Any]
 
 FRAME_INTERVAL: Final = 2e-3
@@ -33,6 +38,26 @@ FRAME_INTERVAL: Final = 2e-3
 
 _MOST_LISTED: Final = 100
 """Greatest number of walks with the same status or fault that are listed one by one."""
+
+_DPI: Final = 160
+
+
+_HEAD: Final = """<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="generator" content="warpchain report">
+"""
+"""What a report begins with."""
+
+
+def _is_report(path: Path) -> bool:
+    with path.open("rb") as content:
+        return content.read(len(_HEAD)) == _HEAD.encode()
+
+
+REPORTS: Final = Kind("page that warpchain report has written", _is_report)
+"""All that a report replaces."""
 
 
 def write_report(
@@ -66,12 +91,12 @@ def write_report(
         "Sweep": _sweep(result),
         "Provenance": _provenance(result),
     }
-    text = page(result.name, _tiles(result), {title: text for title, text in sections.items() if text})
+    text = _page(result.name, _tiles(result), {title: text for title, text in sections.items() if text})
     write_whole(path, text, REPORTS)
 
 
 def _tiles(result: SweepResult) -> dict[str, tuple[int, str]]:
-    """The numbers at the top of the page, see `page`."""
+    """The numbers at the top of the page, see `_page`."""
     ends = {status.label: status.ok for status in Status} | {"missing": True}
     tiles = {"walks": (result.walk_count, "")}
     for label, count in result.summary().items():
@@ -83,7 +108,7 @@ def _tiles(result: SweepResult) -> dict[str, tuple[int, str]]:
 def _figures(result: SweepResult) -> str:
     from warpchain.reports.sweep_figures import figures
 
-    return "\n".join(picture(each.figure, each.caption) for each in figures(result))
+    return "\n".join(_picture(each.figure, each.caption) for each in figures(result))
 
 
 def _cells(result: SweepResult) -> str:
@@ -108,7 +133,7 @@ def _cells(result: SweepResult) -> str:
             for place in np.ndindex(*block.shape[:-1])
         ]
         parts += [f"<h3>{escape(block.name)}</h3>"] * (len(result.blocks) > 1)
-        parts.append(table([*head, *lengths, *counts], rows, numeric=True, marked=found.failed.ravel() > 0))
+        parts.append(_table([*head, *lengths, *counts], rows, numeric=True, marked=found.failed.ravel() > 0))
     return "\n".join(parts)
 
 
@@ -128,7 +153,7 @@ def _listed(result: SweepResult, found: Iterable[tuple[str, str, Sequence[Array]
                 rows.append([f"{index}", *[block.name] * several, cell, f"{sample}"])
         if count:
             parts.append(f"<h3>{heading}: {count:,}</h3><p>{escape(sentence)}</p>")
-            parts.append(table(["walk", *["block"] * several, "cell", "sample"], rows))
+            parts.append(_table(["walk", *["block"] * several, "cell", "sample"], rows))
             parts.append(f"<p>… and {count - len(rows):,} more.</p>" * (count > len(rows)))
     return "\n".join(parts)
 
@@ -156,11 +181,11 @@ def _walk(result: SweepResult, index: int, device: str | None) -> str:
     parts = [f"<p>{escape(text)}</p>", _player(walk)]
     if len(walk.frame_time) and np.isfinite(walk.frame_joints).all():
         caption = "Height and speed of the centre of mass, as in the paper's Figure 5."
-        parts += [picture(walk.plot("film_strip"), "The walk, drawn to scale.")]
-        parts += [picture(walk.plot("height_and_speed"), caption)]
+        parts += [_picture(walk.plot("film_strip"), "The walk, drawn to scale.")]
+        parts += [_picture(walk.plot("height_and_speed"), caption)]
     if planned.drawn:
         rows = [[name, short(value), unit_text(name)] for name, value in planned.drawn.items()]
-        parts.append("<h3>Drawn for this walk</h3>" + table(["name", "value", "unit"], rows))
+        parts.append("<h3>Drawn for this walk</h3>" + _table(["name", "value", "unit"], rows))
     return "\n".join(parts)
 
 
@@ -203,9 +228,85 @@ def _provenance(result: SweepResult) -> str:
     rows = [[name, f"{value}"] for name, value in result.notes().items() if name != "sweep"]
     rows.append(["this page", f"warpchain {VERSION}"])
     again = "<p>With the text under Sweep in a file: <code>warpchain sweep FILE.yaml -o DIR</code></p>"
-    return table(["", ""], rows) + again
+    return _table(["", ""], rows) + again
 
 
 def _meters(length: float) -> str:
     """A length [m] to tenths of a millimetre, a dash for none."""
     return f"{length:.4f}" if math.isfinite(length) else "–"
+
+
+def _page(title: str, tiles: Mapping[str, tuple[int, str]], sections: Mapping[str, str]) -> str:
+    """A whole page: title, numbers by label, "bad" if they need attention or else "", content in HTML by heading."""
+    numbers = (
+        f'<div class="{kind}"><dt>{label}</dt><dd>{count:,}</dd></div>' for label, (count, kind) in tiles.items()
+    )
+    links, parts = [], []
+    for heading, text in sections.items():
+        anchor = heading.lower().replace(" ", "-")
+        links.append(f'<a href="#{anchor}">{heading}</a>')
+        parts.append(f'<section id="{anchor}"><h2>{heading}</h2>\n{text}\n</section>')
+    content = {"numbers": "".join(numbers), "links": " ".join(links), "sections": "\n".join(parts)}
+    return _HEAD + _PAGE.format(title=escape(title), style=_STYLE, **content)
+
+
+def _picture(figure: "Figure", caption: str) -> str:
+    """A figure with its caption; the image is part of the HTML."""
+    shown = image(png(figure, _DPI), caption, f"{round(96 * figure.get_figwidth())}px")
+    return f"<figure>{shown}<figcaption>{escape(caption)}</figcaption></figure>"
+
+
+def _table(
+    head: Sequence[str], rows: Iterable[Sequence[str]], *, numeric: bool = False, marked: Iterable[bool] = ()
+) -> str:
+    """A table of texts in HTML, of numbers if `numeric`; without a head if that is empty; marked rows stand out."""
+
+    def cells(tag: str, texts: Sequence[str]) -> str:
+        return "".join(f'<{tag} style="text-align:{side}">{escape(text)}</{tag}>' for text in texts)
+
+    side = "right" if numeric else "left"
+    top = f"<thead><tr>{cells('th', head)}</tr></thead>" if any(head) else ""
+    kinds = chain((" class=bad" if bad else "" for bad in marked), repeat(""))
+    body = "\n".join(f"<tr{kind}>{cells('td', row)}</tr>" for row, kind in zip(rows, kinds, strict=False))
+    return f'<div class="wide"><table>{top}<tbody>\n{body}\n</tbody></table></div>'
+
+
+_STYLE: Final = """
+:root { color-scheme: light; }
+body { margin: 0 auto; max-width: 62rem; padding: 1.5rem; color: #222; background: #fff;
+       font: 16px/1.5 system-ui, sans-serif; }
+h2 { margin-top: 2.5rem; border-bottom: 1px solid #ccc; }
+p { max-width: 46rem; }
+a { color: #0072b2; margin-right: 1rem; }
+dl { display: flex; flex-wrap: wrap; gap: .75rem; }
+dl div { padding: .5rem 1rem; min-width: 6rem; background: #f3f4f5; border-left: 4px solid #0072b2; }
+dl .bad { border-color: #d55e00; }
+dd { margin: 0; font-size: 1.4rem; }
+figure { margin: 1.5rem 0 2.5rem; }
+figure img { max-width: 100%; display: block; }
+figcaption { max-width: 46rem; color: #555; font-size: .9rem; }
+.wide { overflow-x: auto; }
+table { border-collapse: collapse; font-size: .9rem; }
+th, td { padding: .2rem .8rem .2rem 0; vertical-align: top; border-bottom: 1px solid #e3e3e3;
+         font-variant-numeric: tabular-nums; }
+tr.bad td, p.bad { color: #a84a00; }
+iframe { width: 100%; border: 1px solid #ccc; }
+pre { max-height: 30rem; overflow: auto; padding: 1rem; background: #f3f4f5; font-size: .8rem; line-height: 1.35; }
+@media print { nav, iframe { display: none; } figure, tr { break-inside: avoid; } }
+"""
+
+# The policy makes the browser refuse to load anything.
+_PAGE: Final = """<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta http-equiv="Content-Security-Policy"
+      content="default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'">
+<title>{title}</title>
+<style>{style}</style>
+</head>
+<body>
+<h1>{title}</h1>
+<dl>{numbers}</dl>
+<nav>{links}</nav>
+{sections}
+</body>
+</html>
+"""

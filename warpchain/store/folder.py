@@ -33,7 +33,7 @@ from warpchain.files import given_path, make_folder, naming, remove_output, writ
 from warpchain.hdf5_files import open_regular
 from warpchain.inputs.validation import DamagedFileError, InputError, InputWarning
 from warpchain.store.manifest import OWN, Folder, Manifest, Shard, read_manifest
-from warpchain.store.shards import check_shard, present_shards, read_shard, stamp
+from warpchain.store.shards import opened_motions, present_shards, read_shard, stamp
 from warpchain.sweeps.designs import EXTENSIBLE
 from warpchain.sweeps.plan import Sweep
 from warpchain.version import NUMERICS_VERSION
@@ -133,7 +133,10 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         problems, bad = [], {}
         for shard in present_shards(self.directory, self.manifest):
             try:
-                check_shard(self.directory, shard)
+                read_shard(self.directory, shard)
+                if shard.keeps_motion:
+                    with opened_motions(self.directory, shard):
+                        pass
             except DamagedFileError as error:
                 bad[shard] = str(error).partition("; ")[0]
             except InputError as error:

@@ -123,19 +123,12 @@ class Manifest:
         """Type of the rows: the quantities drawn by any block are columns in all."""
         return row_type([name for block in self.sweep.blocks for name in block.drawn])
 
-    def numbers(self, keys: Rows) -> NDArray[np.int64]:
-        """Numbers of walks in the sweep, given their keys."""
-        blocks = self.sweep.blocks
-        firsts = np.array([block.first_cell for block in blocks])
-        numbers: NDArray[np.int64] = firsts[keys["block"]] + keys["cell"] + blocks[0].stride * keys["sample"]
-        return numbers
-
     @cached_property
     def shards(self) -> tuple[Shard, ...]:
         """All shards, in the order in which they are computed."""
         found: list[Shard] = []
         blocks, series = self.sweep.blocks, self.sweep.recording.series
-        before = [0] * len(blocks)
+        before, firsts = [0] * len(blocks), np.array([block.first_cell for block in blocks])
         for step, growth in enumerate(self.growth):
             upto = [
                 replace(block, samples_given=count).samples for block, count in zip(blocks, growth.samples, strict=True)
@@ -146,7 +139,7 @@ class Manifest:
                     for number, (block, first, stop) in enumerate(zip(blocks, before, upto, strict=True))
                 ]
             )
-            walks, before = self.numbers(keys), upto
+            walks, before = firsts[keys["block"]] + keys["cell"] + blocks[0].stride * keys["sample"], upto
             for place, (start, stop) in enumerate(itertools.pairwise(_bounds(len(keys), growth.shard_size))):
                 part = slice(start, stop)
                 keeps = series is not None and any(map(series.includes, keys["sample"][part].tolist()))

@@ -105,14 +105,6 @@ def opened_motions(directory: Folder, shard: Shard) -> "AbstractContextManager[h
     return _opened(directory, shard, shard.motion_name, MOTION_KIND)
 
 
-def check_shard(directory: Folder, shard: Shard) -> None:
-    """Check both files of a shard; errors as of `read_shard`."""
-    read_shard(directory, shard)
-    if shard.keeps_motion:
-        with opened_motions(directory, shard):
-            pass
-
-
 @contextmanager
 def _opened(directory: Folder, shard: Shard, name: str, kind: str) -> "Iterator[h5py.File]":
     path = Path(directory) / "shards" / name

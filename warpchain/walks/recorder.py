@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from warpchain.engine.batch import Batch
 from warpchain.kernels import layout
-from warpchain.loop.before_release import BEFORE, BeforeRelease
+from warpchain.loop.stationary_loop import BEFORE, BeforeRelease
 from warpchain.walks.even_clock import even_rows
 from warpchain.walks.motion import Keep
 from warpchain.walks.moving_plane import angles, frame_axes

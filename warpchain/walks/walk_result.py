@@ -38,7 +38,7 @@ from warpchain.inputs.setup import Setup
 from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError, json_value, validated
 from warpchain.kernels import layout
-from warpchain.loop.before_release import BEFORE, FIELDS, BeforeRelease
+from warpchain.loop.stationary_loop import BEFORE, FIELDS, BeforeRelease
 from warpchain.pictures.walk_shape import Kind
 from warpchain.status import Status
 from warpchain.walks.faults import FAULTS, MOST_ENERGY_ERROR, energy_error, faults
@@ -204,15 +204,12 @@ class WalkResult:
 
     def __post_init__(self) -> None:
         """Check that arrays and dictionaries fit together."""
-        links, before = self.setup.scene.links, self.before_release
-        check_fields(self, links)
+        check_fields(self, self.setup.scene.links)
         moving = self.setup.scene.plane == "tilting"
         if moving != bool(len(self.tilt)) and len(self.time):
             raise ValueError(f"tilt: it has {len(self.tilt)} instants; give those of a plane that tilts, and no others")
         if (loads := np.shape(self.frame_forces)[:2]) != (moments := np.shape(self.frame_moments)):
             raise ValueError(f"frame_moments: its shape is {moments}; give an array of shape {loads}, as of the forces")
-        if before is not None and before.frame_joints.shape[1] != links:
-            raise ValueError(f"before_release: its frames are not of {links} links; give those of this walk")
 
     def __repr__(self) -> str:
         """One line with the most important numbers."""
