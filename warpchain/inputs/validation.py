@@ -7,8 +7,6 @@ of a field, or a `ValueError` about their own field; `refusals` makes lines of t
 import difflib
 import functools
 import math
-import os
-import re
 import reprlib
 import sys
 import textwrap
@@ -21,6 +19,8 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import to_jsonable_python
+
+from warpchain.files import given_path
 
 STRICT: Final = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 """Of models that hold a user's values."""
@@ -344,10 +344,10 @@ def checked_path(value: object, path: str) -> Path:
     Raises:
         InputError: it is none; the message begins with `path`.
     """
-    text = os.fspath(value) if isinstance(value, str | os.PathLike) else None
-    if not isinstance(text, str) or re.search("[\0\ud800-\udc7f\udd00-\udfff]", text):
-        raise InputError(f"{path}: {shown(value)} is no path; give one as text")
-    return Path(text)
+    try:
+        return given_path(value)  # type: ignore[arg-type]
+    except (OSError, TypeError):
+        raise InputError(f"{path}: {shown(value)} is no path; give one as text") from None
 
 
 def suggestion(given: object, known: Mapping[str, str] | Iterable[str]) -> str:
