@@ -126,7 +126,7 @@ def test_standard_is_explicit_where_loads_are_recorded() -> None:
     ("settings", "message"),
     [
         ({"record_loads": True, "frame_interval": None}, "record_loads: loads are kept with frames, .*; give one"),
-        ({"record_loads": 1}, "record_loads: 1 is not a truth value; give True or False"),
+        ({"record_loads": 1}, "record_loads: Input should be a valid boolean; given 1"),
         (
             {"record_loads": True, "frame_interval": 9e-7},
             "frame_interval: 9e-07 is not between 1e-06 s and 1000.0 s; .*",

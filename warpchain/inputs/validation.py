@@ -31,6 +31,8 @@ LONGEST_LINE: Final = 200
 """Most characters of a line of a message."""
 LONGEST_NAME: Final = 255
 """Most characters of a name that a user gives to something; a folder's name has no more."""
+_LONGEST_PATH: Final = 120
+"""Most characters of a path with which a line begins that is too long; one can go to a path only if it is whole."""
 _LONGEST_VALUE: Final = 60
 """Most characters of a value in a message."""
 _LONGEST_CHOICE: Final = 125
@@ -382,7 +384,9 @@ def printable(text: str) -> str:
 
 
 def one_line(text: str, kind: str = "") -> str:
-    """A message as one printable line of at most `LONGEST_LINE` characters, without the middle of a longer one.
+    """A message as one printable line of at most `LONGEST_LINE` characters.
+
+    What is too long lacks its end, and the middle of a path of more than `_LONGEST_PATH` characters at its beginning.
 
     Args:
         text: the message.
@@ -390,8 +394,11 @@ def one_line(text: str, kind: str = "") -> str:
     """
     ends = text if len(text) < 10 * LONGEST_LINE else text[: 5 * LONGEST_LINE] + text[-5 * LONGEST_LINE :]
     text, room = printable(" ".join(ends.split())), LONGEST_LINE - len(kind)
-    head = 4 * room // 5
-    return kind + (text if len(text) <= room else f"{text[:head]}...{text[3 + head - room :]}")
+    where, colon, rest = text.partition(": ")
+    longest = max(_LONGEST_PATH, room - len(colon + rest))
+    if len(text) > room and len(where) > longest:
+        text = f"{where[: longest // 3]}...{where[longest // 3 + 3 - longest :]}{colon}{rest}"
+    return kind + (text if len(text) <= room else f"{text[: room - 3]}...")
 
 
 def json_value(value: Any) -> Any:
