@@ -10,6 +10,7 @@ Content is written to a part beside the file, `.NAME.01234567.part.SUFFIX`; a ki
 
 import errno
 import os
+import re
 import secrets
 import stat
 from collections.abc import Callable, Iterator
@@ -53,7 +54,7 @@ def given_path(path: str | os.PathLike[str]) -> Path:
     text = os.fspath(path)
     if not text:
         raise failure(errno.ENOENT, "a path is empty; name a file or folder")
-    if "\0" in text or (not text.isascii() and text.encode(errors="ignore").decode() != text):
+    if re.search("[\0\ud800-\udc7f\udd00-\udfff]", text):
         raise failure(errno.EINVAL, f"{ascii(text)[:100]}: has a NUL or a lone surrogate; leave it out")
     return Path(path)
 

@@ -119,7 +119,7 @@ def test_values_from_file_line_and_seed(command: Command) -> None:
         "preset: soft\n"
         "scene: {links: 40, start: ellipse, frequency: 5.0, clearance: 0.004}\n"
         "options: {method: dp5, self_contact: true}\n"
-        "parameters: {gravity: 9.7, chain_friction: 0.5, mu_fc: 0.3}\n",
+        "parameters: {g: 9.7, chain_friction: 0.5, mu_fc: 0.3}\n",
         encoding="utf-8",
     )
     line = "--config walk.yaml --links 32 --set chain_friction=0.4 --set ℓ=0.013 --seed 7 --set walk_limit=0.02"

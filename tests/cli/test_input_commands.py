@@ -31,16 +31,6 @@ def test_parameters_as_a_table(command: Command) -> None:
     assert [line.split()[:3] for line in some[1:]] == [["joint_stiffness", "k", "1e7"], ["frequency", "nu", "15"]]
 
 
-def test_symbols_on_the_line_and_in_the_file(command: Command) -> None:
-    """A symbol sets what its name sets; the line counts more than the file, however each of them spells it."""
-    Path("walk.yaml").write_text("preset: soft\nparameters: {mu_fc: 0.5, g: 9.7}\nscene: {nu: 5}", encoding="utf-8")
-    line = "--config walk.yaml --set floor_friction=0.3 --set parameters.tau_c=2e-4"
-    walk = json.loads(command("walk", *QUICK, *line.split()).out)
-    parameters = walk["parameters"]
-    assert (parameters["floor_friction"], parameters["gravity"], walk["scene"]["frequency"]) == (0.3, 9.7, 5.0)
-    assert parameters["coulomb_friction"] == 2e-4
-
-
 def test_schema_is_printed_or_written(command: Command) -> None:
     """The command prints the schema as JSON, or writes it to a file and prints the path."""
     assert json.loads(command("schema").out) == sweep_schema()

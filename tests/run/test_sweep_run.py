@@ -16,7 +16,6 @@ import numpy as np
 import pytest
 import yaml
 
-import warpchain
 from tests.support.setups import setup_walk
 from warpchain.cli.main import main
 from warpchain.inputs.setup import Setup
@@ -93,17 +92,6 @@ def test_one_broken_walk_among_a_thousand_changes_no_other():
     assert [Status.TIME_LIMIT] * 1000 == [row[0] for row in whole]
     assert with_broken[:500] == whole[:500]
     assert with_broken[501:] == whole[501:]
-
-
-def test_a_single_walk_is_that_of_a_sweep(tmp_path):
-    """`warpchain walk --seed S` is the first sample of a sweep with seed S, to the bit."""
-    content = TINY | {"samples": 1, "grid": {"links": [30]}, "scene": BRIEF | {"frequency": 12.0}}
-    result = sweep(content, tmp_path / "sweep")
-    values = {"links": 30, "frequency": 12.0, "method": "dp5"} | BRIEF
-    walk = warpchain.walk(preset="soft", seed=7, **values)
-    assert result.status.ravel() == [int(walk.status)]
-    assert result.steps_accepted.ravel() == [walk.steps_accepted]
-    assert result.loss_joint_friction.ravel() == [walk.energy["joint_friction"]]
 
 
 def test_threads_and_processes_write_the_same_bytes(tmp_path, uninterrupted):

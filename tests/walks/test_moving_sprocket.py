@@ -98,9 +98,12 @@ def test_a_walk_goes_on_when_the_sprocket_has_vanished(settings: dict[str, Any])
     [
         ([[0.1, 0, 0, 0]], {"start": "ellipse"}, "release: a motion of the sprocket, which start: ellipse"),
         ([[0.1, 0, 0, 0]], {"plane": "tilting"}, "release: a motion of the sprocket, which plane: tilting"),
-        ([[0.1, 0, 0]], {}, r"row 0, \[0.1, 0, 0\], is not four numbers"),
+        ([[0.1, 0, 0]], {}, r"scene\.release\[0\]\[3\]: missing"),
+        ([[0.1, 0, 0, 0], [0.1, 0, 0, 0]], {}, "row 1: 0.1 s is not after 0.1 s"),
         ([[0.0, 0, 0, 0]], {}, "row 0: 0 s is not after 0 s"),
-        ([], {}, "0 rows; give 1 to 16"),
+        ([[0.1, 1e9, 0, 0]], {}, "should be less than or equal to 10000"),
+        ([], {}, "no rows; give at least one"),
+        ("lift", {}, "release"),
         ([[0.2, 0.0, -0.5, 8.0]], {}, r"scene\.release: y = -0\.5 m takes the sprocket through the floor"),
     ],
 )

@@ -86,6 +86,26 @@ def test_an_odd_number_of_links_needs_links_of_one_kind_or_values_of_each() -> N
     assert walk.dx == warpchain.walk(start="ellipse", **{**BRIEF, "links": 37}, **each).dx
 
 
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"charm_link": 60}, "scene.charm_link: 60 is not among 60 links; give 0 to 59"),
+        ({"stiff_joint": 60}, "scene.stiff_joint: 60 is not among 60 links; give 0 to 59"),
+        ({"link_masses": [1.0, 2.0]}, "scene.link_masses: 2 numbers for 60 links; give one for each"),
+        ({"link_masses": [0.0] * 60}, "scene.link_masses[0]: 0 is no mass; give more"),
+        ({"link_inertias": {7: 1e-7}}, "scene.link_inertias: Input should be a valid list, in kg m²; given "),
+        ({"coulomb_frictions": [-1.0] * 60}, "scene.coulomb_frictions[0]: Input should be greater than or equal to 0"),
+        ({"mass_gradient": 1.0}, "scene.mass_gradient: Input should be less than 1; given 1.0"),
+        ({"charm_mass": 0.02, "load_factor": 9.0}, "scene.load_factor: 9 is too much for links of so little rotary "),
+    ],
+)
+def test_what_makes_no_chain_is_refused(settings: dict[str, Any], message: str) -> None:
+    """In one line that names the field and what to give."""
+    with pytest.raises(InputError) as caught:
+        setup_walk("paper", settings, None)
+    assert str(caught.value).startswith(message) and "\n" not in str(caught.value)
+
+
 def test_a_sweep_has_charms_as_an_axis_and_draws_them() -> None:
     """The mass is an axis with a range, the rest is fixed or drawn, and the resolved sweep says so."""
     content = {"version": 1, "name": "charm", "seed": 1, "samples": 2, "preset": "soft", "scene": {"charm_link": 7}}
@@ -95,7 +115,7 @@ def test_a_sweep_has_charms_as_an_axis_and_draws_them() -> None:
     assert [setup.scene.charm_mass for setup in setups] == [0, 0.05, 0.1, 0, 0.05, 0.1]
     assert len({setup.scene.mass_gradient for setup in setups}) == 6
     assert sweep.canonical()["blocks"][0]["scene"]["charm_link"] == 7
-    with pytest.raises(InputError, match=r"^sweep\.grid\.link_masses: takes a list of its own and is no axis"):
+    with pytest.raises(InputError, match=r"^sweep\.grid\.link_masses: not possible here; give it in scene"):
         load_sweep({**content, "grid": {"link_masses": [[1.0] * 60]}})
 
 

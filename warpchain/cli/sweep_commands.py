@@ -132,7 +132,7 @@ def plot(
     film_strip.png, height_and_speed.png, loop.png, energy.png and, if the plane tilts, tilt.png; a line says what is
     left out and why.
     """
-    from warpchain.cli.walk_files import draw_figures, saved, try_folder
+    from warpchain.cli.walk_files import draw_figures, saved
     from warpchain.files import make_folder
     from warpchain.inputs.validation import InputError, printable
     from warpchain.pictures.walk_shape import kinds_of
@@ -146,7 +146,6 @@ def plot(
     if kind is not None and not is_walk:
         raise InputError("--kind: a sweep has none; leave it out, or give the file of a saved walk")
     folder = folder or (path.parent if os.path.isfile(path) else path)
-    try_folder(folder)
     make_folder(folder)
     drawn = (
         draw_figures(found, folder, kinds_of(found) if kind is None else (kind,))

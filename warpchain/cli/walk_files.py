@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, get_args
 
-from warpchain.files import DISK_FAILURES, checked_output, failure, make_folder, remedy, remove_output
-from warpchain.inputs.validation import InputError, one_line
+from warpchain.files import checked_output, make_folder, naming, remove_output
+from warpchain.inputs.validation import one_line
 from warpchain.pictures.walk_shape import Kind
 
 if TYPE_CHECKING:
@@ -51,11 +51,10 @@ def try_folder(folder: Path) -> None:
     """Check before a long run that a folder can be written to; nothing is left there.
 
     Raises:
-        InputError: it cannot.
-        OSError: the disk is full or broken.
+        OSError: it cannot; one line that names it.
     """
     nearest = folder.absolute()
-    try:
+    with naming(folder):
         while True:
             try:
                 nearest.lstat()
@@ -64,10 +63,6 @@ def try_folder(folder: Path) -> None:
                 nearest = nearest.parent
         with tempfile.TemporaryDirectory(prefix=".warpchain-", dir=nearest):
             pass
-    except OSError as error:
-        if error.errno in DISK_FAILURES:
-            raise failure(error.errno, f"--output: {folder}: {error.strerror}; {remedy(error.errno)}") from None
-        raise InputError(f"--output: {folder}: {error.strerror}; give a folder that can be written to") from None
 
 
 def write_walk(result: "WalkResult", folder: Path, animation: str | None) -> Iterator[Path]:

@@ -7,8 +7,6 @@ of a field, or a `ValueError` about their own field; `refusals` makes lines of t
 import difflib
 import functools
 import math
-import os
-import re
 import reprlib
 import sys
 import textwrap
@@ -22,6 +20,8 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, TypeAdapter,
 from pydantic.fields import FieldInfo
 from pydantic_core import to_jsonable_python
 
+from warpchain.files import given_path
+
 STRICT: Final = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 """Of models that hold a user's values."""
 
@@ -31,6 +31,8 @@ LONGEST_LINE: Final = 200
 """Most characters of a line of a message."""
 LONGEST_NAME: Final = 255
 """Most characters of a name that a user gives to something; a folder's name has no more."""
+_LONGEST_PATH: Final = 120
+"""Most characters of a path with which a line begins that is too long; one can go to a path only if it is whole."""
 _LONGEST_VALUE: Final = 60
 """Most characters of a value in a message."""
 _LONGEST_CHOICE: Final = 125
@@ -344,10 +346,10 @@ def checked_path(value: object, path: str) -> Path:
     Raises:
         InputError: it is none; the message begins with `path`.
     """
-    text = os.fspath(value) if isinstance(value, str | os.PathLike) else None
-    if not isinstance(text, str) or re.search("[\0\ud800-\udc7f\udd00-\udfff]", text):
-        raise InputError(f"{path}: {shown(value)} is no path; give one as text")
-    return Path(text)
+    try:
+        return given_path(value)  # type: ignore[arg-type]
+    except (OSError, TypeError):
+        raise InputError(f"{path}: {shown(value)} is no path; give one as text") from None
 
 
 def suggestion(given: object, known: Mapping[str, str] | Iterable[str]) -> str:
@@ -382,7 +384,9 @@ def printable(text: str) -> str:
 
 
 def one_line(text: str, kind: str = "") -> str:
-    """A message as one printable line of at most `LONGEST_LINE` characters, without the middle of a longer one.
+    """A message as one printable line of at most `LONGEST_LINE` characters.
+
+    What is too long lacks its end, and the middle of a path of more than `_LONGEST_PATH` characters at its beginning.
 
     Args:
         text: the message.
@@ -390,8 +394,11 @@ def one_line(text: str, kind: str = "") -> str:
     """
     ends = text if len(text) < 10 * LONGEST_LINE else text[: 5 * LONGEST_LINE] + text[-5 * LONGEST_LINE :]
     text, room = printable(" ".join(ends.split())), LONGEST_LINE - len(kind)
-    head = 4 * room // 5
-    return kind + (text if len(text) <= room else f"{text[:head]}...{text[3 + head - room :]}")
+    where, colon, rest = text.partition(": ")
+    longest = max(_LONGEST_PATH, room - len(colon + rest))
+    if len(text) > room and len(where) > longest:
+        text = f"{where[: longest // 3]}...{where[longest // 3 + 3 - longest :]}{colon}{rest}"
+    return kind + (text if len(text) <= room else f"{text[: room - 3]}...")
 
 
 def json_value(value: Any) -> Any:

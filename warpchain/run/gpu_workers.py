@@ -61,29 +61,22 @@ def visible_gpus(count: int) -> Sequence[str]:
 
 
 def _take_gpu(free: "SimpleQueue[str]") -> None:
-    """Let this process see only one GPU; at its start, because CUDA reads the variable only once, when Warp starts."""
-    _end_with_parent()
+    """Let this process see only one GPU, before Warp starts, and end when the process ends that started it.
+
+    A thread watches that process, because launches and the compilation of kernels run outside of Python's lock. Linux
+    could send a signal instead (PR_SET_PDEATHSIG), but it does so when the thread ends that started the worker, which
+    may be long before the process.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends it to all processes; the parent ends the workers
+    threading.Thread(target=_end_with_parent, name="parent watch", daemon=True).start()
     os.environ["CUDA_VISIBLE_DEVICES"] = free.get()
 
 
 def _end_with_parent() -> None:
-    """End this worker at once when the process that started it ends, by a kill too; and leave Ctrl-C to that process.
-
-    Called in a process that `multiprocessing` spawned, before its first task. A thread does it, because launches and
-    the compilation of kernels run outside of Python's lock. Linux could send a signal instead (PR_SET_PDEATHSIG), but
-    it does so when the thread ends that started the worker, which may be long before the process.
-    """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends it to all processes; the parent ends the workers
-    threading.Thread(target=_watch, args=(), name="parent watch", daemon=True).start()
-
-
-def _watch() -> None:
-    """Wait for the end of the parent, then end this process."""
+    """Wait for the end of the parent, by a kill too, then end this process at once."""
     parent = multiprocessing.parent_process()
-    if parent is None:
-        raise RuntimeError("this process is no worker that multiprocessing started")
     # The sentinel is a pipe whose other end the parent holds, and so does a process that was forked from it. So the
     # number of the parent is asked as well: it changes when the parent ends.
-    while os.getppid() == parent.pid and not multiprocessing.connection.wait([parent.sentinel], LOOK):
+    while parent and os.getppid() == parent.pid and not multiprocessing.connection.wait([parent.sentinel], LOOK):
         pass
     os._exit(ORPHANED)

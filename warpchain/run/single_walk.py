@@ -7,7 +7,7 @@ from warpchain.inputs.distributions import Seed
 from warpchain.inputs.sections import by_section, takes_fields
 from warpchain.inputs.setup import DEFAULT_PRESET, Setup, continued, resolve
 from warpchain.inputs.state import State
-from warpchain.inputs.validation import InputError, checked, full_name, shown
+from warpchain.inputs.validation import InputError, by_name, checked, shown
 from warpchain.run.progress_bar import changing_line, walk_progress_text
 from warpchain.walks.one_walk import OnProgress, run_walk
 from warpchain.walks.walk_result import WalkResult
@@ -71,12 +71,7 @@ def walk(
         InputError: A value is refused; nothing has been computed. It is a ``ValueError``.
     """
     named = {"links": links, "frequency": frequency, "method": method, "tolerance": tolerance, "start": start}
-    for symbol in settings:
-        name = full_name(symbol)
-        if name in named:
-            raise InputError(f"{symbol}: an argument of its own has this value; give {name}=…")
-    given: dict[str, object] = {name: value for name, value in named.items() if value is not None}
-    given.update(settings)
+    given = by_name({**{name: value for name, value in named.items() if value is not None}, **settings})
     loads = checked(record_loads, "record_loads", bool)
     if isinstance(start, State) and setup is None:
         for name, value, reason in (

@@ -132,12 +132,6 @@ class _Law(BaseModel):
     uniform: list[float] | None = Field(None, min_length=2, max_length=2)
     gaussian: _Moments | None = None
 
-    @model_validator(mode="after")
-    def _one_of_them(self) -> Self:
-        if (self.uniform is None) == (self.gaussian is None):
-            raise ValueError("no distribution; give {uniform: [lower, upper]} or {gaussian: {mean: …, sigma: …}}")
-        return self
-
 
 def _distribution(given: Any, info: ValidationInfo) -> Distribution | None:
     """What is drawn of the quantity; None for what is fixed."""
@@ -146,6 +140,8 @@ def _distribution(given: Any, info: ValidationInfo) -> Distribution | None:
         raise ValueError(f"there is no uncertainty of {name} in Table 1; give uniform or gaussian")
     if isinstance(given, str):
         return TABLE[name] if given == "table" else None
+    if (given.uniform is None) == (given.gaussian is None):
+        raise ValueError("no distribution; give {uniform: [lower, upper]} or {gaussian: {mean: …, sigma: …}}")
     bounds = field_bounds(FIELDS[name])
     if given.gaussian is not None:
         if given.gaussian.mean is not None and not bounds.admit(given.gaussian.mean):
