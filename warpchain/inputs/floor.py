@@ -58,13 +58,6 @@ def slope_points(degrees: float) -> Array:
     return np.array([[0.0, 0.0], [math.cos(angle), -math.sin(angle)]])
 
 
-def body_of(points: Array | None) -> str:
-    """Name of the body that carries a chain on these points, see `warpchain.kernels.contacts.fixed_body`."""
-    if points is None:
-        return "floor"
-    return "slope" if len(points) == 2 else "terrain"
-
-
 def heights(points: Array, x: Array) -> Array:
     """Height [m] of the floor at x; at an upright face that of one of its ends."""
     left, right = points[0, 0], points[-1, 0]

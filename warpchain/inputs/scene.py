@@ -240,6 +240,14 @@ def floor_points(scene: Scene) -> Array | None:
     return slope_points(scene.slope) if scene.slope != 0 else None
 
 
+def floor_body(scene: Scene) -> str:
+    """Name of the body that is the floor, see `warpchain.kernels.contacts.fixed_body`."""
+    points = floor_points(scene)
+    if points is None:
+        return "floor"
+    return "slope" if len(points) == 2 else "terrain"
+
+
 def face_count(scene: Scene) -> int:
     """Number of straight faces of the floor; 1 if it is flat, which a drawn slope may change."""
     return 1 if scene.floor == "flat" else len(scene.floor) - 1

@@ -10,10 +10,10 @@ from pydantic import Field
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import gpu_turn
 from warpchain.engine.tallies import LOST
-from warpchain.inputs.floor import body_of, check_above
+from warpchain.inputs.floor import check_above
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.scene import Scene, check_links_on_gpu, floor_points, link_values
+from warpchain.inputs.scene import Scene, check_links_on_gpu, floor_body, floor_points, link_values
 from warpchain.inputs.sections import takes_fields
 from warpchain.inputs.state import State, checked_array
 from warpchain.inputs.validation import InputError, checked, plain, shown, validated
@@ -81,9 +81,10 @@ def simulate(
         if getattr(options, name):
             raise InputError(f"options.{name}: only a walk has phases in which joints soften; leave it out")
     state = _checked_state(parameters, position, velocity)
-    points = None
-    if not isinstance(floor, bool):
-        points = floor_points(state.setup.scene if floor is None else validated(Scene, {"floor": floor}, ""))
+    scene = state.setup.scene
+    if floor is not None:
+        scene = validated(Scene, {} if isinstance(floor, bool) else {"floor": floor}, "")
+    points = floor_points(scene)
     chain = state.parameters if gravity else state.parameters.with_values({"gravity": 0.0})
     check_links_on_gpu(state.links, options.device, "position")
     instants = _checked_times(end, times)
@@ -95,7 +96,7 @@ def simulate(
     if floor is not False and not (floor is None and state.is_placed_as_in(state.setup)):
         check_above(points, state.position, chain.link_length, "position")
     with gpu_turn([options.device]):
-        body = "none" if floor is False else body_of(points)
+        body = "none" if floor is False else floor_body(scene)
         return _follow(options, state, chain, instants, end, body, points)
 
 

@@ -11,9 +11,8 @@ from warpchain.engine.batch import Batch
 from warpchain.engine.devices import gpu_turn, start_device
 from warpchain.engine.kernel_choice import block_threads, features_of, load_kernels
 from warpchain.engine.memory import most_worlds
-from warpchain.inputs.floor import body_of
 from warpchain.inputs.options import Options, on_gpu
-from warpchain.inputs.scene import face_count, floor_points
+from warpchain.inputs.scene import face_count, floor_body
 from warpchain.inputs.setup import Setup
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
@@ -134,7 +133,7 @@ def compile_kernels(setups: Iterable[Setup], threads: int | None = None) -> None
     wanted: set[tuple[str, Features, int]] = set()
     for setup in setups:
         columns = layout.padded_width(setup.scene.links)
-        floor = body_of(floor_points(setup.scene))
+        floor = floor_body(setup.scene)
         for fixed_body in [floor] + ["sprocket"] * setup.has_drive:
             tilts = fixed_body == floor and setup.scene.plane == "tilting"
             features = features_of(setup.options, columns, fixed_body=fixed_body, tilts=tilts)

@@ -24,9 +24,17 @@ from warpchain.engine.control import (
 from warpchain.engine.snapshot import set_first_area, take_snapshot
 from warpchain.engine.sprocket_motion import motion_rows
 from warpchain.engine.tallies import CONTACTS, COUNTS, EXTREMES, LOST
-from warpchain.inputs.floor import body_of, circles_of, raised_by
+from warpchain.inputs.floor import circles_of, raised_by
 from warpchain.inputs.link_values import mean_value
-from warpchain.inputs.scene import contact_radius, floor_points, joint_radius, link_values, loop_speed, settling_time
+from warpchain.inputs.scene import (
+    contact_radius,
+    floor_body,
+    floor_points,
+    joint_radius,
+    link_values,
+    loop_speed,
+    settling_time,
+)
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.start_shapes import ellipse, lay_chain, stadium
 from warpchain.inputs.state import State
@@ -194,7 +202,7 @@ class WalkRun:
     def features(self) -> Features:
         """What the kernel that carries the world on must be compiled for."""
         if self._released:
-            body = body_of(self._floor)
+            body = floor_body(self.setup.scene)
             return self._batch.features(fixed_body=body, tilts=self._tilts, moving_sprocket=self._moves_sprocket)
         return self._batch.features(fixed_body="sprocket")
 
