@@ -74,7 +74,7 @@ def reduced(parts: Sequence[SweepResult]) -> Iterator[dict[str, float | str]]:
 
 
 def _early(dx: Array, early: Array, drawn: Sequence[Array]) -> dict[str, float]:
-    """How Δx of walks with an early meeting differs, over that of the others, less 1: as it is, with what is drawn held.
+    """Δx of walks with an early meeting over that of the others, less 1: as it is, and with what is drawn held.
 
     The error takes no equal scatter of both for granted (HC3).
     """
