@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2, ks_2samp
 
-from studies.paper.statistics import Effect, mean, paired, spread, unpaired
+from studies.paper.statistics import Effect, mean, paired, spread, standard_error, unpaired
 from warpchain import Status
 
 Array = NDArray[np.float64]
@@ -95,14 +95,12 @@ def strands(block: Block) -> Numbers:
 
 DRAWN: Final = "_drawn"
 """End of the names of columns with what a sample has drawn."""
-FOLDS: Final = 10
 
 
 def nonlinear(block: Block) -> Numbers:
     """Shares of the variance of Δx in each cell: of linear and further terms of what is drawn, and of all but chaos.
 
-    Terms are fitted cell by cell to nine tenths of the samples and judged by the last tenth, in turn. What two walks of
-    a sample share that differ in their tolerance only, is not chaos.
+    Terms are fitted cell by cell. What two walks of a sample share that differ in their tolerance only, is not chaos.
     """
     starts, tolerances = (block.axes[name].tolist() for name in ("start", "tolerance"))
     loose, tight = tolerances.index(max(tolerances)), tolerances.index(min(tolerances))
@@ -126,20 +124,19 @@ def nonlinear(block: Block) -> Numbers:
                 ("squares", linear + turning + [each**2 for each in linear]),
                 ("products", linear + turning + products),
             ):
-                shares.setdefault(name, np.empty(shape))[place] = predicted(one[place][kept], terms)
+                shares.setdefault(name, np.empty(shape))[place] = explained(one[place][kept], terms)
             shared = np.corrcoef(one[place][kept], two[place][kept])[0, 1]
             shares.setdefault("repeated", np.empty(shape))[place] = shared
         found[start] = {name: values.tolist() for name, values in shares.items()}
     return found
 
 
-def predicted(values: Array, terms: list[Array]) -> float:
-    """Share of the variance of values (samples,) that terms predict of samples to which they were not fitted."""
-    design, left = np.stack([np.ones(len(values)), *terms], axis=-1), np.empty(len(values))
-    for fold in range(FOLDS):
-        out = np.arange(len(values)) % FOLDS == fold
-        left[out] = values[out] - design[out] @ np.linalg.lstsq(design[~out], values[~out], rcond=None)[0]
-    return float(1 - np.sum(left**2) / np.sum((values - values.mean()) ** 2))
+def explained(values: Array, terms: list[Array]) -> float:
+    """Share of the variance of values (samples,) that terms explain, less what as many terms of noise would."""
+    design = np.stack([np.ones(len(values)), *terms], axis=-1)
+    weights, _, rank, _ = np.linalg.lstsq(design, values, rcond=None)
+    left = np.sum((values - design @ weights) ** 2) / (len(values) - rank)
+    return float(1 - left / values.var(ddof=1))
 
 
 def loops(block: Block) -> Numbers:
@@ -240,16 +237,15 @@ def rest_and_hold(block: Block) -> Numbers:
 
 
 def compared(effect: Effect) -> Numbers:
-    """Weighted mean of the relative effects with its standard error, and χ² of no effect in any cell."""
+    """Mean of the relative effects over the cells with its standard error, and χ² of no effect in any cell."""
     known = effect.known
-    error = effect.half_width[known] / 1.96
+    error = standard_error(effect)[known]
     relative = effect.relative[known]
-    weight = 1 / error**2
     value = float(np.sum((relative / error) ** 2))
     return {
         **plain(effect),
-        "mean": float(np.sum(weight * relative) / weight.sum()),
-        "error": float(weight.sum() ** -0.5),
+        "mean": float(relative.mean()),
+        "error": float(np.sqrt(np.sum(error**2)) / len(error)),
         "chi2": value,
         "cells": len(relative),
         "p": float(chi2.sf(value, len(relative))),

@@ -8,7 +8,7 @@ import numpy as np
 from studies.common import table
 from studies.paper.findings import percent
 from studies.paper.reduction import effect_of
-from studies.paper.statistics import summary
+from studies.paper.statistics import standard_error, summary
 
 Numbers = Mapping[str, Any]
 
@@ -81,8 +81,8 @@ def rest_table(numbers: Numbers) -> str:
     rows = []
     for name, found in content["rest_and_hold"].items():
         effect = effect_of(found)
-        error = effect.half_width / 1.96
-        long, short = (_weighted(effect.relative[chosen], error[chosen]) for chosen in (links >= 150, links < 150))
+        error = standard_error(effect)
+        long, short = (_mean(effect.relative[chosen], error[chosen]) for chosen in (links >= 150, links < 150))
         texts = [_with_error(*each) for each in ((found["mean"], found["error"]), short, long)]
         pairs = f"{int(effect.pairs[effect.known].sum())} in {found['cells']}"
         rows.append([name, *texts, pairs, f"{found['chi2']:.1f}, {found['p']:.2g}"])
@@ -204,11 +204,10 @@ def _text(value: object) -> str:
     return WORDS.get(value, value) if isinstance(value, str) else f"{value:g}"
 
 
-def _weighted(values: Any, error: Any) -> tuple[float, float]:
-    """Weighted mean and its standard error."""
+def _mean(values: Any, error: Any) -> tuple[float, float]:
+    """Mean over the cells and its standard error."""
     known = np.isfinite(values) & np.isfinite(error)
-    weight = 1 / error[known] ** 2
-    return float(np.sum(weight * values[known]) / weight.sum()), float(weight.sum() ** -0.5)
+    return float(values[known].mean()), float(np.sqrt(np.sum(error[known] ** 2)) / known.sum())
 
 
 def _with_error(value: float, error: float) -> str:

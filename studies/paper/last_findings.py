@@ -36,7 +36,10 @@ def nonlinear(numbers: Numbers) -> Finding:
             f"{medians['products']}, all but chaos {medians['repeated']}"
         )
         fails.append(share(int((linear < bounds().most).sum()), linear.size))
-    text = f"shares of the variance in a cell, fitted to it alone, medians of 9 cells of 500 walks: {'; '.join(texts)}"
+    text = (
+        "shares of the variance in a cell, less what as many terms of noise explain, medians of 9 cells of 500 walks: "
+        f"{'; '.join(texts)}"
+    )
     return Finding(text, together(fails))
 
 

@@ -118,11 +118,11 @@ def summary(effect: Effect) -> Summary:
     The interval of the mean is that of these cells, from their walks; it says nothing of other cells.
     """
     known = effect.known
-    relative, half_width, sign = (each[known] for each in (effect.relative, effect.half_width, effect.sign))
+    relative, sign = effect.relative[known], effect.sign[known]
     cells = len(relative)
     if not cells:
         return Summary(0, 0, 0, math.nan, math.nan, math.nan)
-    error = half_width / _factor(effect.pairs[known] - 1)
+    error = standard_error(effect)[known]
     return Summary(
         cells=cells,
         rises=int((sign > 0).sum()),
@@ -131,6 +131,11 @@ def summary(effect: Effect) -> Summary:
         half_width=float(1.96 * np.sqrt((error**2).sum()) / cells),
         typical=float(np.sqrt(max(0.0, float((relative**2 - error**2).mean())))),
     )
+
+
+def standard_error(effect: Effect) -> Array:
+    """Standard errors of the relative effects of paired comparisons."""
+    return effect.half_width / _factor(effect.pairs - 1)
 
 
 def exceeding(effect: Effect, bound: float) -> int:

@@ -31,6 +31,8 @@ FEW: Final = 10
 """Walks that each of two groups has in a cell in which they are compared, at least."""
 EARLY: Final = 2
 """Strands that met by this bounce met early."""
+OTHERWISE: Final = (1, 3)
+"""Bounces by which they might be said to have met early instead."""
 WAYS: Final = (Ending.IN_FLIGHT, Ending.FIRST, Ending.SECOND, Ending.LATER)
 BEFORE: Final = ("a bounce or more before", "in that bounce", "not before")
 """When strands met, of loops that collapse."""
@@ -50,7 +52,8 @@ def reduced(parts: Sequence[SweepResult]) -> Iterator[dict[str, float | str]]:
         met, collapse = at_rest["bounces_before_strands_met"], at_rest["bounces_before_collapse"]
         before = at_rest["strands_met_at"] <= at_rest["collapsed_at"]
         when = np.where(before & (met < collapse), 0, np.where(before, 1, 2))
-        ways, early, dx = endings(at_rest), (met >= 0) & (met <= EARLY), at_rest["dx"]
+        ways, dx = endings(at_rest), at_rest["dx"]
+        drawn = [values for name, values in at_rest.items() if name.endswith(DRAWN)]
         row: dict[str, float | str] = {
             "links": links,
             "frequency": frequency,
@@ -58,7 +61,10 @@ def reduced(parts: Sequence[SweepResult]) -> Iterator[dict[str, float | str]]:
         }
         row |= {"at_rest": int(rest.sum()), "dx": float(dx.mean()) if len(dx) else np.nan}
         row["se"] = float(dx.std(ddof=1) / np.sqrt(len(dx))) if len(dx) > 1 else np.nan
-        row |= _early(dx, early, [values for name, values in at_rest.items() if name.endswith(DRAWN)])
+        row |= _early(dx, (met >= 0) & (met <= EARLY), drawn)
+        for bounce in OTHERWISE:
+            found = _early(dx, (met >= 0) & (met <= bounce), drawn)
+            row |= {f"{name}_{bounce}": found[name] for name in ("held", "held_se")}
         for event, name in EVENTS.items():
             begun = at_rest[f"bounces_before_{name}"]
             counts = [np.sum(begun == number) for number in range(4)] + [np.sum(begun > 3), np.sum(begun < 0)]
@@ -68,28 +74,35 @@ def reduced(parts: Sequence[SweepResult]) -> Iterator[dict[str, float | str]]:
 
 
 def _early(dx: Array, early: Array, drawn: Sequence[Array]) -> dict[str, float]:
-    """What an early meeting does to Δx, over that of the others, less 1: as it is, and with what is drawn held."""
+    """Δx of walks with an early meeting over that of the others, less 1: as it is, and with what is drawn held.
+
+    The error takes no equal scatter of both for granted (HC3).
+    """
     found = {"early": int(early.sum()), "raw": np.nan, "held": np.nan, "held_se": np.nan}
     if min(early.sum(), (~early).sum()) < FEW:
         return found
     late, (*plain, phase) = dx[~early].mean(), [values for values in drawn if values.std() > 0]
     terms = [f(2 * np.pi * phase) for f in (np.sin, np.cos)] + [(each - each.mean()) / each.std() for each in plain]
     design = np.stack([early, np.ones(len(dx)), *terms], axis=1)
-    weights, left, *_ = np.linalg.lstsq(design, dx, rcond=None)
-    variance = left[0] / (len(dx) - design.shape[1]) * np.linalg.inv(design.T @ design)[0, 0]
-    held = {"held": float(weights[0] / late), "held_se": float(np.sqrt(variance) / late)}
+    solve = np.linalg.pinv(design)
+    weights, share = solve @ dx, np.einsum("wk,kw->w", design, solve)
+    left = (dx - design @ weights) / (1 - share)
+    held = {"held": float(weights[0] / late), "held_se": float(np.sqrt(np.sum((solve[0] * left) ** 2)) / late)}
     return found | {"raw": float(dx[early].mean() / late - 1)} | held
 
 
-def _over_cells(values: Array, errors: Array) -> tuple[str, str, str]:
-    """Mean over cells ± its standard error in per cent, χ² of no difference, how many rise and fall significantly."""
+def _over_cells(values: Array, errors: Array, digits: int = 1) -> tuple[str, str, str, str]:
+    """Mean over cells ± its standard error in per cent, χ² of none, of one difference, cells that rise, that fall."""
     known = np.isfinite(values) & (errors > 0)
     values, errors = values[known], errors[known]
     if not len(values):
-        return "", "", ""
+        return "", "", "", ""
+    weight = errors**-2
+    one = float(np.sum(weight * (values - np.sum(weight * values) / weight.sum()) ** 2))
     mean, error, sizes = 100 * values.mean(), 100 * np.sqrt(np.sum(errors**2)) / len(values), values / errors
     rise, fall = np.sum(sizes > 1.96), np.sum(sizes < -1.96)
-    return f"{mean:+.1f} ± {error:.1f} %", f"{np.sum(sizes**2):.0f} of {len(values)}", f"{rise}, {fall}"
+    texts = f"{mean:+.{digits}f} ± {error:.{digits}f} %", f"{np.sum(sizes**2):.0f} of {len(values)}"
+    return *texts, f"{one:.0f} of {len(values) - 1}", f"{rise}, {fall}"
 
 
 def shares(cells: Cells) -> str:
@@ -102,17 +115,31 @@ def shares(cells: Cells) -> str:
             for event in EVENTS:
                 counts = np.array([cells[f"{event}_{key}"][chosen].sum() for key in BEGUN])
                 texts = (f"{100 * count / max(counts.sum(), 1):.0f} %" for count in counts)
-                compared = ("",) * 4
+                compared = ("",) * 5
                 if event == "strands" and np.isfinite(cells["raw"][chosen]).any():
                     raw = f"{100 * np.nanmean(cells['raw'][chosen]):+.1f} %"
                     compared = raw, *_over_cells(cells["held"][chosen], cells["held_se"][chosen])
                 rows.append((name, f"{low} to {high}", event, *texts, *compared))
     head = ("", "links", "", "before", "after 1", "after 2", "after 3", "later", "never")
     return (
-        markdown((*head, "early over late", "what is drawn held", "χ²", "rise, fall"), rows)
+        markdown((*head, "early over late", "what is drawn held", "χ² of none", "of one value", "rise, fall"), rows)
         .replace("-", "−")
         .replace("−−−", "---")
     )
+
+
+def by_bounces(cells: Cells) -> str:
+    """Markdown: the difference from 5 to 30 Hz, with what is drawn held, for other bounds of what is early."""
+    inside, rows = (cells["frequency"] >= 5) & (cells["frequency"] <= 30), []
+    for low, high in GROUPS:
+        chosen, texts = inside & (cells["links"] >= low) & (cells["links"] <= high), []
+        for bounce in sorted((EARLY, *OTHERWISE)):
+            end = "" if bounce == EARLY else f"_{bounce}"
+            values, errors = cells[f"held{end}"][chosen], cells[f"held_se{end}"][chosen]
+            mean, _, _, ends = _over_cells(values, errors)
+            texts.append(f"{mean} ({np.isfinite(values).sum()}: {ends})".replace("-", "−"))
+        rows.append((f"{low} to {high}", *texts))
+    return markdown(("links", "met by the first bounce", "by the second", "by the third"), rows)
 
 
 def ways(cells: Cells) -> str:
@@ -136,13 +163,14 @@ def against_million(cells: Cells, million: Cells) -> str:
     failed = 1 - million["at_rest"][at] / million["walks"][at]
     used = (cells["at_rest"] > 10) & (failed <= laws.MOST_FAILED)
     ratio = cells["dx"] / million["dx_mean"][at] - 1
-    error = np.hypot(cells["se"] / cells["dx"], million["dx_se"][at] / million["dx_mean"][at])
+    walk = million["dx_sd"][at] / np.sqrt(np.maximum(cells["at_rest"], 1))  # better known from the million
+    error = np.hypot(walk, million["dx_se"][at]) / million["dx_mean"][at]
     texts = []
     for name, chosen in (
         ("all", used),
         ("the paper's range", used & laws.in_papers_range(cells["links"], cells["frequency"])),
     ):
-        mean, chi2, ends = _over_cells(ratio[chosen], error[chosen])
+        mean, chi2, _, ends = _over_cells(ratio[chosen], error[chosen], 2)
         texts.append(f"in {name} {mean} (χ² {chi2} cells; rise, fall: {ends})")
     return f"Mean Δx of these walks over that of the million, less 1, mean over cells: {'; '.join(texts)}.".replace(
         "-", "−"
@@ -153,6 +181,7 @@ def tables(cells: Cells, million: Cells) -> dict[str, str]:
     """The tables of the page by their markers."""
     return {
         "strands": shares(cells),
+        "by bounces": by_bounces(cells),
         "ways with strands": ways(cells),
         "against the million": against_million(cells, million),
     }

@@ -3,6 +3,7 @@
     python -m studies.waves.directions run       # twenty minutes of one core → results/directions.csv
     python -m studies.waves.directions           # that file → the table of the page
     python -m studies.waves.directions impacts   # prints how large fast waves of this length are about a first impact
+    python -m studies.waves.directions given     # prints what else a wave changes of a loop
 
 Links turn by δθ cos(2πmj/n + φ), which bends the loop alike for both directions. Their rates say which way the wave
 runs: a slow one stands in the room, against the motion of the links; a fast one runs with them. φ is drawn.
@@ -42,17 +43,12 @@ VARIANTS: Final = (("none", 0.0), *((way, size) for size in (0.05, 0.15) for way
 def with_wave(
     position: Array, velocity: Array, parameters: warpchain.Parameters, way: str, size: float, phase: float
 ) -> tuple[Array, Array]:
-    """The state (n, 3), (n, 3) of a loop with a wave, whose joints are as open as before; its momenta stay."""
-    links, length = len(position), parameters.link_length
-    inertia = np.tile(
-        [
-            [getattr(parameters, f"{kind}_{name}") for name in ("mass", "mass", "inertia")]
-            for kind in ("inner", "outer")
-        ],
-        (links // 2, 1),
-    )
-    motions, _ = loop_motions(position[None], np.array([length]))
-    speed = wave_motion(motions[:, RUNNING], velocity[None], inertia[None])[0][0, -1]
+    """The state (n, 3), (n, 3) of a loop with a wave, whose joints are as open as before.
+
+    Momentum stays, and angular momentum but for what the bend does to it.
+    """
+    links, length, inertia = len(position), parameters.link_length, inertia_of(len(position), parameters)
+    speed = running(position, velocity, parameters)
     number = max(3, round(links / LENGTH))
     wave = size * np.exp(1j * (2 * np.pi * number * np.arange(links) / links + phase))
     back = 1.0 if way == "slow" else -(number**2 - 3) / (number**2 + 1)
@@ -73,6 +69,21 @@ def with_wave(
     change = np.column_stack([speeds.real, speeds.imag, rate])
     rigid = loop_motions(moved[None], np.array([length]))[0][:, RIGID]
     return moved, velocity + wave_motion(rigid, change[None], inertia[None])[1][0]
+
+
+def inertia_of(links: int, parameters: warpchain.Parameters) -> Array:
+    """Mass, mass and moment of inertia of each link, (n, 3)."""
+    kinds = [
+        [getattr(parameters, f"{kind}_{name}") for name in ("mass", "mass", "inertia")] for kind in ("inner", "outer")
+    ]
+    return np.tile(kinds, (links // 2, 1))
+
+
+def running(position: Array, velocity: Array, parameters: warpchain.Parameters) -> float:
+    """Speed [m/s] with which a loop runs along itself."""
+    motions, _ = loop_motions(position[None], np.array([parameters.link_length]))
+    inertia = inertia_of(len(position), parameters)
+    return float(wave_motion(motions[:, RUNNING], velocity[None], inertia[None])[0][0, -1])
 
 
 def _closing(ends: Callable[[Array], NDArray[np.complex128]], values: Array, angle: Array) -> Array:
@@ -184,12 +195,44 @@ def about_impact(links: int, frequency: float) -> tuple[float, float]:
     return tuple(float(np.sqrt(np.mean(part**2))) for part in (angles[: touches[0]], angles[last + 1 : following]))
 
 
+def given(links: int, frequency: float) -> dict[tuple[str, float], Array]:
+    """What waves of all phases change of a loop, (phases, 4): energy, angular momentum, run [%], lowest joint [mm]."""
+    position, velocity, numbers = released(links, frequency, SEED)
+    parameters = warpchain.Parameters(**dict(zip(PARAMETERS, map(float, numbers), strict=True)))
+    inertia = inertia_of(links, parameters)
+
+    def numbers_of(at: Array, speeds: Array) -> Array:
+        arms = at[:, :2] - np.average(at[:, :2], axis=0, weights=inertia[:, 0])
+        spin = arms[:, 0] * speeds[:, 1] - arms[:, 1] * speeds[:, 0]
+        turning = np.sum(inertia[:, 0] * spin + inertia[:, 2] * speeds[:, 2])
+        half = 0.5 * parameters.link_length * np.sin(at[:, 2])
+        lowest = 1000 * min((at[:, 1] - half).min(), (at[:, 1] + half).min())
+        return np.array([np.sum(inertia * speeds**2), turning, running(at, speeds, parameters), lowest])
+
+    before, found = numbers_of(position, velocity), {}
+    for way, size in VARIANTS[1:]:
+        rows = []
+        for phase in np.linspace(0, 2 * np.pi, 24, endpoint=False):
+            after = numbers_of(*with_wave(position, velocity, parameters, way, size, float(phase)))
+            rows.append([*(100 * (after[:3] / before[:3] - 1)), after[3] - before[3]])
+        found[way, size] = np.array(rows)
+    return found
+
+
 def main(command: Annotated[str, typer.Argument()] = "") -> None:
     """Run the study if told so; write the table of the page."""
     if command == "impacts":
         for links, frequency in CELLS:
             before, after = about_impact(links, frequency)
             print(f"{links} links, {frequency:g} Hz: {before:.4f} rad before the first impact, {after:.4f} after it")
+        return
+    if command == "given":
+        cells = [given(links, frequency) for links, frequency in CELLS]
+        for way, size in VARIANTS[1:]:
+            every = np.concatenate([cell[way, size] for cell in cells])
+            names = ("energy / %", "angular momentum / %", "run / %", "lowest joint / mm")
+            for name, values in zip(names, every.T, strict=True):
+                print(f"{way} {size:g}: {name} {values.mean():+.2f} ({values.min():+.1f} to {values.max():+.1f})")
         return
     if command == "run":
         run()

@@ -18,8 +18,12 @@ LINKS: Final = 120
 FREQUENCIES: Final = (15.0, 20.0, 25.0)
 DIP: Final = 0.008
 INTERVAL: Final = 2.5e-4
-LATER: Final = np.array([0.014, 0.016, 0.018, 0.020, 0.022])
-"""Times after the first touch [s] over which speeds are taken: after the tap, before the sprocket is reached."""
+TOUCHING: Final = 1e-4
+"""Height of the lowest circle above the floor that it touches, at most [m]."""
+LATER: Final = np.arange(0.012, 0.027, 0.001)
+"""Times after the first touch [s]: after the tap, before the sprocket is reached."""
+SPAN: Final = 7
+"""So many of these times next to one another give a speed."""
 
 
 def dipping(frequency: float, clearance: float) -> warpchain.WalkResult:
@@ -40,7 +44,7 @@ def dipping(frequency: float, clearance: float) -> warpchain.WalkResult:
 
 
 def found(frequency: float) -> list[str]:
-    """A row of the table: speeds of what the tap leaves, as means over the time after it."""
+    """A row of the table: where and how fast is what the tap leaves, least and greatest over the time after it."""
     plain, tapped = dipping(frequency, 0.5), dipping(frequency, 0.005)
     parameters, time = plain.setup.parameters, plain.frame_time
     length, masses = parameters.link_length, np.tile([parameters.inner_mass, parameters.outer_mass], LINKS // 2)
@@ -62,19 +66,22 @@ def found(frequency: float) -> list[str]:
         slow.append(np.sum(near * place) / near.sum())
         fast.append(np.interp(0.95, np.cumsum(ahead) / ahead.sum(), place))
         behind.append(np.sum(across[i] ** 2 * ((place < -0.1) & (place > -0.58))) / ahead.sum())
-    speed = float(np.polyfit(LATER, fast, 1)[0])
+    speeds = [np.polyfit(LATER[k : k + SPAN], fast[k : k + SPAN], 1)[0] for k in range(len(LATER) - SPAN + 1)]
+    low, high = min(speeds), max(speeds)
+    touched = tapped.time[(tapped.lowest < TOUCHING) & (tapped.time < first + LATER[0])]
     return [
         f"{frequency:g} Hz",
         f"{run:.2f}",
+        f"{1000 * np.ptp(touched):.0f}",
         f"{100 * min(slow):.1f} to {100 * max(slow):.1f}",
-        f"{speed:.1f} m/s, {speed / run:.2f} v",
+        f"{low:.1f} to {high:.1f} m/s, {low / run:.2f} to {high / run:.2f} v",
         f"{100 * np.mean(behind):.0f} %",
     ]
 
 
 def main() -> None:
     """Print the table."""
-    head = ("", "v / (m/s)", "slow: place / cm", "fast: front", "energy across, on the other side")
+    head = ("", "v / (m/s)", "touch / ms", "slow: place / cm", "fast: front", "energy across, on the other side")
     print(table(head, map(found, FREQUENCIES)))
 
 

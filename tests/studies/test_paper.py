@@ -80,13 +80,13 @@ def test_reduction_finds_what_was_put_in(tmp_path: Path) -> None:
     assert effect.sign.tolist() == [[1, 1], [1, 1]]
 
 
-def test_terms_predict_what_they_have_not_seen() -> None:
-    """A square is not predicted by linear terms; of half noise half of the variance is; noise terms predict nothing."""
+def test_terms_explain_no_more_than_they_can() -> None:
+    """Linear terms do not explain a square, and half of what is half noise; terms of noise explain nothing."""
     random = np.random.default_rng(1)
     x, noise = random.normal(size=(2, 2000))
-    assert further.predicted(x**2, [x]) < 0.02 and further.predicted(x**2, [x, x**2]) > 0.999
-    assert further.predicted(x + noise, [x]) == pytest.approx(0.5, abs=0.05)
-    assert further.predicted(noise, list(random.normal(size=(50, 2000)))) < 0.01
+    assert further.explained(x**2, [x]) < 0.02 and further.explained(x**2, [x, x**2]) > 0.999
+    assert further.explained(x + noise, [x]) == pytest.approx(0.5, abs=0.05)
+    assert further.explained(noise, list(random.normal(size=(50, 2000)))) == pytest.approx(0, abs=0.02)
 
 
 def turning_ellipse(time: float, width: float, height: float, speed: float) -> Any:

@@ -98,6 +98,18 @@ def test_an_early_meeting_is_told_from_what_is_drawn() -> None:
     assert found["held"] == pytest.approx(-0.1, rel=0.03) and found["raw"] < -0.14
 
 
+def test_the_error_of_an_early_meeting_knows_of_unequal_scatter() -> None:
+    """Where the few that met early scatter three times as far as the others, the error is the scatter of the result."""
+    random = np.random.default_rng(2)
+    early, found = np.arange(80) < 12, []
+    for _ in range(300):
+        drawn, phase = random.normal(size=80), random.random(80)
+        dx = 1 + 0.01 * np.where(early, 3.0, 1.0) * random.normal(size=80)
+        found.append([strands._early(dx, early, [drawn, phase])[name] for name in ("held", "held_se")])
+    values, errors = np.array(found).T
+    assert errors.mean() == pytest.approx(values.std(), rel=0.15)
+
+
 def made_cells(exponent: float, power: float, noise: float = 0.0) -> dict[str, np.ndarray]:
     """Cells of the law Δx = n^power F(ν n^exponent), with a curve F that is no power."""
     links, frequency = (axis.ravel() for axis in np.meshgrid(np.arange(30.0, 241, 10), np.arange(3.0, 61, 3)))
