@@ -214,7 +214,7 @@ def _compare(path: str | os.PathLike[str], remedy: str, wanted: str | None) -> N
         return
     if wanted and head != _SIGNATURE and b"warpchain SHA-256: " not in end:
         raise InputError(f"{path}: not an HDF5 file; {wanted}")
-    raise DamagedFileError(f"{path}: damaged or cut short; {remedy} (or of warpchain 0.1, which reads it)")
+    raise DamagedFileError(f"{path}: damaged or cut short; {remedy} (or of an earlier warpchain, which reads it)")
 
 
 def open_regular(path: str | os.PathLike[str]) -> BinaryIO:

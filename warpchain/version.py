@@ -6,7 +6,7 @@ VERSION: Final = "0.2.0.dev0"
 
 NUMERICS_VERSION: Final = 13
 """Raised by every change that changes a number of any walk; shards of two versions never mix."""
-FORMAT_VERSION: Final = 8
+FORMAT_VERSION: Final = 9
 """Of all files of results: sweep.json, shards, merged files and walks."""
 
 
@@ -28,4 +28,4 @@ def version_refusal(found: int, remedy: str) -> str | None:
         return None
     if found > FORMAT_VERSION:
         return f"format version {found}, but this warpchain reads {FORMAT_VERSION}; update warpchain"
-    return f"format version {found} of warpchain 0.1, which reads it; {remedy}"
+    return f"format version {found} of an earlier warpchain, which reads it; {remedy}"
