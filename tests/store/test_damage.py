@@ -110,7 +110,7 @@ def test_files_of_other_versions_are_refused(tmp_path: Path, version: int, monke
     with pytest.raises(InputError, match="update warpchain$" if newer else "of an earlier warpchain, which reads it"):
         load_walk(path)
     path.write_bytes(b"\x89HDF\r\n\x1a\n" + b"x" * 900 + _OLDER)
-    with pytest.raises(InputError, match=f"^{path}: damaged .* run the walk again.* of an earlier warpchain, which reads it"):
+    with pytest.raises(InputError, match=f"^{path}: damaged .* earlier warpchain, which reads it"):
         load_walk(path)
 
 
