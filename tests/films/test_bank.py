@@ -126,7 +126,7 @@ def test_films_that_are_not_the_bank_s_are_refused() -> None:
     """Another experiment, more films than repetitions, none, and a bank too small to hold chains out."""
     bank = made_bank(160, seed=1)
     (film,) = films_of(bank, 0, 1, CAMERA, 0)
-    for wrong in ([dataclasses.replace(film, frequency=21.0)], [film] * 5, []):
+    for wrong in ([dataclasses.replace(film, frequency=20.5)], [film] * 5, []):
         with pytest.raises(
             InputError, match=r"films: they are not .*; give 1 to 4 of each of 60 links at 20 Hz, and a bank"
         ):

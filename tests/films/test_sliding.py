@@ -46,6 +46,7 @@ def test_slow_loops_are_known_less() -> None:
         ({"center": EXACT.center * [-1, 1]}, films.Camera(), r"direction: .* backwards; give the other direction"),
         ({"speed": 754.0, "outline": None}, films.Camera(), r"speed/\(2πf\) 6 m do not fit; check direction, origin"),
         ({"frequency": 5.0}, films.Camera(), r"speed/\(2πf\) 0\.239 m do not fit; .* frequency"),
+        ({"speed": 0.9 * EXACT.speed}, films.Camera(), r"0\.0538 m do not fit"),
         ({"outline": EXACT.outline[[0, 2, 1, 3]]}, films.Camera(), r"outline \[-0\.06, 0\.014, 0\.06, 0\.35\]"),
         ({"outline": EXACT.outline[[1, 0, 2, 3]]}, films.Camera(), "do not fit"),
         ({"outline": EXACT.outline[[0, 1, 3, 2]]}, films.Camera(), "do not fit"),

@@ -122,7 +122,8 @@ class Film:
         fits = 0.01 < radius < 0.5
         if box:  # the loop hangs on the sprocket, above the floor
             left, right, low, high = box
-            fits = left < min(x, 0) <= max(x, 0) < right and 0 < low < y < high and 0.8 < radius / right < 1.25
+            most = 3 * (camera.origin + camera.outline) + (0.03 + 3 * camera.speed) * right
+            fits = left < min(x, 0) <= max(x, 0) < right and 0 < low < y < high and abs(radius - right) < most
         if not fits:
             seen = f"center {x:.3g}, {y:.3g}, outline {box}, speed/(2πf) {radius:.3g} m"
             raise InputError(f"film: {seen} do not fit; check {SUSPECTS}")

@@ -73,8 +73,7 @@ def read(
     time, x, y = np.array(rows).reshape(-1, 3).T
     if len(time) < 20 or np.any(np.diff(time) <= 0):
         raise InputError(f"{path}: {len(time)} frames; give at least 20, in order of time")
-    if fps is not None:
-        time = np.round((time - time[0]) / np.median(np.diff(time))) / fps
+    time = time if fps is None else np.round((time - time[0]) / np.median(np.diff(time))) / fps
     sign, order = (1, [0, 1, 2, 3]) if direction == "right" else (-1, [1, 0, 2, 3])
     scale = UNITS[units.pop()] * np.array([sign, 1])
     center = (np.column_stack([x, y]) - origin) * scale
