@@ -107,18 +107,18 @@ def test_errors_are_those_of_chains_alike() -> None:
 
 
 @pytest.mark.parametrize(
-    ("friction", "lower", "wrong"),
+    ("friction", "higher", "wrong"),
     [
-        (0.38, 0.0, r"floor_friction 0\.3\d* is at the edge; .* a bank about it"),
-        (0.27, 0.03, r".* times as far off as its furthest chain; check unit, floor"),
+        (0.38, 0.0, r"floor_friction: 0\.3\d*, in the bank 0\.27 ± 0\.05"),
+        (0.27, 0.03, r"(\w+: \S+, in the bank \S+ ± \S+\s?){3}"),
     ],
 )
-def test_an_answer_outside_of_the_bank_is_refused(friction: float, lower: float, wrong: str) -> None:
+def test_an_answer_outside_of_the_bank_is_refused(friction: float, higher: float, wrong: str) -> None:
     """Friction 2.2 standard deviations off the middle, where few chains are; an outline that no chain has."""
     exact = motion(friction)
-    exact = dataclasses.replace(exact, outline=exact.outline - np.array([0, 0, lower, 0]))
+    exact = dataclasses.replace(exact, outline=exact.outline + np.array([0, 0, 0, higher]))
     film = exact.seen(CAMERA, np.zeros(8), np.random.default_rng(0))
-    with pytest.raises(InputError, match=f"outside of the bank, {wrong}"):
+    with pytest.raises(InputError, match=f"; check direction, .*; if right, give one about these values\n{wrong}$"):
         made_bank(160, seed=1).posterior([film])
 
 
@@ -126,10 +126,12 @@ def test_films_that_are_not_the_bank_s_are_refused() -> None:
     """Another experiment, more films than repetitions, none, and a bank too small to hold chains out."""
     bank = made_bank(160, seed=1)
     (film,) = films_of(bank, 0, 1, CAMERA, 0)
-    for wrong in ([dataclasses.replace(film, frequency=15.0)], [film] * 5, []):
-        with pytest.raises(InputError, match=r"films: they are not .*; give 1 to 4 of each of 60 links at 20 Hz$"):
+    for wrong in ([dataclasses.replace(film, frequency=20.5)], [film] * 5, []):
+        with pytest.raises(
+            InputError, match=r"films: they are not .*; give 1 to 4 of each of 60 links at 20 Hz, and a bank"
+        ):
             bank.posterior(wrong)
-    with pytest.raises(InputError, match="32 chains or more in the bank"):
+    with pytest.raises(InputError, match="a bank of 32 chains or more"):
         made_bank(20, seed=1).posterior([film])
 
 

@@ -33,12 +33,13 @@ def write(folder: Path, text: str) -> Path:
         TRACKER.format(table(FILM.time, FILM.center) + "\n9.0\t\t\n"),
         "t;x;y\n" + table(FILM.time, FILM.center, ";").replace(".", ","),
         "frame,t,x,y\n" + "\n".join(f"7,{line}" for line in table(FILM.time, FILM.center, ",").splitlines()),
-        '"t (s)" "x (mm)" "y (mm)"\n'.replace(" (", "(") + table(FILM.time, FILM.center, " "),
+        '"t (s)" "x (mm)" "y (mm)"\n'.replace(" (", "(") + table(FILM.time, 1e3 * FILM.center, " "),
+        "t (s);x [cm];y [cm];v_x (m/s)\n" + table(FILM.time, 1e2 * FILM.center, ";"),
         "\ufeffy,x,t\n" + table(FILM.center[:, 1], np.column_stack([FILM.center[:, 0], FILM.time]), ","),
     ],
 )
 def test_tables_of_many_programs_are_read(text: str, tmp_path: Path) -> None:
-    """Tabs, semicolons and commas, decimal commas, further columns, another order, marks that were left out."""
+    """Tabs, semicolons, commas, decimal commas, units in heads, further columns, another order, marks left out."""
     film = films.read(write(tmp_path, text), links=60, frequency=20.0, release=0.0)
     assert film.time == pytest.approx(FILM.time, abs=1e-8) and film.center == pytest.approx(FILM.center, abs=1e-8)
 
@@ -93,9 +94,16 @@ def test_what_is_no_film_is_refused(text: str, wrong: str, tmp_path: Path) -> No
 
 
 def test_an_unknown_unit_or_a_missing_file_is_refused(tmp_path: Path) -> None:
-    """Units are m, cm and mm."""
+    """Units are m, cm and mm, and not others than the heads'; in m, places in cm leave too short a film."""
     with pytest.raises(InputError, match="unit: 'inch'"):
         films.read(tmp_path / "film.txt", links=60, frequency=20.0, unit="inch")  # type: ignore[arg-type]
+    path = write(tmp_path, "t (s);x (cm);y (cm)\n" + table(FILM.time, 100 * FILM.center, ";"))
+    with pytest.raises(InputError, match=r"unit: heads of .* and unit say cm and m; correct one"):
+        films.read(path, links=60, frequency=20.0, unit="m")
+    path.write_text(path.read_text(encoding="utf-8").replace(" (cm)", ""), encoding="utf-8")
+    with pytest.raises(InputError, match=r"film: it shows .* check unit, fps, or give release"):
+        films.friction_line(films.read(path, links=60, frequency=20.0))
+    path.unlink()
     with pytest.raises(OSError, match=r"film\.txt"):
         films.read(tmp_path / "film.txt", links=60, frequency=20.0)
 

@@ -47,11 +47,11 @@ def test_walks_that_ended_as_planned_are_no_failures(tmp_path: Path, capsys: pyt
     assert document.texts["failed-walks"].strip().endswith("None.")
     head, *rows = document.rows["cells"]
     assert [dict(zip(head, row, strict=True))["failed"] for row in rows] == ["0", "0"]
-    assert [dict(zip(head, row, strict=True))["no Δx"] for row in rows] == ["1", "1"]
+    assert [dict(zip(head, row, strict=True))["ended as asked"] for row in rows] == ["1", "1"]
     with pytest.raises(SystemExit) as end:
         main(["info", str(directory)])
     assert not end.value.code
-    assert "no Δx" in capsys.readouterr().out
+    assert "ended as asked" in capsys.readouterr().out
     with pytest.raises(InputError, match="no walk has this quantity; give another, such as quantity='walk_time'"):
         load(directory).plot()
 

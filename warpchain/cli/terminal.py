@@ -59,7 +59,7 @@ def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None)
         whole |= {"inaccurate": result.inaccurate_count, "rate": rate, "time_left": time_left, "blocks": blocks}
         print(json.dumps(json_value(whole), indent=2, allow_nan=False))
         return
-    counts = ", ".join(f"{count:,} {label}" for label, count in summary.items() if count or label == "at_rest")
+    counts = ", ".join(f"{count:,} {label}" for label, count in summary.items() if count)
     print(f"{printable(result.name)}: {result.walk_count:,} walks, {counts}")
     for remedy_of_fault, number in fault_remedies(block.faults for block in result.blocks.values()).items():
         print(f"{number:,} inaccurate: {remedy_of_fault}")
@@ -68,7 +68,7 @@ def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None)
         print(f"running: {rate:.2f} walks a second{left}")
     room = _MOST_CELLS
     for name, cells in statistics.items():
-        numbers = {"at rest": cells.count} | ({"no Δx": cells.absent} if cells.absent.any() else {})
+        numbers = {"at rest": cells.count} | ({"ended as asked": cells.absent} if cells.absent.any() else {})
         numbers |= {"failed": cells.failed, "missing": cells.missing}
         rows = []
         for place in itertools.islice(np.ndindex(*cells.mean.shape), room):

@@ -16,7 +16,7 @@ from typing import Final, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.films.film import CAREFUL, CLOCK, Array, Camera, Film, edges, summary
+from warpchain.films.film import CAREFUL, CLOCK, SUSPECTS, Array, Camera, Film, edges, summary
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import InputError
 from warpchain.store.block_result import BlockResult
@@ -108,8 +108,7 @@ class Bank:
         """The parameters of the chain in some films, and how well they would be known of chains of the bank.
 
         Args:
-            films: one or more, of any experiments of the bank, at most as many of each as the bank has repetitions.
-                Outline and speed count if all of them have these.
+            films: of the bank's experiments, of each at most its repetitions; outline and speed count if all have them.
             camera: of all films.
 
         Raises:
@@ -122,23 +121,21 @@ class Bank:
         counts, most = [len(group) for group in groups.values()], len(self.films[0][0])
         if not counts or max(counts) > most or set(groups) - set(self.experiments) or len(self.values) < 4 * FOLDS:
             known = ", ".join(f"{n} links at {f:g} Hz" for n, f in self.experiments)
-            few = f", {4 * FOLDS} chains or more in the bank" if len(self.values) < 4 * FOLDS else ""
-            raise InputError(f"films: they are not those of the bank; give 1 to {most} of each of {known}{few}")
+            enough = f"1 to {most} of each of {known}, and a bank of {4 * FOLDS} chains or more"
+            raise InputError(f"films: they are not those of the bank; give {enough}")
         design = tuple((self.experiments.index(one), len(group)) for one, group in groups.items())
         has = all(film.outline is not None for film in films), all(film.speed is not None for film in films)
         trained = _trained(self, design, has, camera)
         found, distances = _regression(trained.rows, trained.values, _features(groups.values(), *has)[None])
         found, distance = _chosen(found, trained.penalties), distances[trained.penalties.min(), 0] / trained.furthest
         sigma, prior, residuals = _widths(trained, found)[0], self.values.std(axis=0), trained.residuals
-        mean = self.values.mean(axis=0) + prior * found[0]
+        mean = (middle := self.values.mean(axis=0)) + prior * found[0]
         scale = prior * sigma / np.sqrt(np.mean(residuals**2, axis=0))
         edge = np.abs(found[0]) > np.where(sigma < IDENTIFIED, EDGE, EDGE + 1)
         if distance > 1 or edge.any():
-            thin = " and ".join(f"{self.names[k]} {mean[k]:.3g}" for k in np.flatnonzero(edge))
-            where = f"{thin} is at the edge" if thin else f"{distance:.2g} times as far off as its furthest chain"
-            raise InputError(
-                f"films: outside of the bank, {where}; check unit, floor, release, or give a bank about it"
-            )
+            numbers = zip(self.names, mean, middle, prior, edge | ~edge.any(), strict=True)
+            off = [f"{name}: {x:.3g}, in the bank {m:.2g} ± {s:.2g}" for name, x, m, s, shown in numbers if shown]
+            raise InputError(f"films: unlike the bank; check {SUSPECTS}; if right, give one about these values", *off)
         return Posterior(
             names=self.names,
             mean=mean,

@@ -17,6 +17,7 @@ BEFORE: Final = 0.1
 """Time before the release that a film shows [s]."""
 CLOCK: Final = np.arange(0.02, 0.361, 0.02)
 """Times since the release [s] at which films are compared, each a mean over 20 ms."""
+SUSPECTS: Final = "direction, origin, outline, speed (m/s), frequency, unit and release"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,10 +100,10 @@ class Film:
         return float(np.sqrt(self.center[self.time < 0].var(axis=0, ddof=1).mean()))
 
     def check(self, camera: Camera) -> None:
-        """Refuse a film that is too short, or not as the camera says."""
+        """Refuse a film that is too short, not as the camera says, goes backwards, or contradicts itself."""
         first, last, rate = self.time[0], self.time[-1], 1 / float(np.median(np.diff(self.time)))
         if first > 0.02 - BEFORE or last < CLOCK[-1] + 0.01:
-            needed = f"−{BEFORE:g} to {CLOCK[-1] + 0.02:g} s"
+            needed = f"−{BEFORE:g} to {CLOCK[-1] + 0.02:g} s; if the film has them, check unit, fps, or give release"
             raise InputError(f"film: it shows {first:.3f} to {last:.3f} s after the release; give {needed}")
         if abs(rate / camera.fps - 1) > 0.05:
             wrong = f"{camera.fps:g}, but the film has {rate:.4g} frames a second"
@@ -110,10 +111,22 @@ class Film:
         if self.noise > 1.5 * camera.noise:
             wrong = f"{camera.noise} m, but before the release the film scatters by {self.noise:.2g} m"
             raise InputError(f"camera.noise: {wrong}; give that, or check unit and release")
-        near, y = (self.time > 0.02) & (self.time < 0.03), self.center[:, 1] - self.center[self.time < 0, 1].mean()
-        off = (y + GRAVITY * self.time**2 / 2)[near]
+        near, (x, y) = (self.time > 0.02) & (self.time < 0.03), self.center[self.time < 0].mean(axis=0)
+        off = (self.center[:, 1] - y + GRAVITY * self.time**2 / 2)[near]
         if not near.any() or abs(off.mean()) > 5e-4 + 3 * np.hypot(0.03 * GRAVITY * camera.release, camera.noise):
             raise InputError("film: 20 to 30 ms after the release nothing falls freely; check unit, fps and release")
+        if (way := self.center[self.time < CLOCK[-1]][-1, 0] - x) < -5e-3 - 3 * camera.noise:
+            raise InputError(f"direction: the chain goes {-way:.3f} m backwards; give the other direction")
+        box = [] if self.outline is None else self.outline.round(4).tolist()
+        radius = self.speed / (2 * np.pi * self.frequency) if self.speed else box[1] if box else 0.06
+        fits = 0.01 < radius < 0.5
+        if box:  # the loop hangs on the sprocket, above the floor
+            left, right, low, high = box
+            most = 3 * (camera.origin + camera.outline) + (0.03 + 3 * camera.speed) * right
+            fits = left < min(x, 0) <= max(x, 0) < right and 0 < low < y < high and abs(radius - right) < most
+        if not fits:
+            seen = f"center {x:.3g}, {y:.3g}, outline {box}, speed/(2πf) {radius:.3g} m"
+            raise InputError(f"film: {seen} do not fit; check {SUSPECTS}")
 
 
 def film_of(walk: WalkResult, camera: Camera | None = CAREFUL, seed: int = 0) -> Film:
@@ -138,10 +151,7 @@ def edges(joints: Array) -> Array:
 
 
 def summary(film: Film, outline: bool, speed: bool) -> Array:
-    """What films are compared by.
-
-    Place before the release, way since then on `CLOCK`, slopes of the friction line, and outline and speed if wanted.
-    """
+    """What films are compared by: place before the release, way since then, friction line, outline, speed."""
     start = film.center[film.time < 0].mean(axis=0)
     fine = np.add.outer(CLOCK, np.arange(-0.0095, 0.01, 1e-3))
     x, y = (np.interp(fine, film.time, film.center[:, k]).mean(axis=1) - start[k] for k in (0, 1))

@@ -6,7 +6,6 @@ from typing import Final
 import numpy as np
 
 from warpchain.films.film import CAREFUL, CLOCK, GRAVITY, Array, Camera, Film
-from warpchain.inputs.validation import InputError
 
 RELEASE_SPEED: Final = 2e-3
 """Standard deviation of either speed of the centre of mass at the release [m/s]: links pass the sprocket one by one."""
@@ -70,8 +69,6 @@ def friction_line(film: Film, camera: Camera = CAREFUL) -> FrictionLine:
         covariance = np.linalg.inv(matrix.T @ matrix + np.diag(prior**-2.0))
         found = covariance @ (matrix.T @ np.concatenate([lift[falls], x[slides] / size])) / noise
         friction = float(found[0])
-    if friction < -3 * covariance[0, 0] ** 0.5:
-        raise InputError(f"direction: the chain goes backwards, friction {friction:.2f}; give the other direction")
     sticks = STICKS * np.clip((friction / speed - 0.05) / 0.04, 0, 1)
     after = film.time > 0
     return FrictionLine(

@@ -19,7 +19,7 @@ def read(
     *,
     links: int,
     frequency: float,
-    unit: Literal["m", "cm", "mm"] = "m",
+    unit: Literal["m", "cm", "mm"] | None = None,
     direction: Literal["right", "left"] = "right",
     origin: tuple[float, float] = (0.0, 0.0),
     fps: float | None = None,
@@ -29,32 +29,35 @@ def read(
 ) -> Film:
     """Read a film: a text table with columns t, x and y of the centre of mass, as Tracker exports it.
 
-    Lines above the heads of the columns, units in heads, and other columns are passed over. Columns are parted by
+    Lines above the heads of the columns, and other columns, are passed over. Columns are parted by
     tabs, semicolons, commas or spaces; a comma that does not part them is a decimal point.
 
     Args:
         path: the file.
         links: number of links.
         frequency: of the sprocket [Hz].
-        unit: of lengths in the file, and of `origin` and `outline`.
+        unit: of lengths in the file, and of `origin` and `outline`; None: that of heads such as `x (cm)`, else m.
         direction: to which side the chain walks in the picture.
         origin: x of the sprocket's axis and y of the floor in the file.
         fps: true frames a second, if the times of the file are those of slow motion.
         release: time of the release in the file, with `fps` since the first frame [s]; None: it is fitted to the fall.
-        outline: leftmost, rightmost x, lowest and highest y of joints at the release, as in the file; None: unknown.
+        outline: left and rightmost x, lowest and highest y of joints before the release, as seen; None: unknown.
         speed: of the loop before the release [m/s], such as n ℓ over the period of a painted link; None: unknown.
 
     Raises:
         OSError: the file cannot be read.
         InputError: it has no such columns, or a line that is not numbers.
     """
-    if unit not in UNITS or direction not in ("right", "left"):
+    if unit not in (None, *UNITS) or direction not in ("right", "left"):
         raise InputError(f"unit: {shown(unit)}, direction: {shown(direction)}; give m, cm or mm, and right or left")
     lines = [_cells(line) for line in Path(path).read_text(encoding="utf-8-sig", errors="replace").splitlines()]
     heads = [[re.sub(r"[\s(\[].*", "", cell) for cell in cells] for cells in lines]  # without units
     first = next((number for number, names in enumerate(heads) if {"t", "x", "y"} <= set(names)), None)
     if first is None:
         raise InputError(f"{path}: no line with the column heads t, x and y; export these of the centre of mass")
+    units = {*re.findall(r"\b[xy][^\w;]+([cm]?m)\b", ";".join(lines[first])), *([unit] if unit else [])} or {"m"}
+    if len(units) > 1:
+        raise InputError(f"unit: heads of {path} and unit say {' and '.join(sorted(units))}; correct one of them")
     names, rows = heads[first], []
     if names.count("x") > 1:
         raise InputError(f"{path}: several columns x; export one track, the centre of mass")
@@ -70,18 +73,11 @@ def read(
     time, x, y = np.array(rows).reshape(-1, 3).T
     if len(time) < 20 or np.any(np.diff(time) <= 0):
         raise InputError(f"{path}: {len(time)} frames; give at least 20, in order of time")
-    if fps is not None:
-        time = np.round((time - time[0]) / np.median(np.diff(time))) / fps
-    sign, length = 1 if direction == "right" else -1, UNITS[unit]
-
-    def metres(places: Array) -> Array:
-        return (places - origin) * [sign * length, length]
-
-    edges = None
-    if outline is not None:
-        (left, right), (low, high) = metres(np.reshape(outline, (2, 2)).T).T
-        edges = np.array([min(left, right), max(left, right), low, high])
-    center = metres(np.column_stack([x, y]))
+    time = time if fps is None else np.round((time - time[0]) / np.median(np.diff(time))) / fps
+    sign, order = (1, [0, 1, 2, 3]) if direction == "right" else (-1, [1, 0, 2, 3])
+    scale = UNITS[units.pop()] * np.array([sign, 1])
+    center = (np.column_stack([x, y]) - origin) * scale
+    edges = None if outline is None else (np.reshape(outline, 4)[order] - np.repeat(origin, 2)) * np.repeat(scale, 2)
     release = _fitted_release(time, center[:, 1]) if release is None else release
     return Film(time=time - release, center=center, links=links, frequency=frequency, outline=edges, speed=speed)
 

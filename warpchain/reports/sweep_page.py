@@ -122,7 +122,7 @@ def _cells(result: SweepResult) -> str:
         head = [with_unit(axis_symbol(name), unit_text(name)) for name in block.axes]
         lengths = {"mean Δx / m": found.mean, "s.d. / m": found.sd, "s.e. / m": found.standard_error}
         counts = {"at rest": found.count, "failed": found.failed}
-        counts |= {"no Δx": found.absent} if found.absent.any() else {}
+        counts |= {"ended as asked": found.absent} if found.absent.any() else {}
         counts |= {"not run yet": found.missing} if found.missing.any() else {}
         rows = [
             [
