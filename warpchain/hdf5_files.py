@@ -174,7 +174,7 @@ def reading_hdf5(
     Raises:
         OSError: it cannot be read.
         InputError: it is no regular file, of another kind or of another version.
-        DamagedFileError: it is damaged or cut short.
+        DamagedFileError: it is damaged, cut short or of an earlier warpchain.
     """
     import h5py
 
@@ -214,7 +214,7 @@ def _compare(path: str | os.PathLike[str], remedy: str, wanted: str | None) -> N
         return
     if wanted and head != _SIGNATURE and b"warpchain SHA-256: " not in end:
         raise InputError(f"{path}: not an HDF5 file; {wanted}")
-    raise DamagedFileError(f"{path}: damaged or cut short; {remedy} (or of an earlier warpchain, which reads it)")
+    raise DamagedFileError(f"{path}: damaged, cut short or of an earlier warpchain; {remedy}")
 
 
 def open_regular(path: str | os.PathLike[str]) -> BinaryIO:

@@ -137,7 +137,9 @@ def test_damage_to_a_motion_is_seen(kept: Path, tmp_path: Path) -> None:
     assert content.count(wanted) == 1
     content[content.index(wanted) + 11] ^= 4
     path.write_bytes(content)
-    with pytest.raises(InputError, match=f"{path}: damaged or cut short; delete it and run the sweep again"):
+    with pytest.raises(
+        InputError, match=f"{path}: damaged, cut short or of an earlier warpchain; delete it and run the sweep again"
+    ):
         result.series(links=30, frequency=5, sample=3)
     with pytest.warns(InputWarning, match=f"{path}: .*; its walks are computed again"):
         sweep(KEPT, tmp_path)

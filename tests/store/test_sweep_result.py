@@ -179,7 +179,7 @@ def test_no_sweep_no_result(tmp_path: Path, single: Path) -> None:
     run(tmp_path)
     path = tmp_path / "shards/0-000001.h5"
     path.write_bytes(path.read_bytes()[:-1])
-    with pytest.raises(InputError, match=f"{path}: damaged or cut short; delete it"):
+    with pytest.raises(InputError, match=f"{path}: damaged, cut short or of an earlier warpchain; delete it"):
         load(tmp_path)
 
 

@@ -397,7 +397,7 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
     Raises:
         OSError: the file cannot be read.
         InputError: the file is no walk, or belongs to another version of warpchain. It is a `ValueError`.
-        DamagedFileError: the file is damaged or cut short. It is an `InputError`.
+        DamagedFileError: the file is damaged, cut short or of an earlier warpchain. It is an `InputError`.
     """
     if os.path.isdir(path):
         record = os.path.join(path, "walk.h5")
