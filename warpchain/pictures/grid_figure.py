@@ -132,7 +132,8 @@ def draw_grid(
             means = np.concatenate([each.cells.mean.ravel() for each in panels if each.kind == "map"])
             image = _draw_map(axes, panel, (np.nanmin(means), np.nanmax(means)))
         note = lost_note([vars(panel.cells)])
-        axes.set_xlabel(f"{quantity_label(panel.across.name)}\n{note}".strip())
+        below = quantity_label(panel.across.name) if not alike or axes in areas[-columns:] else ""
+        axes.set_xlabel(f"{below}\n{note}".strip())
         if not (alike or are_lines) or axes in areas[::columns]:
             axes.set_ylabel(quantity_label(panel.along.name) if panel.kind == "map" and panel.along else label)
     if owner is not None and left_out:
@@ -171,7 +172,7 @@ def _all_panels(blocks: "Mapping[str, CellStatistics]", kind: Kind | None, x: st
         if any(panel.cells.absent.any() for panel in panels):
             raise NothingToShow("no walk has this quantity; give another, such as quantity='walk_time'")
         raise NothingToShow("no walk has come to rest; let the sweep go on, or see the statuses in summary()")
-    return panels, left_out
+    return [each for each in panels if np.isfinite(each.cells.mean).any() or each.cells.failed.any()], left_out
 
 
 def _panels(cells: "CellStatistics", kind: Kind | None, x: str | None, block: str) -> Iterator[Panel]:
