@@ -63,6 +63,8 @@ def test_a_wave_runs_its_way(way: str, slope: float) -> None:
 @pytest.mark.slow
 def test_a_tap_on_the_sprocket_starts_two_waves() -> None:
     """The bend stays near the bottom, the front of the velocity runs at nearly twice the speed of the links."""
-    _, run, slow, fast, behind = sprocket_tap.found(20.0)
-    assert float(run) == pytest.approx(7.5, rel=0.02) and all(4 < float(cm) < 8 for cm in slow.split(" to "))
-    assert 1.6 < float(fast.split()[2]) < 2.1 and float(behind.split()[0]) < 20
+    _, run, touch, slow, fast, behind = sprocket_tap.found(20.0)
+    near, far = map(float, slow.split(" to "))
+    assert float(run) == pytest.approx(7.5, rel=0.02) and 3 < near < far < near + 2.5
+    least, greatest = (float(fast.split()[k]) for k in (4, 6))  # over windows of the time after it, in speeds of links
+    assert 1.2 < least < greatest < 2.1 and greatest > 1.6 and float(behind.split()[0]) < 20 and 4 <= float(touch) <= 10

@@ -1,7 +1,13 @@
-"""Ctrl-C ends a command, also where a library makes an error of its own of the exception."""
+"""Ctrl-C ends a command at any moment, also where Python loses the exception that it makes.
 
+Python drops a KeyboardInterrupt that is raised in a callback of its own, such as that of a weak reference or a
+`__del__`: it prints "Exception ignored in" and goes on. Libraries may also turn it into an error of theirs.
+"""
+
+import _thread
 import contextlib
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from types import FrameType
@@ -10,25 +16,45 @@ from typing import Final
 INTERRUPTED: Final = 130
 """Exit status of a command that Ctrl-C ended."""
 
+AGAIN: Final = 0.05
+"""Time [s] until an interrupt that was lost is raised once more."""
+
 
 @contextlib.contextmanager
 def interrupts_heard() -> Iterator[Callable[[], bool]]:
-    """Yield a function that tells whether there was an interrupt; others than Python's own handler stay in charge."""
-    heard = threading.Event()
-    usual = signal.getsignal(signal.SIGINT)
+    """Raise `KeyboardInterrupt` until it is not lost; yield a function that tells whether there was an interrupt.
+
+    Outside of the main thread, and where somebody else handles or ignores the signal, nothing is changed.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield lambda: False
+        return
+    usual_handler, usual_hook = signal.getsignal(signal.SIGINT), sys.unraisablehook
+    if usual_handler is not signal.default_int_handler:
+        yield lambda: False
+        return
+    heard = False
 
     def handle(number: int, frame: FrameType | None) -> None:
-        heard.set()
+        nonlocal heard
+        heard = True
         raise KeyboardInterrupt
 
-    if threading.current_thread() is not threading.main_thread() or usual is not signal.default_int_handler:
-        yield heard.is_set
-        return
+    def hook(lost: "sys.UnraisableHookArgs", /) -> None:
+        if not issubclass(lost.exc_type, KeyboardInterrupt):
+            usual_hook(lost)
+            return
+        again = threading.Timer(AGAIN, _thread.interrupt_main)  # not in here, where it would be lost again
+        again.daemon = True
+        again.start()
+
+    sys.unraisablehook = hook
     signal.signal(signal.SIGINT, handle)
     try:
-        yield heard.is_set
+        yield lambda: heard
     finally:
-        signal.signal(signal.SIGINT, usual)
+        signal.signal(signal.SIGINT, usual_handler)
+        sys.unraisablehook = usual_hook
 
 
 def ignore_interrupts() -> None:
