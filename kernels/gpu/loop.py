@@ -84,8 +84,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     exchange_ends, stage = block_stage(block_dim, tilts)
     greatest, _write, _read = block_maxima(block_dim)
     maxima_address = tile_address(vec4i, block_dim)
-    proximity_functions = block_proximity(features, block_dim)
-    write_proximity, read_proximity = proximity_functions[:2]
+    write_proximity, read_proximity, _ = block_proximity(features, block_dim)
     attempt = explicit_attempt(method.tableau, block_dim, write_proximity, read_proximity, tilts)
     plane = block_tilting(block_dim) if tilts else block_upright(features.fixed_body)
     begin_step, end_step, after_first_stage = plane.begin_step, plane.end_step, plane.after_first_stage
@@ -211,10 +210,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         barrier()
         while status == RUNNING and attempts < attempts_left:
             if time >= K[wp.static(layout.BOARD_VALUES), layout.VALUE_NEXT_SAMPLE]:
-                changed, pauses, sampled = take_sample(
-                    K, T, P, model, drive, state, record, control, place, world, time
-                )
-                status = sampled
+                changed, pauses, status = take_sample(K, T, P, model, drive, state, record, control, place, world, time)
                 if changed:
                     next_end = exchange_ends(ends, place, read_link(K, lane))
                     evaluate_first_stage(forces, K, place, next_end)
@@ -250,20 +246,15 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 if lane == 0:
                     raise_value(K, layout.VALUE_OPENING, proximity.opening)
                 end_step(K, P, M, place, h)
-                is_hit, listed, bound, met = meet(
+                is_hit, pairs, reach, status = meet(
                     K, L, T, E, F, P, M, drive, state, control, place, ground, world, time, proximity, pairs
                 )
-                pairs = listed
-                reach = bound
-                status = met
                 if is_hit or wp.static(not reuses_last):
                     if is_hit:
                         next_end = exchange_ends(ends, place, read_link(K, lane))
                     evaluate_first_stage(forces, K, place, next_end)
             else:
-                shorter, state_after = reject(errors, K, control, place, h, error)
-                step = shorter
-                status = state_after
+                step, status = reject(errors, K, control, place, h, error)
         if status == RUNNING and attempts_made(state, world) + wp.int64(attempts) >= control.step_limit:
             status = int(STEP_LIMIT)
         store_run(K, T, P, model, state, record, scratch, control, place, world, time, status, accepted, attempts)

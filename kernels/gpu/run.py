@@ -175,37 +175,6 @@ def block_sample(features: Features, touch: TouchLayout, plane: BlockPlane):
     store_plane = plane.store
 
     @wp.func
-    def take_by_one(
-        K: Rows,
-        T: Integers,
-        model: Model,
-        drive: Drive,
-        state: State,
-        record: Record,
-        control: Control,
-        world: int,
-        time: wp.float64,
-    ):
-        """The first thread's part. The status goes to the mailbox; ``is_late``: the launch has lasted long enough."""
-        softness = state.softness[world]
-        load_factor = state.load_factor[world]
-        chain = present(model, state, control, world)
-        touches = state.counts[world, SELF_IMPULSES] + wp.int64(T[wp.static(touch.self_hits)])
-        meetings = state.counts[world, STRAND_IMPULSES] + wp.int64(T[wp.static(touch.strand_hits)])
-        last_impulse = K[BOARD_VALUES, VALUE_LAST_IMPULSE]
-        T[wp.static(touch.mailbox)] = sample(
-            K, chain, drive, state, record, control, world, time, touches, meetings, last_impulse
-        )
-        if has_changed(state, world, softness, load_factor):
-            after = present(model, state, control, world)
-            book_softening(chain, after, state, world)
-            write_constants(K, after)
-        write_step_bounds(K, drive, state, control, world, wp.static(is_driven))
-        write_marks(K, state, control, world)
-        if clock() > K[BOARD_VALUES, VALUE_DEADLINE]:
-            T[wp.static(touch.is_late)] = 1
-
-    @wp.func
     def take_sample(
         K: Rows,
         T: Integers,
@@ -225,14 +194,28 @@ def block_sample(features: Features, touch: TouchLayout, plane: BlockPlane):
         barrier()
         if place.lane == 0:
             store_plane(P, state, world)
-            take_by_one(K, T, model, drive, state, record, control, world, time)
+            chain = present(model, state, control, world)
+            touches = state.counts[world, SELF_IMPULSES] + wp.int64(T[wp.static(touch.self_hits)])
+            meetings = state.counts[world, STRAND_IMPULSES] + wp.int64(T[wp.static(touch.strand_hits)])
+            last_impulse = K[BOARD_VALUES, VALUE_LAST_IMPULSE]
+            T[wp.static(touch.mailbox)] = sample(
+                K, chain, drive, state, record, control, world, time, touches, meetings, last_impulse
+            )
+            if has_changed(state, world, softness, load_factor):
+                after = present(model, state, control, world)
+                book_softening(chain, after, state, world)
+                write_constants(K, after)
+            write_step_bounds(K, drive, state, control, world, wp.static(is_driven))
+            write_marks(K, state, control, world)
+            if clock() > K[BOARD_VALUES, VALUE_DEADLINE]:
+                T[wp.static(touch.is_late)] = 1
         barrier()
         status = T[wp.static(touch.mailbox)]
         pauses = record_is_full(record, world) or T[wp.static(touch.is_late)] != 0
         barrier()
         changed = has_changed(state, world, softness, load_factor)
-        if changed:
-            if wp.static(is_driven) and place.lane < place.links:
+        if wp.static(is_driven):
+            if changed and place.lane < place.links:
                 write_link(K, model, world, place.lane, state.load_factor[world])
         return changed, pauses, status
 

@@ -132,8 +132,8 @@ def draw_grid(
             means = np.concatenate([each.cells.mean.ravel() for each in panels if each.kind == "map"])
             image = _draw_map(axes, panel, (np.nanmin(means), np.nanmax(means)))
         note = lost_note([vars(panel.cells)])
-        below = quantity_label(panel.across.name) if not alike or axes in areas[-columns:] else ""
-        axes.set_xlabel(f"{below}\n{note}".strip())
+        name = quantity_label(panel.across.name) if not alike or axes in areas[-columns:] else ""
+        axes.set_xlabel(f"{name}\n{note}".strip())
         if not (alike or are_lines) or axes in areas[::columns]:
             axes.set_ylabel(quantity_label(panel.along.name) if panel.kind == "map" and panel.along else label)
     if owner is not None and left_out:
