@@ -66,15 +66,6 @@ def test_plot_of_a_walk_that_never_was_released_fails(command: Command) -> None:
     assert [path.name for path in Path().iterdir()] == ["walk.h5"]
 
 
-def test_loads_are_recorded(command: Command) -> None:
-    """`--record-loads` takes frames 0.1 ms apart, with forces."""
-    line = "--links 20 --frequency 8 --preset soft --start ellipse --set walk_limit=0.03 --set clearance=0.002"
-    command("walk", *line.split(), "--record-loads", "-o", "fine")
-    walk = warpchain.load_walk("fine/walk.h5")
-    assert walk.setup.options.method == "os32"
-    assert walk.frame_forces.shape == (len(walk.frame_time), 20, 2) and len(walk.frame_time) > 290
-
-
 @pytest.mark.parametrize(("suffix", "beginning"), [("gif", b"GIF89a"), ("html", b"<!DOCTYPE html>")])
 def test_animate_writes_a_moving_picture(command: Command, saved: Path, suffix: str, beginning: bytes) -> None:
     """The file is of the kind that its suffix says."""

@@ -86,26 +86,6 @@ def test_other_measurements_condition_the_gaussian() -> None:
         answer.given(mass=(1.0, 0.1))
 
 
-def test_errors_are_those_of_chains_alike() -> None:
-    """On rough floors speeds of these loops were misread: the radius is known less there than on smooth ones."""
-    bank, random = made_bank(160, seed=1), np.random.default_rng(5)
-
-    def misread(chain: int, film: films.Film) -> films.Film:
-        return dataclasses.replace(
-            film, speed=film.speed * (1 + 0.01 * (bank.values[chain, 0] > 0.27) * random.normal())
-        )
-
-    walks = [[[misread(chain, film) for film in row] for row in rows] for chain, rows in enumerate(bank.films)]
-    other = dataclasses.replace(bank, films=walks)
-
-    def sigma(friction: float) -> float:
-        chain = int(np.abs(bank.values[:, 0] - friction).argmin())
-        (film,) = films_of(bank, chain, 1, CAMERA, 0)
-        return float(other.posterior([dataclasses.replace(film, outline=None)]).sigma[1])
-
-    assert sigma(0.31) > 1.1 * sigma(0.23)
-
-
 @pytest.mark.parametrize(
     ("friction", "higher", "wrong"),
     [

@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import yaml
 
@@ -65,22 +64,6 @@ def test_a_grown_sweep_is_the_larger_one(tmp_path: Path, sampler: str) -> None:
     for name in ("grown", "fresh"):
         merge(tmp_path / name, tmp_path / f"{name}.h5")
     assert (tmp_path / "grown.h5").read_bytes() == (tmp_path / "fresh.h5").read_bytes()
-
-
-def test_a_sweep_grows_before_it_is_complete(tmp_path: Path) -> None:
-    """Walks that were missing are then run in their old shards; what is there is read meanwhile."""
-    make_sweep(tmp_path / "grown", content(samples=2), lambda walk: drawn_distance(walk) if walk.sample else None)
-    kept = shards(tmp_path / "grown")
-    made = make_sweep(
-        tmp_path / "grown", content(samples=5), lambda walk: drawn_distance(walk) if walk.cell[0] else None
-    )
-    assert kept.items() < shards(tmp_path / "grown").items()
-    expected = np.zeros((2, 2, 5), bool)
-    expected[1] = expected[:, :, 1] = True
-    np.testing.assert_array_equal(made.status == 1, expected)
-    grown = make_sweep(tmp_path / "grown", content(samples=5), drawn_distance)
-    assert columns(grown) == columns(make_sweep(tmp_path / "fresh", content(samples=5), drawn_distance))
-    assert kept.items() < shards(tmp_path / "grown").items()
 
 
 def test_every_step_of_growing_may_be_the_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

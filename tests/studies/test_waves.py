@@ -18,7 +18,6 @@ from studies.waves.dispersion import (
 from studies.waves.mode_fit import find_packet, fit_rates, mode_amplitudes
 from studies.waves.tapped_ring import tapped_ring
 from tests.oracle_model.motion_equations import acceleration, friction_torque
-from tests.oracle_model.ring_modes import ring_modes
 from warpchain import Status, preset
 
 PAPER = preset("paper").with_values({"coulomb_friction": 0.0})
@@ -76,17 +75,6 @@ def test_long_waves_run_at_the_speed_of_a_string():
     expected = PAPER.viscous_friction * 1e-8 / (2 * 3.4235e-3 * PAPER.link_length**2)
     assert waves.damping[0, LOWER_FORWARD] == pytest.approx(expected, rel=1e-4)
     assert waves.reach[0, LOWER_FORWARD] == pytest.approx(speed / PAPER.link_length / expected, rel=1e-3)
-
-
-@pytest.mark.parametrize("links", [8, 12, 60])
-@pytest.mark.parametrize("friction", [0.0, 9e-5])
-def test_ring_agrees_with_the_equations_of_motion(links, friction):
-    """The exact ring has the bending modes of the linearised NumPy model, but for what k = 1e9 N/m stretches."""
-    parameters = PAPER.with_values({"viscous_friction": friction})
-    numbers = np.arange(2, links // 4 + 1)
-    waves, modes = ring_waves(parameters, links, SPEED, numbers), ring_modes(links, parameters, SPEED, numbers)
-    assert_allclose(nearest(waves.rate, modes), waves.rate, rtol=2e-5)
-    assert_allclose(nearest(modes, waves.rate), modes, rtol=2e-5)
 
 
 def test_long_waves_of_a_ring_are_those_of_the_continuous_ring():

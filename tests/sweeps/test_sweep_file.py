@@ -1,13 +1,10 @@
 """Sweeps: files, values, blocks and refusals."""
 
 import itertools
-import pickle
 import time
-from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 
 from tests.support.sweep_content import TABLE_1, UNIFORM, blocks, content
 from warpchain.inputs.parameters import Parameters
@@ -99,21 +96,6 @@ def test_axis_values(name: str, given: object, values: tuple[object, ...]) -> No
     (block,) = load_sweep(content(grid={name: given}, samples=1)).blocks
     assert block.axes == {name: values}
     assert [type(value) for value in block.axes[name]] == [type(value) for value in values]
-
-
-def test_from_a_file(tmp_path: Path) -> None:
-    """A file gives the same sweep as its content, its canonical copy too; a sweep is taken as it is."""
-    path = tmp_path / "sweep.yaml"
-    path.write_text(yaml.safe_dump(content(distributions={"coulomb_friction": {"gaussian": {"sigma": 2e-5}}})))
-    sweep = load_sweep(path)
-    again = tmp_path / "again.yaml"
-    again.write_text(yaml.safe_dump(sweep.canonical(), sort_keys=False))
-    for other in (load_sweep(str(path)), load_sweep(again), pickle.loads(pickle.dumps(sweep)), load_sweep(sweep)):
-        assert other.digest() == sweep.digest()
-        assert other.canonical() == sweep.canonical()
-        assert [other.planned(index) for index in other.indices[:12].tolist()] == [
-            sweep.planned(index) for index in other.indices[:12].tolist()
-        ]
 
 
 # Refusals

@@ -288,21 +288,3 @@ def test_saltelli_gives_known_sobol_indices() -> None:
     assert total == pytest.approx(scipy.total_order, rel=1e-10)
     assert first == pytest.approx([0.3139, 0.4424, 0.0], abs=0.1)
     assert total == pytest.approx([0.5576, 0.4424, 0.2437], abs=0.1)
-
-
-def test_failed_walks_cost_their_sample_only() -> None:
-    """A walk without result takes its sample out of the indices and changes the others little."""
-    sweep = unit_cube(FRACTIONS[:3], "saltelli", 512)
-    values = ishigami(drawn(sweep, sweep.walk_count))
-    whole = saltelli_outputs(values, 3)
-    values[[0, 4, 1234]] = math.nan
-    outputs = saltelli_outputs(values, 3)
-    for key, result in outputs.items():
-        assert (result == np.delete(whole[key], [0, 1234 // 5], axis=-1)).all()
-    for index, all_of_them in zip(sobol_indices(outputs), sobol_indices(whole), strict=True):
-        assert index == pytest.approx(all_of_them, abs=0.03)
-    nothing = sobol_indices(saltelli_outputs(np.full(10, math.nan), 3))
-    constant = sobol_indices(saltelli_outputs(np.ones(10), 3))
-    assert np.isnan([*nothing, *constant]).all()
-    with pytest.raises(ValueError, match="reshape"):
-        saltelli_outputs(values[1:], 3)

@@ -117,11 +117,3 @@ def test_a_sweep_has_charms_as_an_axis_and_draws_them() -> None:
     assert sweep.canonical()["blocks"][0]["scene"]["charm_link"] == 7
     with pytest.raises(InputError, match=r"^sweep\.grid\.link_masses: not possible here; give it in scene"):
         load_sweep({**content, "grid": {"link_masses": [[1.0] * 60]}})
-
-
-def test_sweeps_that_say_nothing_of_links_keep_their_digests() -> None:
-    """Fields that have their defaults are left out, so that results made before the fields go on."""
-    content = {"version": 1, "name": "old", "seed": 1, "samples": 2, "preset": "soft"}
-    plain, said = load_sweep(content), load_sweep({**content, "scene": {"charm_mass": 0.0, "link_masses": None}})
-    assert plain.digest() == said.digest() != load_sweep({**content, "scene": {"charm_mass": 0.01}}).digest()
-    assert load_sweep(plain.canonical()).digest() == plain.digest()

@@ -1,6 +1,5 @@
 """Whole walks: where they end, their statuses, their ledger, samples, records and progress."""
 
-import dataclasses
 import itertools
 
 import numpy as np
@@ -92,20 +91,6 @@ def test_series_tell_of_the_walk(walk_from_rest):
     assert walk.energy["kinetic_at_end"] == walk.kinetic_energy[-1]
 
 
-def test_other_starts_walk_alike():
-    """Starting on the turning sprocket, or as an ellipse without one, the chain walks as far to within a fifth."""
-    spinning = soft_walk(start="spinning")
-    ellipse = soft_walk(start="ellipse")
-    for walk in (spinning, ellipse):
-        assert walk.status == Status.AT_REST
-        assert 0.5 < walk.dx < 0.8
-        assert walk.lowest[0] == pytest.approx(0.01, abs=1e-12)
-    assert ellipse.sprocket_center is None
-    assert ellipse.simulated_time == ellipse.walk_time
-    assert ellipse.impulses["sprocket"] == 0
-    assert spinning.simulated_time > spinning.walk_time
-
-
 @pytest.mark.parametrize("start", ["spinning", "ellipse"])
 def test_phase_turns_the_released_chain(start):
     """A phase of 1/2 releases the loop turned by half its length: link 30 is where link 0 would have been."""
@@ -175,20 +160,6 @@ def test_seed_repeats_its_sample():
     assert means.setup.parameters == SOFT
     assert means.setup.scene.phase == 0.0
     assert means.setup.scene.clearance == 0.01
-
-
-def test_a_saved_setup_repeats_its_walk(tmp_path):
-    """A walk that was drawn, saved and read is repeated from its setup alone: all arrays are equal to the bit."""
-    first = warpchain.walk(links=30, frequency=10.0, preset="soft", seed=12, clearance=0.02, tolerance=2e-3)
-    first.save(tmp_path / "walk.h5")
-    saved = warpchain.load_walk(tmp_path / "walk.h5")
-    again = warpchain.walk(setup=saved.setup, seed=saved.seed)
-    differing = {"wall_time"}
-    for name in {field.name for field in dataclasses.fields(first)} - differing - {"before_release"}:
-        np.testing.assert_array_equal(getattr(again, name), getattr(first, name), err_msg=name)
-    before = [dataclasses.asdict(walk.before_release) for walk in (again, first)]
-    for name, values in before[0].items():
-        assert np.array_equal(values, before[1][name], equal_nan=True), name
 
 
 @pytest.mark.parametrize("name", ["floor_friction", "mu_fc", "μ_fc"])
