@@ -4,7 +4,7 @@ import csv
 import math
 import re
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -124,6 +124,17 @@ def error_line(axes: Axes, x: Any, cells: Any, place: tuple[Any, ...], **style: 
     axes.errorbar(x, cells.mean[place], cells.standard_error[place], **style)
 
 
+def of_cells(block: Any) -> Iterator[tuple[tuple[int, ...], list[float]]]:
+    """Place of each cell of a block, and the values of its axes there."""
+    for place in np.ndindex(*map(len, block.axes.values())):
+        yield place, [values[number] for values, number in zip(block.axes.values(), place, strict=True)]
+
+
+def mean_where(chosen: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Means over the samples of each cell of chosen walks; NaN without one."""
+    return np.ma.masked_array(values, ~chosen).mean(axis=-1).filled(np.nan)
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a file; its folder is made."""
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -159,8 +170,12 @@ def with_tables(text: str, tables: Mapping[str, str]) -> str:
     return text
 
 
-def write_tables(page: Path, tables: Mapping[str, str]) -> None:
-    """Put tables between the markers of a page, and print them."""
+def publish(folder: Path, tables: Mapping[str, str], figures: Mapping[str, Figure], dpi: int = 200) -> None:
+    """Put tables between the markers of a study's page, and print them; write its figures, figures/NAME.png."""
     for name, table in tables.items():
         print(f"\n{name}\n{table}")
-    write_text(page, with_tables(page.read_text(encoding="utf-8"), tables))
+    page = folder / "README.md"
+    if tables:
+        write_text(page, with_tables(page.read_text(encoding="utf-8"), tables))
+    for name, figure in figures.items():
+        save_figure(figure, folder / "figures" / f"{name}.png", dpi)

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from studies.common import FAINT, INK, save_figure, tidy
+from studies.common import FAINT, INK, tidy
 from studies.common import table as markdown
 from studies.phase_diagram import laws
 from warpchain import InputError, Status, SweepResult, preset
@@ -191,7 +191,7 @@ def _span(values: Array) -> str:
     return f"{values.min():.2g} to {values.max():.2g}"
 
 
-def draw(cells: Cells, curve: Curve, path: Path) -> None:
+def draw(cells: Cells, curve: Curve) -> Figure:
     """Δx/(nℓ) over turns per second, and over turns in the time (R/g)^½; the phase diagram in grey."""
     figure = Figure(figsize=(11, 4.8), layout="constrained")
     panels = (
@@ -215,4 +215,4 @@ def draw(cells: Cells, curve: Curve, path: Path) -> None:
         tidy(axes, grid="both")
     figure.axes[0].set_ylabel("Δx/(nℓ)")
     figure.axes[0].legend(frameon=False, title="varied")
-    save_figure(figure, path)
+    return figure

@@ -18,7 +18,7 @@ import typer
 from numpy.typing import NDArray
 
 import warpchain
-from studies.common import read_rows, run_study, table, write_rows, write_tables
+from studies.common import minus, over_cells, publish, read_rows, run_study, table, write_rows
 from studies.waves.drag import END, NEAR, PARAMETERS, released
 from studies.waves.fields import normal_velocities
 from studies.waves.wave_drag import RIGID, RUNNING, loop_motions, wave_motion
@@ -162,7 +162,8 @@ def changes(rows: Sequence[Mapping[str, str]], way: str, size: float) -> Array:
 
 def mean_of_cells(change: Array, error: Array) -> str:
     """Mean over the cells ± its standard error."""
-    return f"{change.mean():+.1f} ± {np.sqrt(np.sum(error**2)) / len(error):.1f} %".replace("-", "−")
+    over = over_cells(change, error)
+    return minus(f"{over.mean:+.1f} ± {over.error:.1f} %")
 
 
 def summary(rows: Sequence[Mapping[str, str]]) -> str:
@@ -170,14 +171,11 @@ def summary(rows: Sequence[Mapping[str, str]]) -> str:
     lines = []
     for way, size in VARIANTS[1:]:
         change, error, by_phase, f = changes(rows, way, size)
-        typical = np.sqrt(max(0.0, float(np.mean(change**2 - error**2))))
-        ends = f"{change.min():+.0f} to {change.max():+.0f} %".replace("-", "−")
-        chi2 = f"{np.sum((change / error) ** 2):.0f} of {len(change)}"
-        texts = mean_of_cells(change, error), ends, f"{typical:.1f} %", chi2, f"{by_phase.mean():.1f} %"
-        lines.append([way, f"{size:g}", *texts, f"{f.mean():.1f}"])
-    return table(
-        "wave | amplitude / rad | Δx, mean of cells | cells | typical | χ² of none | ∝ cos φ | F of that", lines
-    )
+        over, ends = over_cells(change, error), minus(f"{change.min():+.0f} to {change.max():+.0f} %")
+        texts = mean_of_cells(change, error), ends, f"{over.typical:.1f} %", f"{over.chi2:.0f} of {len(over)}"
+        lines.append([way, f"{size:g}", *texts, f"{by_phase.mean():.1f} %", f"{f.mean():.1f}"])
+    head = "wave | amplitude / rad | Δx, mean of cells | cells | typical | χ² of none | ∝ cos φ | F of that"
+    return table(head, lines)
 
 
 def about_impact(links: int, frequency: float) -> tuple[float, float]:
@@ -236,7 +234,7 @@ def main(command: Annotated[str, typer.Argument()] = "") -> None:
         return
     if command == "run":
         run()
-    write_tables(FOLDER / "README.md", {"directions": summary(read_rows(RESULTS))})
+    publish(FOLDER, {"directions": summary(read_rows(RESULTS))}, {})
 
 
 if __name__ == "__main__":
