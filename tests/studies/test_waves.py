@@ -15,7 +15,7 @@ from studies.waves.dispersion import (
     ring_waves,
     straight_waves,
 )
-from studies.waves.mode_fit import find_packet, fit_rates, mode_amplitudes
+from studies.waves.mode_fit import fit_rates, mode_amplitudes
 from studies.waves.tapped_ring import tapped_ring
 from tests.oracle_model.motion_equations import acceleration, friction_torque
 from warpchain import Status, preset
@@ -122,32 +122,6 @@ def test_modes_of_a_tapped_ring():
     measured = nearest(wanted, np.array(found))
     assert_allclose(measured.imag, wanted.imag, rtol=1e-3)
     assert_allclose(measured.real, wanted.real, rtol=1e-2)
-
-
-def test_two_packets_run_at_their_group_speeds():
-    """Waves of 12 links run both ways: places as group speeds say to 0.1 %, amplitudes fall as damping says to 1 %.
-
-    A packet's short waves die first, so its mean speed changes; the packet's own spectrum gives it.
-    """
-    links, number = 180, 15
-    place, times = from_tap(links), np.linspace(0.05, 0.1, 41)
-    spins = 0.1 * np.cos(2 * np.pi * number / links * place) * np.exp(-(place**2) / 200)
-    angles = tapped(links, spins, times)
-    waves = ring_waves(SOFT, links, SPEED, np.arange(2, links // 4 + 1))
-    in_room = []
-    for column in (LOWER_BACKWARD, LOWER_FORWARD):
-        speeds, damping = waves.group_speed[:, column], waves.damping[:, column]
-        guess = speeds[number - 2] * times
-        width = np.minimum(np.abs(guess), links / 2 - np.abs(guess))
-        packets = [find_packet(*each) for each in zip(angles, guess, width, strict=True)]
-        expected = [packet.mean(speeds) * time for packet, time in zip(packets, times, strict=True)]
-        speed = np.polyfit(times, [packet.place for packet in packets], 1)[0]
-        assert speed == pytest.approx(np.polyfit(times, expected, 1)[0], rel=1e-3)
-        assert speed == pytest.approx(speeds[number - 2], rel=0.02)
-        falls = -np.polyfit(times, np.log([packet.amplitude for packet in packets]), 1)[0]
-        assert falls == pytest.approx(np.mean([packet.mean(damping) for packet in packets]), rel=1e-2)
-        in_room.append(1 + speed * SOFT.link_length / SPEED)
-    assert_allclose(in_room, [0.0, 2.0], atol=0.04)
 
 
 @pytest.mark.parametrize("amplitude", [1e-3, 0.1, 1.0, 60.0])
