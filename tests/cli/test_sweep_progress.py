@@ -92,14 +92,14 @@ def test_the_time_of_a_walk_is_without_compilation(monkeypatch: pytest.MonkeyPat
     walk(preset="soft", **settings)
 
     def slowly(*arguments: object) -> None:
-        time.sleep(3.0)
+        time.sleep(1.0)
         compiled(*arguments)  # type: ignore[arg-type]
 
     monkeypatch.setattr(Batch, "compile", slowly)
     began = time.perf_counter()
     result = walk(preset="soft", **settings)
-    assert time.perf_counter() - began > 3.0
-    assert 0 < result.wall_time < 2.5
+    assert time.perf_counter() - began > 1.0
+    assert 0 < result.wall_time < 0.8
 
 
 def test_info_lists_a_thousand_cells_at_most(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -115,10 +115,11 @@ def test_further_axes_are_panels(tmp_path: Path) -> None:
     grid = {"links": [60, 90], "start": ["rest", "ellipse"], "gravity": GRAVITY, "floor_friction": FRICTION}
     drawn = panels(make_sweep(tmp_path / "four", sweep(grid)).plot())
     assert list(drawn) == [f"$n$ = {n}, start = {start}" for n in (60, 90) for start in ("rest", "ellipse")]
-    grid = {name: list(range(1, 1 + MOST_PANELS + 2)) for name in ("gravity", "settle_time", "walk_limit")}
+    counts = {"gravity": 6, "settle_time": 5, "further_hold": 7, "walk_limit": 8}
+    grid = {name: list(range(1, 1 + count)) for name, count in counts.items()}
     figure = make_sweep(tmp_path / "many", sweep(grid, samples=1), lambda walk: 1.0 + walk.index).plot()
     assert len(panels(figure)) == MOST_PANELS
-    assert isinstance(figure, Figure) and figure.get_suptitle() == "24 of 26 panels"
+    assert isinstance(figure, Figure) and figure.get_suptitle() == f"{MOST_PANELS} of 30 panels"
 
 
 # Maps
