@@ -15,9 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-import yaml
 
 from tests.support import synthetic_sweep
 from tests.support.stopped_calls import is_stopped
@@ -71,25 +69,6 @@ needs_namespace = pytest.mark.skipif(
 
 
 # Begin, go on, end
-
-
-def test_a_sweep_is_written_and_read(tmp_path: Path) -> None:
-    """All rows come back to the bit; nothing is missing, and nothing else is in the folder."""
-    with open_folder(tmp_path / "new" / "folder") as opened:
-        folder = opened.directory
-        walks = np.concatenate([shard.walks for shard in opened.missing()])
-        assert walks.tolist() == SWEEP.indices.tolist() and {len(shard) for shard in opened.missing()} == {20}
-        assert len(read_rows(folder, opened.manifest)[1]) == 0
-        for shard in reversed(opened.missing()):
-            write(opened, shard, synthetic_rows(SWEEP, shard))
-        assert opened.missing() == []
-        opened.log("ended")
-        expected = np.concatenate([synthetic_rows(SWEEP, shard) for shard in SHARDS])
-        assert read_rows(folder, opened.manifest)[1].tobytes() == expected.tobytes()
-    assert sorted(os.listdir(folder)) == ["lock", "log.txt", "shards", "sweep.json", "sweep.yaml"]
-    assert len(os.listdir(folder / "shards")) == 8
-    assert yaml.safe_load((folder / "sweep.yaml").read_text()) == SWEEP.canonical()
-    assert (folder / "log.txt").read_text().endswith("  ended\n")
 
 
 def test_equal_sweeps_leave_equal_files(tmp_path: Path) -> None:

@@ -8,7 +8,6 @@ import warpchain
 from studies.waves.dispersion import (
     LOWER_BACKWARD,
     LOWER_FORWARD,
-    continuous_ring,
     equivalent_friction,
     long_wave_speed,
     ring_spin,
@@ -75,15 +74,6 @@ def test_long_waves_run_at_the_speed_of_a_string():
     expected = PAPER.viscous_friction * 1e-8 / (2 * 3.4235e-3 * PAPER.link_length**2)
     assert waves.damping[0, LOWER_FORWARD] == pytest.approx(expected, rel=1e-4)
     assert waves.reach[0, LOWER_FORWARD] == pytest.approx(speed / PAPER.link_length / expected, rel=1e-3)
-
-
-def test_long_waves_of_a_ring_are_those_of_the_continuous_ring():
-    """At 60 links a wave and more, frequencies of the continuous ring are right to 0.1 %, damping to 2 %."""
-    numbers = np.array([2, 3, 5])
-    ring = ring_waves(PAPER, 300, SPEED, numbers).rate[:, [LOWER_BACKWARD, LOWER_FORWARD]]
-    continuous = continuous_ring(PAPER, 300, SPEED, numbers)
-    assert_allclose(continuous.imag, ring.imag, rtol=1e-3)
-    assert_allclose(continuous.real, ring.real, rtol=2e-2)
 
 
 def tapped(links, spins, times, parameters=SOFT):
