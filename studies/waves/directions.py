@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 
 import warpchain
 from studies.common import minus, over_cells, publish, read_rows, run_study, table, write_rows
-from studies.waves.drag import END, NEAR, PARAMETERS, released
+from studies.waves import wave_drag
+from studies.waves.drag import END, NEAR, released
 from studies.waves.fields import normal_velocities
-from studies.waves.wave_drag import RIGID, RUNNING, loop_motions, wave_motion
+from studies.waves.wave_drag import RIGID, RUNNING, inertia_of, loop_motions, wave_motion
 
 Array = NDArray[np.float64]
 
@@ -71,14 +72,6 @@ def with_wave(
     return moved, velocity + wave_motion(rigid, change[None], inertia[None])[1][0]
 
 
-def inertia_of(links: int, parameters: warpchain.Parameters) -> Array:
-    """Mass, mass and moment of inertia of each link, (n, 3)."""
-    kinds = [
-        [getattr(parameters, f"{kind}_{name}") for name in ("mass", "mass", "inertia")] for kind in ("inner", "outer")
-    ]
-    return np.tile(kinds, (links // 2, 1))
-
-
 def running(position: Array, velocity: Array, parameters: warpchain.Parameters) -> float:
     """Speed [m/s] with which a loop runs along itself."""
     motions, _ = loop_motions(position[None], np.array([parameters.link_length]))
@@ -106,17 +99,14 @@ def distances(links: int, frequency: float) -> tuple[Array, Array]:
     phases = 2 * np.pi * np.random.default_rng(SEED).random(SAMPLES)
     chains, states = [], []
     for sample in range(SAMPLES):
-        position, velocity, numbers = released(links, frequency, SEED + sample)
-        parameters = warpchain.Parameters(**dict(zip(PARAMETERS, map(float, numbers), strict=True)))
+        position, velocity, parameters = released(links, frequency, SEED + sample)
         for way, size in VARIANTS:
             chains.append(parameters)
             states.append(with_wave(position, velocity, parameters, way, size, phases[sample]))
     position, velocity = (np.array(each) for each in zip(*states, strict=True))
     walking = warpchain.Chains(chains, position, velocity)
     walking.run(END, to_rest=True)
-    mass = np.tile([[each.inner_mass, each.outer_mass] for each in chains], links // 2)
-    dx = np.sum(mass * walking.motions()[0][..., 0], axis=1) / mass.sum(axis=1)
-    dx[walking.status != warpchain.Status.AT_REST] = np.nan
+    dx = wave_drag.distances(walking, np.array([inertia_of(links, each) for each in chains]))
     return dx.reshape(SAMPLES, -1).T, phases
 
 
@@ -130,17 +120,10 @@ def reduced(dx: Array, phases: Array) -> list[dict[str, str]]:
         found, left, *_ = np.linalg.lstsq(design, change, rcond=None)
         variance = left[0] / (both.sum() - 3)
         explained = change.var() * both.sum() - left[0]
-        rows.append(
-            {
-                "wave": way,
-                "size": f"{size:g}",
-                "pairs": str(both.sum()),
-                "change": f"{change.mean():.3f}",
-                "error": f"{change.std(ddof=1) / np.sqrt(both.sum()):.3f}",
-                "by_phase": f"{np.hypot(*found[1:]):.3f}",
-                "f": f"{explained / 2 / variance:.3f}",
-            }
-        )
+        numbers = {"change": change.mean(), "error": change.std(ddof=1) / np.sqrt(both.sum())}
+        numbers |= {"by_phase": np.hypot(*found[1:]), "f": explained / 2 / variance}
+        words = {"wave": way, "size": f"{size:g}", "pairs": str(both.sum())}
+        rows.append(words | {name: f"{value:.3f}" for name, value in numbers.items()})
     return rows
 
 
@@ -184,7 +167,7 @@ def about_impact(links: int, frequency: float) -> tuple[float, float]:
         links=links, frequency=frequency, preset="soft", start="spinning", frame_interval=2.5e-4, walk_limit=0.4
     )
     parameters, time, number = walk.setup.parameters, walk.frame_time, round(links / LENGTH)
-    masses = np.tile([parameters.inner_mass, parameters.outer_mass], links // 2)
+    masses = inertia_of(links, parameters)[:, 0]
     modes = np.abs(np.fft.rfft(normal_velocities(time, walk.frame_joints, masses), axis=1))[:, number - 1 : number + 2]
     angles = np.sqrt(np.sum((2 * modes / links) ** 2, axis=1)) / (4 * np.pi * frequency * RIDING)
     touches = np.flatnonzero(np.interp(time, walk.time, walk.lowest) < NEAR)
@@ -195,8 +178,7 @@ def about_impact(links: int, frequency: float) -> tuple[float, float]:
 
 def given(links: int, frequency: float) -> dict[tuple[str, float], Array]:
     """What waves of all phases change of a loop, (phases, 4): energy, angular momentum, run [%], lowest joint [mm]."""
-    position, velocity, numbers = released(links, frequency, SEED)
-    parameters = warpchain.Parameters(**dict(zip(PARAMETERS, map(float, numbers), strict=True)))
+    position, velocity, parameters = released(links, frequency, SEED)
     inertia = inertia_of(links, parameters)
 
     def numbers_of(at: Array, speeds: Array) -> Array:
