@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 import yaml
 
+from tests.run.test_sweep_run import data_of
 from tests.support.made_sweeps import make_sweep
 from tests.support.stopped_calls import is_stopped
 from tests.support.sweep_content import UNIFORM, blocks, content
@@ -41,11 +42,6 @@ def columns(result: SweepResult) -> dict[tuple[str, str], bytes]:
     }
 
 
-def shards(folder: Path) -> dict[str, bytes]:
-    """Name → bytes of all shards."""
-    return {name: data for name, data in files(folder).items() if name.startswith("shards/")}
-
-
 @pytest.mark.parametrize("sampler", EXTENSIBLE)
 def test_a_grown_sweep_is_the_larger_one(tmp_path: Path, sampler: str) -> None:
     """Grown twice, in one block or both, a folder gives the larger sweep to the bit; no shard changes."""
@@ -54,7 +50,7 @@ def test_a_grown_sweep_is_the_larger_one(tmp_path: Path, sampler: str) -> None:
     for counts in ((2, 4), (8, 4), (16, 8)):
         given = two_blocks(*counts, sampler=sampler, **drawn)
         grown = make_sweep(tmp_path / "grown", given, drawn_distance)
-        after = shards(tmp_path / "grown")
+        after = data_of(tmp_path / "grown")
         assert before.items() < after.items()
         before = after
     fresh = make_sweep(tmp_path / "fresh", given, drawn_distance)
