@@ -76,6 +76,47 @@ def test_long_waves_run_at_the_speed_of_a_string():
     assert waves.reach[0, LOWER_FORWARD] == pytest.approx(speed / PAPER.link_length / expected, rel=1e-3)
 
 
+def ring_modes(n, parameters, speed, numbers):
+    """Rates of bending (k, 4) of a ring [1/s] in the frame that turns along, where it looks the same at every pair.
+
+    Small motions are ∝ exp(iκj + λt), κ = 2π·number/n: two links, six coordinates (radial, tangential, angle). With the
+    equations Ẍ = A δX + B δẊ differentiated by complex steps, and Ẋ = ξ̇ + Ω ẑ × ξ, ξ̈ = (A + Ω B ẑ× + Ω²) ξ +
+    (B − 2Ω ẑ×) ξ̇. Bending is the slower third of the rates, springs of joints the others.
+    """
+    position, velocity = tapped_ring(n, parameters, speed, np.zeros(n))
+    spin, (cosine, sine) = velocity[0, 2], position[:, :2].T / np.hypot(*position[:, :2].T)
+    axes = np.zeros((n, 3, 3))  # component, direction
+    axes[:, :2, :2] = np.moveaxis(np.array([[cosine, -sine], [sine, cosine]]), -1, 0)
+    axes[:, 2, 2] = 1.0
+    derivatives = np.empty((2, n // 2, 6, 6))
+    for which, column in np.ndindex(2, 6):
+        link, direction = divmod(column, 3)
+        state = [position.astype(complex), velocity.astype(complex)]
+        state[which][link] += 1e-30j * axes[link, :, direction]
+        changed = acceleration(*state, parameters, gravity=False).imag / 1e-30
+        derivatives[which, :, :, column] = np.einsum("lcd,lc->ld", axes, changed).reshape(n // 2, 6)
+    turn, square, rates = np.zeros((6, 6)), np.diag([1.0, 1.0, 0.0] * 2) * spin**2, []
+    turn[[0, 3], [1, 4]], turn[[1, 4], [0, 3]] = -1.0, 1.0
+    for number in numbers:
+        wave = np.exp(-4j * np.pi * number * np.arange(n // 2) / n)
+        place, rate = (np.tensordot(wave, blocks, axes=1) for blocks in derivatives)
+        lower = [place + spin * rate @ turn + square, rate - 2 * spin * turn]
+        found = np.linalg.eigvals(np.block([[np.zeros((6, 6)), np.eye(6)], lower]))
+        rates.append(found[np.argsort(np.abs(found))][:4])
+    return np.array(rates)
+
+
+@pytest.mark.parametrize("links", [8, 12, 60])
+@pytest.mark.parametrize("friction", [0.0, 9e-5])
+def test_ring_agrees_with_the_equations_of_motion(links, friction):
+    """The exact ring has the bending modes of the linearised NumPy model, but for what k = 1e9 N/m stretches."""
+    parameters = PAPER.with_values({"viscous_friction": friction})
+    numbers = np.arange(2, links // 4 + 1)
+    waves, modes = ring_waves(parameters, links, SPEED, numbers), ring_modes(links, parameters, SPEED, numbers)
+    assert_allclose(nearest(waves.rate, modes), waves.rate, rtol=2e-5)
+    assert_allclose(nearest(modes, waves.rate), modes, rtol=2e-5)
+
+
 def tapped(links, spins, times, parameters=SOFT):
     """Angles of a ring's links (t, n) [rad] after a tap, less those of the ring that turns on."""
     position, velocity = tapped_ring(links, parameters, SPEED, spins)
