@@ -85,7 +85,7 @@ def test_chains_too_long_for_shared_memory_equal_a_cpu_kernel(block_dim: int, mo
     """Long chains keep their board in the scratch, with the same result, even with more threads than columns."""
     monkeypatch.setattr(functions, "LARGEST_SHARED_BLOCK", LINKS - 1)
     make_advance_block.cache_clear()
-    ours, theirs = (batch_of([heap(LINKS)], method="bs32") for _ in range(2))
+    ours, theirs = (batch_of([heap(LINKS)], method="os32") for _ in range(2))
     features = ours.features(fixed_body="floor")
     launch_blocks(ours, features, 20, block_dim=block_dim)
     make_advance_block.cache_clear()
