@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 import warpchain
-from studies.common import save_figure
+from studies.common import publish
 from studies.waves.fields import (
     characteristic,
     curvatures,
@@ -18,7 +18,7 @@ from studies.waves.fields import (
 from studies.waves.picture import AVERAGED, waves_figure
 from studies.waves.wave_drag import inertia_of
 
-FIGURE = Path(__file__).parent / "figures" / "picture.png"
+FOLDER = Path(__file__).parent
 WALKS = ((120, 20.0, (0.10, 0.24)), (60, 15.0, (0.13, 0.33)))
 """Links, frequency [Hz], and times [s] between two impacts in which speeds are measured."""
 MODES = (2, 3, 4, 5, 6, 8, 10)
@@ -60,5 +60,5 @@ def main() -> None:
     for number, (links, frequency, (begin, end)) in enumerate(WALKS):
         walk = recorded(links, frequency)
         if number == 0:
-            save_figure(waves_figure(walk, colour="curvature", window=(0.0, 0.25)), FIGURE, dpi=90)
+            publish(FOLDER, {}, {"picture": waves_figure(walk, window=(0.0, 0.25))}, dpi=90)
         print_speeds(walk, begin, end)
