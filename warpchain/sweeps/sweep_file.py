@@ -47,7 +47,7 @@ from warpchain.inputs.validation import (
     suggestion,
 )
 from warpchain.inputs.yaml_files import read_yaml
-from warpchain.sweeps.axes import AXIS_LIMIT, CELL_LIMIT, axis
+from warpchain.sweeps.axes import AXIS_LIMIT, CELL_LIMIT, Name, axis, named_axis
 from warpchain.sweeps.block import POINT, Block, Value
 from warpchain.sweeps.designs import SAMPLERS, check_design
 from warpchain.sweeps.recording import Frames, Recording
@@ -99,9 +99,7 @@ _TYPES: Final[Mapping[str, Any]] = {
     ]
     for name, field in FIELDS.items()
 }
-
-
-_AXES: Final = {name: kind for name, kind in _TYPES.items() if name not in LISTS}
+_AXES: Final = {name: (named_axis if name in LISTS else axis)(kind) for name, kind in _TYPES.items()}
 
 
 def _mapping_of(title: str, types: Mapping[str, Any]) -> Any:
@@ -206,15 +204,17 @@ class BlockKeys(WalkKeys):
         dict[str, Any], _mapping_of("distributions", {"all": _Word, **dict.fromkeys(DRAWABLE, _Drawn)})
     ] = Field({}, description="what samples draw, see below")
     grid: Annotated[
-        dict[str, list[Value]],
-        _mapping_of("grid", {"preset": axis(_Preset), **{name: axis(kind) for name, kind in _AXES.items()}}),
+        dict[str, list[Value] | dict[str, Value]], _mapping_of("grid", {"preset": axis(_Preset), **_AXES})
     ] = Field({}, description="axes of the grid, see below; not in a file with blocks")
-
     points: Annotated[
         dict[str, list[Value]],
         _mapping_of(
             "points",
-            {name: Annotated[list[kind], Field(min_length=1, max_length=AXIS_LIMIT)] for name, kind in _AXES.items()},
+            {
+                name: Annotated[list[kind], Field(min_length=1, max_length=AXIS_LIMIT)]
+                for name, kind in _TYPES.items()
+                if name not in LISTS
+            },
         ),
     ] = Field(
         {},
@@ -242,11 +242,7 @@ class BlockKeys(WalkKeys):
 class BlockOfFile(BlockKeys):
     """An item of `blocks`."""
 
-    name: str = Field(
-        pattern="^[A-Za-z0-9][A-Za-z0-9_-]*$",
-        max_length=LONGEST_NAME,
-        description="name of the block, unique in its sweep",
-    )
+    name: Name = Field(description="name of the block, unique in its sweep")
 
 
 class SweepFile(BlockKeys):
@@ -358,7 +354,8 @@ def _block(name: str, path: str, outer: BlockKeys | None, inner: BlockKeys) -> B
         return {**(getattr(outer, key) if outer else {}), **getattr(inner, key)}
 
     points = {name: tuple(values) for name, values in inner.points.items()}
-    axes = {axis: tuple(values) for axis, values in inner.grid.items()}
+    axes: dict[str, tuple[Value, ...]] = {axis: tuple(values) for axis, values in inner.grid.items()}
+    named = {axis: values for axis, values in inner.grid.items() if isinstance(values, dict)}
     if points:
         axes = {POINT: tuple(range(len(next(iter(points.values()))))), **axes}
     varied = {*axes, *points}
@@ -371,7 +368,7 @@ def _block(name: str, path: str, outer: BlockKeys | None, inner: BlockKeys) -> B
     drawn = _drawn(merged("distributions"), sections, varied, f"{path}.distributions")
     check_design(sampler or "random", samples, len(drawn), path)
     fixed = None if "preset" in axes else preset
-    return Block(path, name, fixed, sections, axes, points, drawn, sampler or "random", samples)
+    return Block(path, name, fixed, sections, axes, named, points, drawn, sampler or "random", samples)
 
 
 def _drawn(
