@@ -90,13 +90,13 @@ class Bounds:
         return math.isfinite(value) and above and value <= self.upper
 
 
-def number_field(default: Any, unit: str, description: str, **more: Any) -> Any:
+def number_field(default: Any, unit: str, description: str | None = None, **more: Any) -> Any:
     """A pydantic field that holds a number.
 
     Args:
         default: its default, in `unit`; `...` for none.
         unit: SI unit, `DIMENSIONLESS` for pure numbers.
-        description: its meaning, in one line.
+        description: its meaning; that of a field of a section may stand below it.
         more: limits `ge`, `gt`, `le`, `lt` in `unit`, as of `pydantic.Field`; anything else stands beside the unit.
     """
     limits = {name: more.pop(name) for name in ("ge", "gt", "le", "lt") if name in more}
@@ -157,13 +157,14 @@ def spelled(symbol: str) -> str:
 class Section(BaseModel):
     """A section of a user's values: parameters, scene or options; its fields have their names from then on."""
 
-    model_config = STRICT
+    model_config = STRICT | ConfigDict(use_attribute_docstrings=True)
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
         """Tell the names of the fields."""
         for name, field in cls.model_fields.items():
             FIELDS[name], SECTION_OF[name] = field, cls.__name__.lower()
+            field.description = " ".join((field.description or "").split())
             if isinstance(field.json_schema_extra, dict) and "symbol" in field.json_schema_extra:
                 SYMBOL_OF[name] = spelled(str(field.json_schema_extra["symbol"]))
                 NAME_OF_SYMBOL[SYMBOL_OF[name]] = name
