@@ -18,7 +18,7 @@ from warpchain.inputs.methods import METHODS, METHODS_BY_NEED
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS, Parameters
 from warpchain.inputs.scene import LISTS, Scene
-from warpchain.inputs.validation import field_unit, spelled
+from warpchain.inputs.validation import FIELDS, field_limits, field_unit, spelled
 from warpchain.status import Status
 from warpchain.sweeps.designs import SAMPLERS
 from warpchain.sweeps.recording import FRAME_INTERVAL, SERIES_INTERVAL, Frames
@@ -110,7 +110,9 @@ def parameters_page() -> str:
             ascii_symbol = spelled(row.symbol)
             symbol = row.symbol if ascii_symbol == row.symbol else f"{row.symbol}, `{ascii_symbol}`"
             value = f"{row.value:g}" + (f" ± {row.sigma:g}" if row.sigma else "")
-            bounds = f"{'[' if row.bounds.lower_included else '('}{row.bounds.lower:g}, {row.bounds.upper:g}]"
+            limits = field_limits(FIELDS[name])
+            bounds = f"[{limits['ge']:g}" if "ge" in limits else f"({limits['gt']:g}"
+            bounds += f", {limits['le']:g}]"
             rows.append((f"`{name}`", symbol, in_unit(value, row.unit), bounds, row.meaning))
         tables.append(f"## {source.capitalize()}\n\n" + table(("name", "symbol", "value", "bounds", "meaning"), rows))
     differing = {

@@ -20,7 +20,7 @@ from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene
 from warpchain.inputs.sections import SECTION_OF
 from warpchain.inputs.state import Setup
-from warpchain.inputs.validation import Bounds, InputError, Whole, checked, field_bounds
+from warpchain.inputs.validation import FIELDS, InputError, Whole, checked, field_bounds
 
 CLEARANCE_RANGE: Final = (0.005, 0.015)
 """Interval of the release height that a sample draws from, in m."""
@@ -49,12 +49,12 @@ class Uniform:
     Attributes:
         lower: lower end, in the unit of the quantity.
         upper: upper end.
-        bounds: the physical values.
+        bounds: least and greatest physical value.
     """
 
     lower: float
     upper: float
-    bounds: Bounds
+    bounds: tuple[float, float]
 
     def draw(self, rng: np.random.Generator) -> float:
         """One value, which need not be physical."""
@@ -71,7 +71,7 @@ class Uniform:
         return lower + (upper - lower) * fraction
 
     def _physical_ends(self) -> tuple[float, float]:
-        return max(self.lower, self.bounds.lower), min(self.upper, self.bounds.upper)
+        return max(self.lower, self.bounds[0]), min(self.upper, self.bounds[1])
 
     def __str__(self) -> str:
         """In words, for error messages."""
@@ -89,12 +89,12 @@ class Gaussian:
     Attributes:
         mean: mean of the whole Gaussian, in the unit of the quantity; None: the chain's own value, see `placed`.
         sigma: standard deviation of the whole Gaussian.
-        bounds: the physical values.
+        bounds: least and greatest physical value.
     """
 
     mean: float | None
     sigma: float
-    bounds: Bounds
+    bounds: tuple[float, float]
 
     def draw(self, rng: np.random.Generator) -> float:
         """One value of the whole Gaussian, which need not be physical."""
@@ -120,8 +120,8 @@ class Gaussian:
 
     def _standard_ends(self) -> tuple[float, float]:
         """The physical bounds in standard deviations from the mean."""
-        mean = self._placed_mean
-        return (self.bounds.lower - mean) / self.sigma, (self.bounds.upper - mean) / self.sigma
+        least, most = self.bounds
+        return (least - self._placed_mean) / self.sigma, (most - self._placed_mean) / self.sigma
 
     def __str__(self) -> str:
         """In words, for error messages."""
@@ -149,12 +149,12 @@ def _between(lower: float, upper: float, fraction: float) -> float:
 
 TABLE: Final[Mapping[str, Distribution]] = {
     **{
-        name: Gaussian(None, quantity.sigma, quantity.bounds)
+        name: Gaussian(None, quantity.sigma, field_bounds(FIELDS[name]))
         for name, quantity in Parameters.quantities().items()
         if quantity.sigma > 0
     },
-    "phase": Uniform(0.0, 1.0, field_bounds(Scene.model_fields["phase"])),
-    "clearance": Uniform(*CLEARANCE_RANGE, field_bounds(Scene.model_fields["clearance"])),
+    "phase": Uniform(0.0, 1.0, field_bounds(FIELDS["phase"])),
+    "clearance": Uniform(*CLEARANCE_RANGE, field_bounds(FIELDS["clearance"])),
 }
 """Default of what a sample draws: the Gaussians of Table 1 in the order of the table, then phase and clearance of the
 release."""
@@ -176,7 +176,7 @@ def placed(distributions: Mapping[str, Distribution], setup: Setup) -> dict[str,
             distribution = Gaussian(float(value), distribution.sigma, distribution.bounds)
         complete[name] = distribution
     if "link_length" in distributions and "circle_radius" not in distributions:
-        room = Bounds(2 * setup.parameters.circle_radius, lower_included=False)
+        room = math.nextafter(2 * setup.parameters.circle_radius, math.inf), math.inf
         complete["link_length"] = replace(complete["link_length"], bounds=room)
     return complete
 
@@ -197,7 +197,7 @@ def draw(distributions: Mapping[str, Distribution], rng: np.random.Generator) ->
 def _physical_draw(name: str, distribution: Distribution, rng: np.random.Generator) -> float:
     for _ in range(DRAW_LIMIT):
         value = distribution.draw(rng)
-        if distribution.bounds.admit(value):
+        if distribution.bounds[0] <= value <= distribution.bounds[1]:
             return value
     raise InputError(
         f"{SECTION_OF[name]}.{name}: {DRAW_LIMIT} draws {distribution} were all outside the physical bounds; "

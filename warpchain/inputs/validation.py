@@ -8,10 +8,8 @@ import difflib
 import functools
 import math
 import reprlib
-import sys
 import textwrap
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final, TypeVar, get_args
 
@@ -70,26 +68,6 @@ class InputWarning(UserWarning):
     """Input that is possible but probably not meant; its text reads like that of an `InputError`."""
 
 
-@dataclass(frozen=True)
-class Bounds:
-    """An interval of physical values.
-
-    Attributes:
-        lower: lower end, in the unit of the quantity.
-        upper: upper end; included when finite.
-        lower_included: whether the lower end itself is physical.
-    """
-
-    lower: float
-    upper: float = math.inf
-    lower_included: bool = True
-
-    def admit(self, value: float) -> bool:
-        """Whether `value` is finite and inside the interval."""
-        above = value >= self.lower if self.lower_included else value > self.lower
-        return math.isfinite(value) and above and value <= self.upper
-
-
 def number_field(default: Any, unit: str, description: str | None = None, **more: Any) -> Any:
     """A pydantic field that holds a number.
 
@@ -129,11 +107,11 @@ def field_choices(field: FieldInfo) -> tuple[Any, ...]:
     return (True, False) if field.annotation is bool else tuple(words)
 
 
-def field_bounds(field: FieldInfo) -> Bounds:
-    """The interval that the limits of a field leave."""
+def field_bounds(field: FieldInfo) -> tuple[float, float]:
+    """Least and greatest value that the limits of a field leave."""
     limits = field_limits(field)
-    upper = math.nextafter(limits["lt"], -math.inf) if "lt" in limits else limits.get("le", math.inf)
-    return Bounds(limits.get("ge", limits.get("gt", -math.inf)), upper, "gt" not in limits)
+    least = limits["ge"] if "ge" in limits else math.nextafter(limits.get("gt", -math.inf), math.inf)
+    return least, limits["le"] if "le" in limits else math.nextafter(limits.get("lt", math.inf), -math.inf)
 
 
 FIELDS: Final[dict[str, FieldInfo]] = {}
@@ -328,17 +306,6 @@ def checked(value: object, path: str, kind: Any, unit: str = DIMENSIONLESS) -> A
         return _adapter(kind).validate_python(plain(value, path))
     except ValidationError as error:
         raise InputError(refusals(error, path, unit=unit)[0]) from None
-
-
-def checked_positive(value: object, path: str, kind: str = "number") -> float:
-    """The value, if it is a positive finite number.
-
-    Raises:
-        InputError: it is not; the message begins with `path` and asks for a `kind`.
-    """
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value <= sys.float_info.max:
-        raise InputError(f"{path}: {shown(value)} is no positive {kind}; give one")
-    return value
 
 
 def checked_path(value: object, path: str) -> Path:

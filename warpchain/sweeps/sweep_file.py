@@ -141,17 +141,22 @@ def _distribution(given: Any, info: ValidationInfo) -> Distribution | None:
     if (given.uniform is None) == (given.gaussian is None):
         raise ValueError("no distribution; give {uniform: [lower, upper]} or {gaussian: {mean: …, sigma: …}}")
     bounds = field_bounds(FIELDS[name])
+    law: Distribution
     if given.gaussian is not None:
-        if given.gaussian.mean is not None and not bounds.admit(given.gaussian.mean):
-            raise InputError(f"gaussian.mean: {given.gaussian.mean} is not physical; see `warpchain parameters {name}`")
-        return Gaussian(given.gaussian.mean, given.gaussian.sigma, bounds)
-    lower, upper = given.uniform
-    if lower >= upper:
-        raise InputError(f"uniform[1]: {upper} is not greater than {lower}; give a greater value")
-    for place, end, inwards in ((0, lower, math.inf), (1, upper, -math.inf)):  # an end may be an open bound
-        if not (bounds.admit(end) or bounds.admit(math.nextafter(end, inwards))):
-            raise InputError(f"uniform[{place}]: {end} is not physical; see `warpchain parameters {name}`")
-    return Uniform(lower, upper, bounds)
+        law, numbers = (
+            Gaussian(given.gaussian.mean, given.gaussian.sigma, bounds),
+            {"gaussian.mean": given.gaussian.mean},
+        )
+    else:
+        lower, upper = given.uniform
+        if lower >= upper:
+            raise InputError(f"uniform[1]: {upper} is not greater than {lower}; give a greater value")
+        law, numbers = Uniform(lower, upper, bounds), {"uniform[0]": lower, "uniform[1]": upper}
+    least, most = math.nextafter(bounds[0], -math.inf), math.nextafter(bounds[1], math.inf)  # one may be an open bound
+    for where, number in numbers.items():
+        if number is not None and not least <= number <= most:
+            raise InputError(f"{where}: {number} is not physical; see `warpchain parameters {name}`")
+    return law
 
 
 _Word = Literal["table", "fixed"]
