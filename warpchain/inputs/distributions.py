@@ -191,18 +191,17 @@ def draw(distributions: Mapping[str, Distribution], rng: np.random.Generator) ->
     Raises:
         InputError: a quantity had no physical draw.
     """
-    return {name: _physical_draw(name, distribution, rng) for name, distribution in distributions.items()}
-
-
-def _physical_draw(name: str, distribution: Distribution, rng: np.random.Generator) -> float:
-    for _ in range(DRAW_LIMIT):
-        value = distribution.draw(rng)
-        if distribution.bounds[0] <= value <= distribution.bounds[1]:
-            return value
-    raise InputError(
-        f"{SECTION_OF[name]}.{name}: {DRAW_LIMIT} draws {distribution} were all outside the physical bounds; "
-        "give a mean inside them"
-    )
+    drawn = {}
+    for name, distribution in distributions.items():
+        draws = (distribution.draw(rng) for _ in range(DRAW_LIMIT))
+        least, most = distribution.bounds
+        drawn[name] = next((value for value in draws if least <= value <= most), math.nan)
+        if math.isnan(drawn[name]):
+            raise InputError(
+                f"{SECTION_OF[name]}.{name}: {DRAW_LIMIT} draws {distribution} were all outside the physical bounds; "
+                "give a mean inside them"
+            )
+    return drawn
 
 
 def random_generator(seed: int, cell: int = 0, sample: int = 0) -> np.random.Generator:

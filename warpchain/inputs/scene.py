@@ -4,7 +4,7 @@ import math
 from typing import Annotated, Final, Literal, Self
 
 import numpy as np
-from pydantic import Discriminator, Field, Strict, Tag, model_validator
+from pydantic import ConfigDict, Discriminator, Field, Strict, Tag, model_validator
 
 from warpchain.inputs.floor import Array, Points, slope_points
 from warpchain.inputs.link_values import LinkValues, alternating
@@ -57,6 +57,8 @@ class Scene(Section):
             the chain never hangs, the release disturbs a plane that is fixed, a plane that tilts has no flat floor, or
             a link or joint is none of the chain.
     """
+
+    model_config = ConfigDict(use_attribute_docstrings=True)
 
     links: Whole = number_field(60, "1", symbol="n", ge=4, le=MOST_LINKS)
     """number of links around the loop, even where inner and outer links alternate"""

@@ -135,7 +135,7 @@ def spelled(symbol: str) -> str:
 class Section(BaseModel):
     """A section of a user's values: parameters, scene or options; its fields have their names from then on."""
 
-    model_config = STRICT | ConfigDict(use_attribute_docstrings=True)
+    model_config = STRICT
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:

@@ -63,10 +63,14 @@ def _expanded(values: Any, check: Callable[[Any], list[Any]], info: ValidationIn
     return checked
 
 
+def list_of(kind: Any) -> Any:
+    """Annotation of a list of values."""
+    return Annotated[list[kind], Field(min_length=1, max_length=AXIS_LIMIT)]
+
+
 def axis(kind: Any) -> Any:
     """Annotation of the values of an axis, a list or a range."""
-    listed = Annotated[list[kind], Field(min_length=1, max_length=AXIS_LIMIT)]
-    return Annotated[listed, WrapValidator(_expanded, json_schema_input_type=listed | _Range)]
+    return Annotated[list_of(kind), WrapValidator(_expanded, json_schema_input_type=list_of(kind) | _Range)]
 
 
 def _with_names(values: Any) -> Any:

@@ -47,7 +47,7 @@ from warpchain.inputs.validation import (
     suggestion,
 )
 from warpchain.inputs.yaml_files import read_yaml
-from warpchain.sweeps.axes import AXIS_LIMIT, CELL_LIMIT, Name, axis, named_axis
+from warpchain.sweeps.axes import CELL_LIMIT, Name, axis, list_of, named_axis
 from warpchain.sweeps.block import POINT, Block, Value
 from warpchain.sweeps.designs import SAMPLERS, check_design
 from warpchain.sweeps.recording import Frames, Recording
@@ -213,14 +213,7 @@ class BlockKeys(WalkKeys):
     ] = Field({}, description="axes of the grid, see below; not in a file with blocks")
     points: Annotated[
         dict[str, list[Value]],
-        _mapping_of(
-            "points",
-            {
-                name: Annotated[list[kind], Field(min_length=1, max_length=AXIS_LIMIT)]
-                for name, kind in _TYPES.items()
-                if name not in LISTS
-            },
-        ),
+        _mapping_of("points", {name: list_of(kind) for name, kind in _TYPES.items() if name not in LISTS}),
     ] = Field(
         {},
         description="parameter sets: quantity → its value in each; one more axis, `point`; not in a file with blocks",
@@ -264,7 +257,7 @@ class SweepFile(BlockKeys):
     same_samples_along: list[str] = Field(
         [], description="axes along which the samples of all cells draw the same numbers"
     )
-    record: Recording = Field(Recording.of({}), description="what is kept of the motion of walks, see below")
+    record: Recording = Field(Recording(), description="what is kept of the motion of walks, see below")
 
     @model_validator(mode="after")
     def _one_grid_or_blocks(self) -> Self:
@@ -278,16 +271,7 @@ class SweepFile(BlockKeys):
         return self
 
 
-_KEYS: Final = (
-    *SweepFile.model_fields,
-    *Recording.model_fields,
-    *Frames.model_fields,
-    *_Law.model_fields,
-    "from",
-    "to",
-    "step",
-    "count",
-)
+_KEYS: Final = [name for model in (SweepFile, Recording, Frames, _Law) for name in model.model_fields]
 
 
 def sweep_schema() -> dict[str, Any]:
@@ -321,19 +305,7 @@ def read_walk_file(path: str | os.PathLike[str]) -> tuple[str | None, dict[str, 
 def read_sweep(
     source: str | os.PathLike[str] | Mapping[str, object], **replaced: object
 ) -> tuple[str, int, tuple[str, ...], tuple[Block, ...], Recording]:
-    """Read a sweep file, or one that comes with the package by its bare name, or take its content as a mapping.
-
-    Args:
-        source: the file or its content.
-        replaced: `seed` and `samples` instead of those at the top of the file; blocks with samples of their own keep
-            these.
-
-    Returns:
-        Name, seed, axes of equal samples, blocks and recording: the fields of `warpchain.sweeps.plan.Sweep`.
-
-    Raises:
-        InputError: the file cannot be read, or something in it is refused.
-    """
+    """The fields of a `Sweep`: name, seed, axes of equal samples, blocks, recording; see `load_sweep`."""
     content = plain(source, "sweep") if isinstance(source, Mapping) else read_yaml(sweep_path(source))
     replaced = {key: value for key, value in replaced.items() if value is not None}
     if isinstance(content, dict):
