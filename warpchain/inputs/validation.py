@@ -157,15 +157,7 @@ T = TypeVar("T")
 
 
 def by_name(values: Mapping[Any, T], path: str = "") -> dict[Any, T]:
-    """Values by the full names of their fields; neither names nor values are checked.
-
-    Args:
-        values: name or symbol → value.
-        path: where the values were given.
-
-    Raises:
-        InputError: a value is given twice, by name and by symbol.
-    """
+    """Values by the full names of their fields, unchecked; an `InputError` if one is given twice."""
     named: dict[Any, T] = {}
     for written, value in values.items():
         name = full_name(written)
@@ -291,16 +283,13 @@ def _adapter(kind: Any) -> TypeAdapter[Any]:
 
 
 def checked(value: object, path: str, kind: Any, unit: str = DIMENSIONLESS) -> Any:
-    """A value that is no field, such as an argument of a function, in Python's own types.
+    """A value that is no field, such as an argument of a function, in Python's own types; else an `InputError`.
 
     Args:
         value: of the user.
         path: its name, for errors.
         kind: an annotation that pydantic can check, such as `bool` or `Annotated[float, Field(gt=0)]`.
         unit: of a number.
-
-    Raises:
-        InputError: it is of another kind; the message begins with `path`.
     """
     try:
         return _adapter(kind).validate_python(plain(value, path))
@@ -309,11 +298,7 @@ def checked(value: object, path: str, kind: Any, unit: str = DIMENSIONLESS) -> A
 
 
 def checked_path(value: object, path: str) -> Path:
-    """The value as a path, if a file system can have it.
-
-    Raises:
-        InputError: it is none; the message begins with `path`.
-    """
+    """The value as a path, if a file system can have it; else an `InputError` that begins with `path`."""
     try:
         return given_path(value)  # type: ignore[arg-type]
     except (OSError, TypeError):
@@ -321,12 +306,7 @@ def checked_path(value: object, path: str) -> Path:
 
 
 def suggestion(given: object, known: Mapping[str, str] | Iterable[str]) -> str:
-    """The remedy for an unknown name: the closest known one, or as many as find room.
-
-    Args:
-        given: the name.
-        known: names that may be given; a mapping says how each is shown.
-    """
+    """The remedy for an unknown name: the closest of the known, or as many as find room, shown as a mapping says."""
     names = known if isinstance(known, Mapping) else {name: name for name in known if name != given}
     close = difflib.get_close_matches(str(given)[:_LONGEST_VALUE], names, n=1) if isinstance(given, str) else []
     if close:
@@ -352,13 +332,9 @@ def printable(text: str) -> str:
 
 
 def one_line(text: str, kind: str = "") -> str:
-    """A message as one printable line of at most `LONGEST_LINE` characters.
+    """A message as one printable line of at most `LONGEST_LINE` characters, behind its kind, such as `error: `.
 
     What is too long lacks its end, and the middle of a path of more than `_LONGEST_PATH` characters at its beginning.
-
-    Args:
-        text: the message.
-        kind: what stands before it, such as `error: `.
     """
     ends = text if len(text) < 10 * LONGEST_LINE else text[: 5 * LONGEST_LINE] + text[-5 * LONGEST_LINE :]
     text, room = printable(" ".join(ends.split())), LONGEST_LINE - len(kind)
