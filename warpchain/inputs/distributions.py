@@ -164,10 +164,6 @@ def placed(distributions: Mapping[str, Distribution], setup: Setup) -> dict[str,
     """The distributions with means and bounds for one chain.
 
     A Gaussian without a mean gets the chain's value. A link length must leave room for its two circles.
-
-    Args:
-        distributions: name, one of `DRAWABLE` → distribution.
-        setup: the chain's values.
     """
     complete: dict[str, Distribution] = {}
     for name, distribution in distributions.items():
@@ -182,14 +178,9 @@ def placed(distributions: Mapping[str, Distribution], setup: Setup) -> dict[str,
 
 
 def draw(distributions: Mapping[str, Distribution], rng: np.random.Generator) -> dict[str, float]:
-    """One value of each distribution, in their order; one outside its bounds is drawn again.
+    """One value of each of the `placed` distributions, in their order; one outside its bounds is drawn again.
 
-    Args:
-        distributions: name → distribution, see `placed`.
-        rng: the stream to draw from, see `random_generator`.
-
-    Raises:
-        InputError: a quantity had no physical draw.
+    An `InputError` says that a quantity had no physical draw.
     """
     drawn = {}
     for name, distribution in distributions.items():
@@ -205,31 +196,16 @@ def draw(distributions: Mapping[str, Distribution], rng: np.random.Generator) ->
 
 
 def random_generator(seed: int, cell: int = 0, sample: int = 0) -> np.random.Generator:
-    """The random generator of one sample.
-
-    Args:
-        seed: seed of the sweep, 0 … `LARGEST_SEED`.
-        cell: index of the sweep's cell (one combination of values), 0 … 2³² − 1.
-        sample: index of the sample in its cell, 0 … 2³² − 1.
-
-    Raises:
-        InputError: a number is no integer or out of range.
-    """
+    """The random generator of one sample, given the sweep's seed, the number of its cell, and its own in there."""
     entropy = checked(seed, "seed", Seed)
     key = [checked(number, name, _Index) for name, number in (("cell", cell), ("sample", sample))]
     return np.random.default_rng(np.random.SeedSequence(entropy, spawn_key=key))
 
 
 def sampled(setup: Setup, rng: np.random.Generator, kept: Container[str] = ()) -> Setup:
-    """The setup with the quantities of `TABLE` drawn about its own values, in the order of the table.
+    """The setup with the quantities of `TABLE`, but those kept, drawn about its own values, in the order of the table.
 
-    Args:
-        setup: the means; a quantity without an uncertainty is taken over.
-        rng: the stream to draw from, see `random_generator`.
-        kept: quantities that are not drawn.
-
-    Raises:
-        InputError: no draw of a quantity was physical, or the drawn values together make no possible walk.
+    An `InputError` says that no draw was physical, or that the drawn values together make no possible walk.
     """
     drawn = {name: distribution for name, distribution in TABLE.items() if name not in kept}
     return setup.with_drawn(draw(placed(drawn, setup), rng))

@@ -212,11 +212,7 @@ def link_values(scene: Scene, parameters: Parameters) -> LinkValues:
 
 
 def check_parity(scene: Scene, parameters: Parameters, path: str = "scene.links") -> None:
-    """Check that the links of a chain can alternate between two kinds, if they do.
-
-    Raises:
-        InputError: their number is odd; the message begins with `path`.
-    """
+    """Check that links of two kinds are even in number; else an `InputError` that begins with `path`."""
     is_one_kind = (parameters.inner_mass, parameters.inner_inertia) == (parameters.outer_mass, parameters.outer_inertia)
     if scene.links % 2 and not is_one_kind and (scene.link_masses is None or scene.link_inertias is None):
         raise InputError(
@@ -251,11 +247,7 @@ def loop_speed(scene: Scene, parameters: Parameters) -> float:
 
 
 def contact_radius(scene: Scene, parameters: Parameters) -> float:
-    """Radius of the sprocket that the circles of the links touch, in m.
-
-    Raises:
-        InputError: the sprocket radius is that of the joints and leaves nothing to touch.
-    """
+    """Radius of the sprocket that the circles of the links touch, in m; an `InputError` if nothing is left to touch."""
     if scene.sprocket_radius_is == "contact":
         return parameters.sprocket_radius
     if parameters.sprocket_radius <= parameters.circle_radius:
@@ -279,11 +271,7 @@ def fewest_links(scene: Scene, parameters: Parameters) -> int:
 
 
 def check_links_on_gpu(links: int, device: str, field: str) -> None:
-    """Check that a device can carry a chain of this many links.
-
-    Raises:
-        InputError: it cannot; the message begins with the field that says how many links there are.
-    """
+    """Check that a device can carry a chain of this many links; else an `InputError` that begins with `field`."""
     if on_gpu(device) and links > MOST_LINKS_ON_GPU:
         raise InputError(
             f"{field}: {links} links are more than a GPU's block has threads; "
@@ -292,14 +280,9 @@ def check_links_on_gpu(links: int, device: str, field: str) -> None:
 
 
 def check_scene(scene: Scene, parameters: Parameters) -> None:
-    """Check what a scene and its parameters must fulfil together.
+    """Check what a scene and its parameters must fulfil together; else an `InputError`.
 
     A scene that starts as an ellipse has no sprocket, so nothing is asked of that.
-
-    Raises:
-        InputError: links of two kinds are odd in number, the chain is too short for its sprocket, or the sprocket too
-            small, or `contact_radius` finds none, or the links are too point-like for the load factor that is given, or
-            the frequency is one of minutes.
     """
     check_parity(scene, parameters)
     if scene.start == "ellipse":

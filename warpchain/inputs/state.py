@@ -67,14 +67,7 @@ class Setup:
         return np.frombuffer(hashlib.sha256("\n".join(parts).encode()).digest(), dtype=np.uint8)
 
     def with_drawn(self, drawn: Mapping[str, float]) -> "Setup":
-        """A copy with drawn values in place of its own.
-
-        Args:
-            drawn: fields of `Parameters` or `Scene` → value.
-
-        Raises:
-            InputError: the values together make no possible walk.
-        """
+        """A copy with drawn values of parameters and scene, if they make a possible walk; else an `InputError`."""
         sections: dict[str, dict[str, float]] = {"parameters": {}, "scene": {}}
         for name, value in drawn.items():
             sections[SECTION_OF[name]][name] = value
@@ -214,15 +207,9 @@ class State:
 
 
 def checked_array(given: object, path: str, *shape: int | str) -> Array:
-    """Anything like an array of finite real numbers as a new float64 array of this shape.
+    """Anything like an array of finite real numbers as a new float64 array of this shape; a letter is any number.
 
-    Args:
-        given: of the user.
-        path: its name, for errors.
-        shape: a letter stands for any number.
-
-    Raises:
-        InputError: it is another thing; the message begins with `path`.
+    Of anything else an `InputError` that begins with `path`.
     """
     wanted = f"({', '.join(map(str, shape))}{',' * (len(shape) == 1)})"
     try:

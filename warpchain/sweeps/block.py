@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.inputs.distributions import Distribution, Gaussian, placed
+from warpchain.inputs.distributions import Distribution, Gaussian
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.parameters import preset as parameter_preset
@@ -96,11 +96,7 @@ class Block:
         return {**{name: values for name, values in self.axes.items() if name != POINT}, **self.points}
 
     def fixed(self, cell: tuple[int, ...]) -> Setup:
-        """The setup of a cell before anything is drawn: the values that Gaussians are centred on.
-
-        Raises:
-            InputError: the values of the cell contradict one another.
-        """
+        """The setup of a cell before anything is drawn: the values that Gaussians are centred on."""
         return next(self.fixed_in([cell]))
 
     def fixed_in(self, cells: Iterable[tuple[int, ...]]) -> Iterator[Setup]:
@@ -165,10 +161,6 @@ class Block:
             along, values = "preset", tuple(getattr(parameter_preset(str(preset)), name) for preset in presets)
         sizes = [len(values) if axis == along else 1 for axis in self.axes]
         return np.broadcast_to(np.reshape(np.array(values), (*sizes, 1)), (*self.shape[:-1], 1))
-
-    def placed(self, fixed: Setup) -> dict[str, Distribution]:
-        """The distributions of a cell, given its `fixed` setup."""
-        return placed(self.distributions, fixed)
 
     def canonical(self) -> dict[str, Any]:
         """The block as JSON-able content of a file, with every default and range written out.

@@ -40,16 +40,10 @@ def walks_per_sample(sampler: str, dimensions: int) -> int:
 
 
 def check_design(sampler: str, samples: int, dimensions: int, path: str) -> None:
-    """Check that a sampler can make a number of samples.
+    """Check that a sampler can make a number of samples of so many drawn quantities.
 
-    Args:
-        sampler: one of `SAMPLERS`.
-        samples: samples per cell, as the sweep states them.
-        dimensions: number of drawn quantities.
-        path: where sampler and samples were given, for errors.
-
-    Raises:
-        InputError: samples would all be equal, are too many, or break the balance of a Sobol' sequence.
+    An `InputError`, which begins with `path`, says that samples would all be equal, are too many, or break the balance
+    of a Sobol' sequence.
     """
     if dimensions == 0:
         if sampler == "saltelli":
