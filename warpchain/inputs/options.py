@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import AfterValidator, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from warpchain.inputs.methods import BURST_TOLERANCE, FORMER_METHODS, METHODS, METHODS_BY_NEED
 from warpchain.inputs.validation import InputError, Section, Whole, number_field, shown, suggestion
@@ -64,8 +64,6 @@ class Options(Section):
         pydantic.ValidationError: a value is unknown or out of bounds, the smallest step is not below the contact step,
             the device is not supported, or the method does not run on it.
     """
-
-    model_config = ConfigDict(use_attribute_docstrings=True)
 
     method: Annotated[str, AfterValidator(_known_method)] = Field(
         default="standard",

@@ -4,7 +4,7 @@ import math
 from typing import Annotated, Final, Literal, Self
 
 import numpy as np
-from pydantic import ConfigDict, Discriminator, Field, Strict, Tag, model_validator
+from pydantic import Discriminator, Field, Strict, Tag, model_validator
 
 from warpchain.inputs.floor import Array, Points, slope_points
 from warpchain.inputs.link_values import LinkValues, alternating
@@ -38,8 +38,6 @@ STEEPEST: Final = 80.0
 RIGHT_ANGLE: Final = math.pi / 2
 OF_LINKS: Final = ("link_masses", "link_inertias", "viscous_frictions", "coulomb_frictions")
 """Fields with a number for each link or joint."""
-LISTS: Final = (*OF_LINKS, "release", "floor")
-"""Fields that take lists, so that they are no axes of a sweep."""
 TAP: Final = ("lateral_speed", "tilt", "tilt_rate", "yaw_rate")
 """What a release may give to a plane that tilts. Each is 0 by default: an upright plane that nothing disturbs stays
 upright, so that a scene with a tilting plane alone is the paper's."""
@@ -57,8 +55,6 @@ class Scene(Section):
             the chain never hangs, the release disturbs a plane that is fixed, a plane that tilts has no flat floor, or
             a link or joint is none of the chain.
     """
-
-    model_config = ConfigDict(use_attribute_docstrings=True)
 
     links: Whole = number_field(60, "1", symbol="n", ge=4, le=MOST_LINKS)
     """number of links around the loop, even where inner and outer links alternate"""
@@ -170,6 +166,10 @@ class Scene(Section):
                 "give 'spinning' here, or start: rest"
             )
         return self
+
+
+LISTS: Final = tuple(name for name, field in Scene.model_fields.items() if "tuple[" in str(field.annotation))
+"""Fields that may be lists, so that their values on an axis of a sweep have names."""
 
 
 def floor_points(scene: Scene) -> Array | None:
