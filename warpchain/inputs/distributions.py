@@ -184,10 +184,13 @@ def draw(distributions: Mapping[str, Distribution], rng: np.random.Generator) ->
     """
     drawn = {}
     for name, distribution in distributions.items():
-        draws = (distribution.draw(rng) for _ in range(DRAW_LIMIT))
         least, most = distribution.bounds
-        drawn[name] = next((value for value in draws if least <= value <= most), math.nan)
-        if math.isnan(drawn[name]):
+        for _ in range(DRAW_LIMIT):
+            value = distribution.draw(rng)
+            if least <= value <= most:
+                drawn[name] = value
+                break
+        else:
             raise InputError(
                 f"{SECTION_OF[name]}.{name}: {DRAW_LIMIT} draws {distribution} were all outside the physical bounds; "
                 "give a mean inside them"
