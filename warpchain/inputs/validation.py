@@ -231,7 +231,7 @@ def refusals(error: ValidationError, path: str, keys: Iterable[str] = (), unit: 
     for problem in error.errors(include_url=False)[:MOST_PROBLEMS]:
         where, cause = path, problem.get("ctx", {}).get("error")
         for part in problem["loc"]:
-            if not (isinstance(part, str) and part.startswith("(")):  # the branch of a union
+            if not (isinstance(part, str) and part.startswith(("(", "["))):  # the branch of a union, "[key]" of a key
                 where = path_of(where, part)
         if isinstance(cause, InputError):
             lines.append(f"{where}.{cause}".removeprefix("."))
