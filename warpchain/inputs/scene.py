@@ -17,9 +17,7 @@ MOST_LINKS: Final = 100_000
 """A chain of so many links takes 0.4 GB, and kernels of its own."""
 MOST_LINKS_ON_GPU: Final = 1024
 """A chain is a block of threads there, one for each link, and CUDA has no larger blocks."""
-HIGHEST_FREQUENCY: Final = 1e4
-"""There Table 1's chain moves at 3.8 km/s, under a tension that stretches its joints by a third of a link [Hz]."""
-LIKELY_FREQUENCY: Final = 300.0
+HIGHEST_FREQUENCY: Final = 300.0
 """Greatest frequency of a sprocket, far above what any loop holds [Hz]; a greater one is in turns a minute."""
 LEAST_SPROCKET: Final = 1e-3
 """Least distance of the joints from the sprocket's centre, in link lengths; far smaller ones are lost in rounding."""
@@ -287,11 +285,6 @@ def check_scene(scene: Scene, parameters: Parameters) -> None:
     check_parity(scene, parameters)
     if scene.start == "ellipse":
         return
-    if scene.frequency > LIKELY_FREQUENCY:
-        raise InputError(
-            f"scene.frequency: {scene.frequency:g} Hz is far above what a loop holds, 35 Hz with 60 links; if that is "
-            f"in turns a minute, give {scene.frequency / 60:g}"
-        )
     contact_radius(scene, parameters)
     highest = scene.clearance + scene.links * parameters.link_length / 2  # of the sprocket's lowest point
     if scene.release and floor_points(scene) is None and (lowest := min(row[2] for row in scene.release)) < -highest:
