@@ -118,7 +118,7 @@ def test_from_a_file(tmp_path: Path) -> None:
 
 # Refusals
 
-FULL = {"frequency": {"from": 1, "to": 10_000, "step": 1}}
+FULL = {"walk_limit": {"from": 1, "to": 10_000, "step": 1}}
 LONG = {"from": 1e-3, "to": 1e-2, "count": 10_000}
 
 
