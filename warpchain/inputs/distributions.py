@@ -108,9 +108,11 @@ class Gaussian:
     def quantile(self, fraction: float) -> float:
         """The value below which the share `fraction` (0 < fraction < 1) of the physical draws lies."""
         lower, upper = self._standard_ends()
+        scale = self.sigma
         if lower > 0:  # by symmetry below the mean, where shares near 0 keep their digits
-            return self._placed_mean - self.sigma * _between(-upper, -lower, 1.0 - fraction)
-        return self._placed_mean + self.sigma * _between(lower, upper, fraction)
+            lower, upper, fraction, scale = -upper, -lower, 1.0 - fraction, -scale
+        first, last = _below(lower), _below(upper)
+        return self._placed_mean + scale * _STANDARD.inv_cdf(first + (last - first) * fraction)
 
     @property
     def _placed_mean(self) -> float:
@@ -139,12 +141,6 @@ Distribution = Uniform | Gaussian
 def _below(end: float) -> float:
     """The share of a standard Gaussian below `end`; erfc keeps the digits of small shares."""
     return 0.5 * math.erfc(-end / math.sqrt(2))
-
-
-def _between(lower: float, upper: float, fraction: float) -> float:
-    """Quantile of a standard Gaussian cut off at `lower` and `upper`."""
-    first, last = _below(lower), _below(upper)
-    return _STANDARD.inv_cdf(first + (last - first) * fraction)
 
 
 TABLE: Final[Mapping[str, Distribution]] = {
