@@ -44,7 +44,7 @@ from warpchain.kernels.layout import (
     Y,
 )
 from warpchain.kernels.physics.elementary import TWO, ZERO, from_order_key, order_bits, order_key
-from warpchain.kernels.physics.geometry import LANES, whole_lanes
+from warpchain.kernels.physics.geometry import LANES, Link, whole_lanes
 from warpchain.kernels.physics.plane import (
     begin_plane_step,
     end_plane_step,
@@ -129,10 +129,13 @@ def shift_first_stage(K: Rows, before: Chain, now: Chain):
     a = now.half_length
     i = int(0)
     while i < whole_lanes(now.link_count):
-        arm_x = a * K[COSINE, i]
-        arm_y = a * K[SINE, i]
-        ax, ay, turn = plane_load(now, K[X, i], K[Y, i], arm_x, arm_y)
-        old_ax, old_ay, old_turn = plane_load(before, K[X, i], K[Y, i], arm_x, arm_y)
+        link = Link()
+        link.x = K[X, i]
+        link.y = K[Y, i]
+        link.arm_x = a * K[COSINE, i]
+        link.arm_y = a * K[SINE, i]
+        ax, ay, turn = plane_load(now, i, link, ZERO, ZERO)
+        old_ax, old_ay, old_turn = plane_load(before, i, link, ZERO, ZERO)
         K[STAGES, i] = K[STAGES, i] + (ax - old_ax)
         K[STAGES + 1, i] = K[STAGES + 1, i] + (ay - old_ay)
         K[STAGES + 2, i] = K[STAGES + 2, i] + (turn - old_turn)

@@ -4,6 +4,8 @@ import warp as wp
 
 from warpchain.kernels.layout import COSINE, INERTIA, LEFT_X, LEFT_Y, MASS, OMEGA, RIGHT_X, RIGHT_Y, SINE, U, V, X, Y
 from warpchain.kernels.physics.elementary import HALF, ZERO, from_order_key, order_key
+from warpchain.kernels.physics.geometry import Link
+from warpchain.kernels.physics.load import NOTHING, link_energy, weight_energy
 from warpchain.kernels.types import Chain, Rows
 
 wp.set_module_options({"enable_backward": False})
@@ -29,6 +31,20 @@ class Summary:
 
 
 @wp.func
+def moving_link(K: Rows, chain: Chain, i: int) -> Link:
+    """A link, from the rows of the state."""
+    link = Link()
+    link.x = K[X, i]
+    link.y = K[Y, i]
+    link.u = K[U, i]
+    link.v = K[V, i]
+    link.omega = K[OMEGA, i]
+    link.arm_x = chain.half_length * K[COSINE, i]
+    link.arm_y = chain.half_length * K[SINE, i]
+    return link
+
+
+@wp.func
 def summarise(K: Rows, chain: Chain) -> Summary:
     """Sums over the placed links.
 
@@ -46,6 +62,7 @@ def summarise(K: Rows, chain: Chain) -> Summary:
     along = ZERO
     square = ZERO
     area = ZERO
+    further = NOTHING
     left = order_key(K[RIGHT_X, 0])
     right = left
     bottom = order_key(K[RIGHT_Y, 0])
@@ -59,6 +76,7 @@ def summarise(K: Rows, chain: Chain) -> Summary:
         my += m * K[Y, i]
         mu += m * K[U, i]
         mv += m * K[V, i]
+        further += link_energy(chain, i, moving_link(K, chain, i))
         kinetic += HALF * (m * speed + K[INERTIA, i] * K[OMEGA, i] * K[OMEGA, i])
         square += speed
         along += K[U, i] * K[COSINE, i] + K[V, i] * K[SINE, i]
@@ -77,7 +95,7 @@ def summarise(K: Rows, chain: Chain) -> Summary:
     summary.center_u = mu / mass
     summary.center_v = mv / mass
     summary.kinetic = kinetic
-    summary.gravitational = chain.gravity * my
+    summary.gravitational = weight_energy(chain, my) + further
     summary.spring = spring
     summary.lowest = from_order_key(bottom) - chain.circle_radius
     summary.rms_speed = wp.sqrt(square / wp.float64(n))

@@ -9,11 +9,12 @@ from warpchain.kernels.contacts.fixed_body import BODIES, Touching, link_and_bod
 from warpchain.kernels.contacts.tilting_floor import greatest_across_speed, middle_height, steepness
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.board import ends_of
-from warpchain.kernels.gpu.stage import Link, Place, Proximity, constants, felt_plane, read_link, vec5d
+from warpchain.kernels.gpu.stage import Place, Proximity, constants, felt_plane, read_link, vec5d
 from warpchain.kernels.gpu.threads import block_maxima, vec4i
 from warpchain.kernels.layout import COSINE, INVERSE_INERTIA, INVERSE_MASS, OMEGA, SINE, U, V
 from warpchain.kernels.methods.controller import quick_quotient, quick_root
 from warpchain.kernels.physics.elementary import TWO, from_order_key_single, order_bits_single, order_key_single
+from warpchain.kernels.physics.geometry import Link
 from warpchain.kernels.types import Chain, Control, Drive, Ground, Rows, State
 
 wp.set_module_options({"enable_backward": False})
