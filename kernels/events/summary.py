@@ -2,7 +2,22 @@
 
 import warp as wp
 
-from warpchain.kernels.layout import COSINE, INERTIA, LEFT_X, LEFT_Y, MASS, OMEGA, RIGHT_X, RIGHT_Y, SINE, U, V, X, Y
+from warpchain.kernels.layout import (
+    COSINE,
+    INERTIA,
+    LEFT_X,
+    LEFT_Y,
+    MASS,
+    OMEGA,
+    RADIUS,
+    RIGHT_X,
+    RIGHT_Y,
+    SINE,
+    U,
+    V,
+    X,
+    Y,
+)
 from warpchain.kernels.physics.elementary import HALF, ZERO, from_order_key, order_key
 from warpchain.kernels.physics.geometry import Link
 from warpchain.kernels.physics.load import NOTHING, link_energy, weight_energy
@@ -67,6 +82,7 @@ def summarise(K: Rows, chain: Chain) -> Summary:
     right = left
     bottom = order_key(K[RIGHT_Y, 0])
     top = bottom
+    lowest = order_key(wp.float64(wp.inf))
     i = int(0)
     while i < n:
         m = K[MASS, i]
@@ -86,7 +102,9 @@ def summarise(K: Rows, chain: Chain) -> Summary:
         area += K[LEFT_X, i] * K[RIGHT_Y, i] - K[RIGHT_X, i] * K[LEFT_Y, i]
         left = wp.min(left, order_key(K[RIGHT_X, i]))
         right = wp.max(right, order_key(K[RIGHT_X, i]))
-        bottom = wp.min(bottom, wp.min(order_key(K[LEFT_Y, i]), order_key(K[RIGHT_Y, i])))
+        low = wp.min(K[LEFT_Y, i], K[RIGHT_Y, i])
+        bottom = wp.min(bottom, order_key(low))
+        lowest = wp.min(lowest, order_key(low - K[RADIUS, i]))
         top = wp.max(top, order_key(K[RIGHT_Y, i]))
         i += 1
     summary = Summary()
@@ -97,7 +115,7 @@ def summarise(K: Rows, chain: Chain) -> Summary:
     summary.kinetic = kinetic
     summary.gravitational = weight_energy(chain, my) + further
     summary.spring = spring
-    summary.lowest = from_order_key(bottom) - chain.circle_radius
+    summary.lowest = from_order_key(lowest)
     summary.rms_speed = wp.sqrt(square / wp.float64(n))
     summary.height = from_order_key(top) - from_order_key(bottom)
     summary.width = from_order_key(right) - from_order_key(left)

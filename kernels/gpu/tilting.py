@@ -35,6 +35,7 @@ from warpchain.kernels.layout import (
     PLANE_SPEED,
     PLANE_TURN_X,
     PLANE_TURN_Y,
+    RADIUS,
     SINE,
     SUMS_OF_MOTION,
     SUMS_OF_PLACES,
@@ -56,7 +57,7 @@ from warpchain.kernels.physics.plane import (
     place_terms,
     plane_load,
 )
-from warpchain.kernels.types import Drive, Ground, Row, Rows, State
+from warpchain.kernels.types import Drive, Ground, Row, Rows, State, with_circles
 
 wp.set_module_options({"enable_backward": False})
 
@@ -285,7 +286,7 @@ def block_tilting(block_dim: int) -> BlockPlane:
     def meet(K: Rows, P: Row, M: Row, place: Place, _ground: Ground, _drive: Drive, _world: int, _time: wp.float64):
         lane = place.lane
         barrier()  # the plane and its mass are those of the new state
-        chain = on_plane(constants(K), P, 0)
+        chain = with_circles(on_plane(constants(K), P, 0), K[RADIUS, place.column])
         slope = steepness(chain)
         link = read_link(K, lane)
         left_x, left_y, right_x, right_y = ends_of(link)

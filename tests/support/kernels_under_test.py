@@ -166,7 +166,7 @@ class ContactPass:
         self.columns = layout.padded_width(max(self.links))
         self.skin, self.sprocket_speed, self.push_rate = skin, sprocket_speed, push_rate
         self.model = model_of([(len(chain.position), chain.parameters) for chain in chains])
-        sizes = chains[0].parameters.link_length, chains[0].parameters.circle_radius
+        sizes = chains[0].parameters.link_length, max(self.model.chains.numpy()["circle_radius"])
         for name, rows_of in (("faces", faces_of(profile)), ("cells", cells_of(profile, *sizes))):
             same = np.repeat(rows_of[None], len(chains), axis=0)
             setattr(self.model, name, wp.array(same, dtype=wp.float64, device=DEVICE))

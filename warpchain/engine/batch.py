@@ -170,10 +170,11 @@ class Batch:
         self._edit(self.model.links)[world, :, :links] = rows_of(own)
 
     def set_floor(self, world: int, points: Array, parameters: Parameters) -> None:
-        """Set the floor of a world's chain, by the points of its profile (p, 2), if it is not flat."""
+        """Set the floor of a world's chain, which is set, by the points of its profile (p, 2), if it is not flat."""
         self._edit(self.model.faces)[world, : len(points) - 1] = faces_of(points)
         if len(points) > 2:
-            self._edit(self.model.cells)[world] = cells_of(points, parameters.link_length, parameters.circle_radius)
+            widest = float(self._view(self.model.chains)[world]["circle_radius"])
+            self._edit(self.model.cells)[world] = cells_of(points, parameters.link_length, widest)
 
     def load(
         self,

@@ -99,11 +99,11 @@ def check_above(points: Array | None, position: Array, link_length: float, path:
         )
 
 
-def raised_by(points: Array, circles: Array, radius: float, clearance: float) -> float:
-    """How far circles about these places (p, 2) must be raised for the nearest to be so far from the floor [m]."""
-    wanted, (left, bottom), (right, _) = clearance + radius, circles.min(axis=0), circles.max(axis=0)
+def raised_by(points: Array, circles: Array, radius: Array, clearance: float) -> float:
+    """How far circles (p, 2) of these radii must be raised for the nearest to be so far from the floor [m]."""
+    wanted, (left, bottom), (right, _) = clearance + radius.max(), circles.min(axis=0), circles.max(axis=0)
     beside = points[(points[:, 0] >= left - wanted) & (points[:, 0] <= right + wanted), 1]
     high = max([*beside, *heights(points, np.array([left - wanted, right + wanted]))]) + wanted - bottom
-    while (excess := distances(points, circles + np.array([0.0, high])).min() - wanted) > EXACT:
+    while (excess := (distances(points, circles + np.array([0.0, high])) - (clearance + radius)).min()) > EXACT:
         high -= excess  # which brings nothing nearer to the floor than that
     return float(high)

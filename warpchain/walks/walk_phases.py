@@ -398,11 +398,10 @@ class WalkRun:
 
     def _raise(self, position: Array) -> float:
         """How far a chain at this position must be raised to its clearance [m]."""
-        clearance, parameters = self.setup.scene.clearance, self.setup.parameters
+        clearance, length, radius = self.setup.scene.clearance, self.setup.parameters.link_length, self._links.radius
         if self._floor is None:
-            return clearance - lowest_point(position, parameters)
-        circles = circles_of(position, parameters.link_length)
-        return raised_by(self._floor, circles, parameters.circle_radius, clearance)
+            return clearance - lowest_point(position, length, radius)
+        return raised_by(self._floor, circles_of(position, length), np.tile(radius, 2), clearance)
 
     def _set_floor(self) -> None:
         """Set the floor, and how far the chain may walk on it."""
