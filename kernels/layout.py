@@ -112,9 +112,9 @@ CENTER_Z, CENTER_W = 25, 26
 ALL_COLUMNS = 27
 
 # Model.faces: where a face begins, the unit vector along it, that along the face before it if the corner between them
-# is convex and 0 otherwise, and where along it it begins and ends: infinite for the first and the last face.
-FACE_X, FACE_Y, ALONG_X, ALONG_Y, BEFORE_X, BEFORE_Y, FACE_BEGIN, FACE_END = range(8)
-FACE_VALUES = 8
+# is convex and 0 otherwise, and where along it it begins and ends: infinite for the first and the last face; e and μ.
+FACE_X, FACE_Y, ALONG_X, ALONG_Y, BEFORE_X, BEFORE_Y, FACE_BEGIN, FACE_END, FACE_RESTITUTION, FACE_FRICTION = range(10)
+FACE_VALUES = 10
 # Drive.motion: time [s], place x, y [m] of the sprocket, its velocity u, v [m/s], angular velocity [rad/s].
 MOTION_TIME, MOTION_X, MOTION_Y, MOTION_U, MOTION_V, MOTION_TURNING = range(6)
 MOTION_VALUES, MOTION_ROWS = 6, 17

@@ -263,8 +263,8 @@ def link_and_body(name: str):
             push = chain.push_rate * wp.max(ZERO, -gap)
             lever_x = face.x - link.x
             lever_y = face.y - link.y
-            e = chain.floor_restitution
-            mu = chain.floor_friction
+            e = face.restitution
+            mu = face.friction
             link = struck(chain, link, gap, nx, ny, lever_x, lever_y, push * nx, push * ny, e, mu)
         return link
 

@@ -136,7 +136,11 @@ class Scene(Section):
     floor: Annotated[
         Annotated[Literal["flat"], Tag("(flat)")] | Annotated[Points, Tag("(points)")],
         Discriminator(lambda given: "(flat)" if isinstance(given, str) else "(points)"),
-    ] = Field(default="flat", description="flat, or a profile [[x, y], …] in m, whose ends go on straight")
+    ] = Field(
+        default="flat",
+        description="flat, or a profile [[x, y], …] in m, whose ends go on straight; [x, y, e, μ] gives "
+        "restitution and friction of the line that begins there",
+    )
     slope: float = number_field(
         0.0, "°", "of an endless floor; positive: it falls the way the chain walks", ge=-STEEPEST, le=STEEPEST
     )
@@ -240,8 +244,15 @@ class Scene(Section):
 def floor_points(scene: Scene) -> Array | None:
     """Points of the floor's profile [m], shape (p, 2); None if it is flat."""
     if scene.floor != "flat":
-        return np.array(scene.floor)
+        return np.array([point[:2] for point in scene.floor])
     return slope_points(scene.slope) if scene.slope != 0 else None
+
+
+def floor_laws(scene: Scene, parameters: Parameters) -> Array:
+    """Coefficients of restitution and friction of each straight face of the floor, shape (faces, 2)."""
+    usual = (parameters.floor_restitution, parameters.floor_friction)
+    points = ((), ()) if scene.floor == "flat" else scene.floor
+    return np.array([point[2:] or usual for point in points[:-1]])
 
 
 def floor_body(scene: Scene) -> str:

@@ -29,6 +29,7 @@ from warpchain.inputs.link_values import mean_value
 from warpchain.inputs.scene import (
     contact_radius,
     floor_body,
+    floor_laws,
     floor_points,
     joint_radius,
     link_values,
@@ -408,7 +409,7 @@ class WalkRun:
         scene = self.setup.scene
         self._batch.set_drive(self._world, farthest=(scene.distance_limit or 0.0) * self._level)
         if self._floor is not None:
-            self._batch.set_floor(self._world, self._floor, self.setup.parameters)
+            self._batch.set_floor(self._world, self._floor, floor_laws(scene, self.setup.parameters))
 
     def _release(self, position: Array, velocity: Array) -> None:
         scene = self.setup.scene
