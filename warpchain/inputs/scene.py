@@ -34,7 +34,7 @@ LONGEST: Final = 1e6
 STEEPEST: Final = 80.0
 """Greatest angle of a slope [°]."""
 RIGHT_ANGLE: Final = math.pi / 2
-OF_LINKS: Final = ("link_masses", "link_inertias", "viscous_frictions", "coulomb_frictions")
+OF_LINKS: Final = ("link_masses", "link_inertias", "viscous_frictions", "coulomb_frictions", "link_radii")
 """Fields with a number for each link or joint."""
 TAP: Final = ("lateral_speed", "tilt", "tilt_rate", "yaw_rate")
 """What a release may give to a plane that tilts. Each is 0 by default: an upright plane that nothing disturbs stays
@@ -96,7 +96,8 @@ class Scene(Section):
         Annotated[Literal["flat"], Tag("(flat)")] | Annotated[Points, Tag("(points)")],
         Discriminator(lambda given: "(flat)" if isinstance(given, str) else "(points)"),
     ] = "flat"
-    """flat, or a profile [[x, y], …] in m, whose ends go on straight"""
+    """flat, or a profile [[x, y], …] in m, whose ends go on straight; [x, y, e, μ] gives restitution and friction of
+    the line that begins there"""
     slope: float = number_field(0.0, "°", ge=-STEEPEST, le=STEEPEST)
     """of an endless floor; positive: it falls the way the chain walks"""
     distance_limit: float | None = number_field(None, "m", gt=0, le=HIGHEST)
@@ -119,6 +120,8 @@ class Scene(Section):
     """mass at the centre of charm_link, added to its own"""
     charm_inertia: float = number_field(0.0, "kg m²", ge=0, le=1e12)
     """moment of inertia of the charm about that centre, added likewise"""
+    charm_radius: float | None = number_field(None, "m", gt=0, le=1e3)
+    """radius of both circles of charm_link; null: of its own"""
     stiff_joint: int = number_field(0, "1", ge=0, le=MOST_LINKS - 1)
     """joint that is stiff: the one at the end of this link"""
     stiff_joint_factor: float = number_field(1.0, "1", ge=0, le=1e6)
@@ -133,6 +136,8 @@ class Scene(Section):
     """viscous_friction of each joint; null: the same for all"""
     coulomb_frictions: _Numbers = number_field(None, "N m")
     """coulomb_friction of each joint; null: the same for all"""
+    link_radii: _Numbers = number_field(None, "m")
+    """radius of both circles of each link; null: circle_radius"""
 
     @model_validator(mode="after")
     def _goes_together(self) -> Self:
@@ -146,7 +151,7 @@ class Scene(Section):
             if values is not None and len(values) != self.links:
                 raise InputError(f"{name}: {len(values)} numbers for {self.links} links; give one for each")
             if values is not None and name.startswith("link") and min(values) == 0:
-                raise InputError(f"{name}[{values.index(0)}]: 0 is no {name[5:-2]}; give more")
+                raise InputError(f"{name}[{values.index(0)}]: 0 is too little; give more")
         if self.slope != 0 and self.floor != "flat":
             raise InputError(f"slope: {self.slope} of a floor that is a profile; give slope: 0, or floor: flat")
         if self.plane == "tilting" and floor_points(self) is not None:
@@ -173,8 +178,15 @@ LISTS: Final = tuple(name for name, field in Scene.model_fields.items() if "tupl
 def floor_points(scene: Scene) -> Array | None:
     """Points of the floor's profile [m], shape (p, 2); None if it is flat."""
     if scene.floor != "flat":
-        return np.array(scene.floor)
+        return np.array([point[:2] for point in scene.floor])
     return slope_points(scene.slope) if scene.slope != 0 else None
+
+
+def floor_laws(scene: Scene, parameters: Parameters) -> Array:
+    """Coefficients of restitution and friction of each straight face of the floor, shape (faces, 2)."""
+    usual = (parameters.floor_restitution, parameters.floor_friction)
+    points = ((), ()) if scene.floor == "flat" else scene.floor
+    return np.array([point[2:] or usual for point in points[:-1]])
 
 
 def floor_body(scene: Scene) -> str:
@@ -193,10 +205,8 @@ def face_count(scene: Scene) -> int:
 def link_values(scene: Scene, parameters: Parameters) -> LinkValues:
     """What each link and joint of the chain of a walk has of its own."""
     values = alternating(parameters, scene.links)
-    given = (scene.link_masses, scene.link_inertias, scene.viscous_frictions, scene.coulomb_frictions)
-    rows = (values.mass, values.inertia, values.viscous_friction, values.coulomb_friction)
-    for row, own in zip(rows, given, strict=True):
-        if own is not None:
+    for row, name in zip(vars(values).values(), OF_LINKS, strict=True):
+        if (own := getattr(scene, name)) is not None:
             row[:] = own
     if scene.mass_gradient:
         growth = 1 + scene.mass_gradient * np.linspace(-1.0, 1.0, scene.links)
@@ -204,9 +214,24 @@ def link_values(scene: Scene, parameters: Parameters) -> LinkValues:
         values.inertia[:] *= growth
     values.mass[scene.charm_link] += scene.charm_mass
     values.inertia[scene.charm_link] += scene.charm_inertia
+    if scene.charm_radius is not None:
+        values.radius[scene.charm_link] = scene.charm_radius
     values.viscous_friction[scene.stiff_joint] *= scene.stiff_joint_factor
     values.coulomb_friction[scene.stiff_joint] *= scene.stiff_joint_factor
     return values
+
+
+def check_links(scene: Scene, parameters: Parameters) -> None:
+    """Check that links that have circles of their own are longer than these are wide; else an `InputError`."""
+    if scene.link_radii is None and scene.charm_radius is None:
+        return
+    radii = link_values(scene, parameters).radius
+    if not radii.max() < parameters.link_length / 2:
+        field = "charm_radius" if scene.charm_radius == radii.max() else f"link_radii[{radii.argmax()}]"
+        raise InputError(
+            f"scene.{field}: {radii.max()} is not smaller than half the link length {parameters.link_length / 2}; "
+            "give less"
+        )
 
 
 def check_parity(scene: Scene, parameters: Parameters, path: str = "scene.links") -> None:
@@ -282,6 +307,7 @@ def check_scene(scene: Scene, parameters: Parameters) -> None:
 
     A scene that starts as an ellipse has no sprocket, so nothing is asked of that.
     """
+    check_links(scene, parameters)
     check_parity(scene, parameters)
     if scene.start == "ellipse":
         return
