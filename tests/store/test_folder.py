@@ -71,17 +71,6 @@ needs_namespace = pytest.mark.skipif(
 # Begin, go on, end
 
 
-def test_equal_sweeps_leave_equal_files(tmp_path: Path) -> None:
-    """The files have no time, place or chance in them, whatever NaNs and order the rows came with."""
-    run(tmp_path / "one")
-    with open_folder(tmp_path / "two") as opened:
-        for shard in sorted(opened.missing(), key=lambda shard: shard.walks[0] % 7):
-            rows = synthetic_rows(SWEEP, shard)
-            rows["greatest_opening"] = -rows["greatest_opening"]  # the same NaN to a reader, but other bits
-            write(opened, shard, rows)
-    assert content(tmp_path / "one") == content(tmp_path / "two")
-
-
 def test_a_sweep_survives_kills(tmp_path: Path) -> None:
     """Killed 20 times at random moments, always readable and gone on with: the same bytes as one never killed."""
     done = play("killed", tmp_path / "killed")
