@@ -105,25 +105,19 @@ def push_rate(options: Options) -> float:
 
 
 def control_of(options: Options) -> Control:
-    """Settings from the options; the caller sets the length of a launch and which frames are kept."""
+    """Settings, by name those of the options; the caller sets the length of a launch and which frames are kept."""
     control = Control()
-    control.tolerance = options.tolerance
-    control.soft_tolerance = options.tolerance if options.soft_tolerance is None else options.soft_tolerance
-    control.flight_tolerance = options.flight_tolerance
+    tolerance = options.tolerance if options.soft_tolerance is None else options.soft_tolerance
+    for name, value in {**vars(options), "soft_tolerance": tolerance}.items():
+        if name in Control.vars:  # type: ignore[attr-defined]
+            setattr(control, name, value)
     control.proportional = int(options.controller == "pi")
-    control.contact_step = options.contact_step
-    control.skin = options.skin
-    control.smallest_step = options.smallest_step
-    control.step_limit = options.step_limit
     control.sample_interval = options.record_interval
-    control.rest_speed = options.rest_speed
-    control.rest_time = options.rest_time
     control.soft_stiffness = SOFT.joint_stiffness
     control.soft_damping = SOFT.joint_damping
     control.soft_smoothing = SOFT.friction_smoothing
     control.softest_stiffness = SOFTEST.joint_stiffness
     control.softest_damping = SOFTEST.joint_damping
-    control.soft_contact_step = options.soft_contact_step
     control.pile_push = PILE_PUSH
     control.soften_area = options.soften_area if options.soften_pile else -math.inf
     control.stiffening_time = STIFFENING_TIME

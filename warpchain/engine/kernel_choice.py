@@ -9,7 +9,6 @@ import warp as wp
 from warpchain.engine.devices import Device, Gpu
 from warpchain.engine.kernel_entries import kernel_entry, step_module
 from warpchain.engine.processors import processors
-from warpchain.inputs.options import Options
 from warpchain.kernels.features import Features
 from warpchain.kernels.methods.method import find_method
 
@@ -70,20 +69,6 @@ def shared_threads(method: str, links: Iterable[int], walks: int) -> int | None:
     if len(sizes) < 2 or walks > SHARED_WALKS or not find_method(method).runs_on_gpus or max(sizes) > SHARED_THREADS:
         return None
     return max(sizes)
-
-
-def features_of(
-    options: Options, columns: int, *, fixed_body: str, tilts: bool = False, moving_sprocket: bool = False
-) -> Features:
-    """Kernel features for chains with these options in scratch of this width."""
-    return Features(
-        method=options.method,
-        columns=columns,
-        fixed_body=fixed_body,
-        self_contact=options.self_contact,
-        tilts=tilts,
-        moving_sprocket=moving_sprocket,
-    )
 
 
 def step_kernel(device: Device, features: Features, threads: int) -> wp.Kernel:

@@ -47,25 +47,10 @@ def change(batch: Batch, world: int, position: Array, velocity: Array) -> None:
 
     Its clock, the softness of its joints, its counters and its watches go on.
     """
-    state, links = batch.state, batch.links[world]
-    batch._edit(state.links)[world, :, :links] = np.concatenate([position, velocity], axis=1).T
-    batch._edit(state.is_fresh)[world] = 1
-    for array in (state.has_first_stage, state.gap, state.time_to_contact, state.slack, state.losses):
-        batch._edit(array)[world] = 0
+    state = batch.state
+    batch.place(world, position, velocity)
+    batch.set_state(world, **dict.fromkeys(("has_first_stage", "gap", "time_to_contact", "slack", "losses"), 0))
     if batch._view(state.is_rigid)[world]:  # joints become rigid again as soon as they are quiet
-        steps = batch._edit(state.step), batch._edit(state.other_step)
-        steps[0][world], steps[1][world] = steps[1][world], steps[0][world]
-        batch._edit(state.is_rigid)[world] = 0
-        batch._edit(state.last_error)[world] = 1.0
+        step, other = (float(batch._view(array)[world]) for array in (state.step, state.other_step))
+        batch.set_state(world, step=other, other_step=step, is_rigid=0, last_error=1.0)
     batch._edit(state.last_sample)[world, layout.TIME] = -1.0
-
-
-def set_frame_marks(batch: Batch, world: int, interval: float) -> None:
-    """Let a world that goes on take frames at multiples of an interval [s]; 0: with its samples."""
-    mark = np.floor(batch.time(world) / interval) if interval > 0 else -1
-    batch._edit(batch.state.next_frame)[world] = mark
-
-
-def set_first_area(batch: Batch, world: int, area: float) -> None:
-    """Set the area [m²] that a loop which collapses is compared with."""
-    batch._edit(batch.state.first_area)[world] = area
