@@ -88,12 +88,24 @@ class Recorded(NamedTuple):
     planes: Array
 
 
+_STRUCTS: dict[str, Any] = {"model": Model, "drive": Drive, "state": State, "record": Record}
+
+
+def _struct(group: str, arrays: Mapping[str, wp.array]) -> Any:
+    """A struct of kernels with the arrays of its name."""
+    filled = _STRUCTS[group]()
+    for name in _STRUCTS[group].vars:
+        setattr(filled, name, arrays[f"{group}/{name}"])
+    return filled
+
+
 class Batch:
     """W chains on one device, each with its own parameters, state and statistics.
 
-    Arrays are written and read through the methods. The host may read any world between launches.
+    The host may read and change any world between launches.
 
     Attributes:
+        host: Arrays of the structs in :mod:`warpchain.kernels.types` by name, such as ``state/time``.
         threads: That carry a chain.
         bytes: Memory that they take on the device.
         records: Whether samples or frames are kept.
@@ -130,46 +142,46 @@ class Batch:
         self.options = options
         self.device = start_device(options.device)
         self.links = [0] * worlds
-        self.bytes = 0
-        self._mirrors: dict[int, Mirror] = {}
+        self.columns = layout.padded_width(longest)
         self._gpu = self.device if isinstance(self.device, Gpu) else None
         self._stream: Any = self._gpu.stream() if self._gpu else None
         self._done: Any = None
         self._lanes = [self._gpu.stream() for _ in range(LANES)] if self._gpu else []
         self.threads = (threads or block_threads(longest)) if self._gpu else 1
-        self.columns = layout.padded_width(longest)
 
-        self.model = self._arrays(
-            Model,
-            links=(layout.LINK_ROWS, longest),
-            faces=(faces, layout.FACE_VALUES),
-            cells=((layout.GROUND_CELLS + 1) * (faces > 1), layout.CELL_VALUES),
-        )
-        self.drive = self._arrays(Drive, motion=(layout.MOTION_ROWS, layout.MOTION_VALUES))
-        self._constant = set(self._mirrors)
-        if self._gpu:
-            self._order = Mirror((worlds,), wp.int32, self._gpu, self._stream)
-        self.state = self._arrays(
-            State,
-            links=(6, longest),
-            watch=(layout.WATCH_ROWS,),
-            plane=(layout.PLANE_ROWS,),
-            first_sample=(layout.ALL_COLUMNS,),
-            last_sample=(layout.ALL_COLUMNS,),
-            counts=(layout.COUNT_ROWS,),
-            extremes=(layout.EXTREME_ROWS,),
-            losses=(layout.LOSS_ROWS,),
-        )
-        self._edit(self.state.status)[:] = int(Status.FINISHED)
+        self.records = keeps_samples or frame_every is not None
         samples, frames = CAPACITY_SAMPLES * keeps_samples, CAPACITY_FRAMES * (frame_every is not None)
-        self.records = samples + frames > 0
-        self.record = self._arrays(
-            Record,
-            samples=(samples, layout.ALL_COLUMNS if tilts else layout.SAMPLE_COLUMNS),
-            frames=(frames, 2 * longest + layout.PLANE_VALUES * tilts),
-            frame_times=(frames,),
-            frame_loads=(frames * keeps_loads, 3 * longest),
-        )
+        recorded = {
+            "record/samples": (samples, layout.ALL_COLUMNS if tilts else layout.SAMPLE_COLUMNS),
+            "record/frames": (frames, 2 * longest + layout.PLANE_VALUES * tilts),
+            "record/frame_times": (frames,),
+            "record/frame_loads": (frames * keeps_loads, 3 * longest),
+        }
+        shapes = {
+            **recorded,
+            "model/links": (layout.LINK_ROWS, longest),
+            "model/faces": (faces, layout.FACE_VALUES),
+            "model/cells": ((layout.GROUND_CELLS + 1) * (faces > 1), layout.CELL_VALUES),
+            "drive/motion": (layout.MOTION_ROWS, layout.MOTION_VALUES),
+            "state/links": (6, longest),
+            "state/watch": (layout.WATCH_ROWS,),
+            "state/plane": (layout.PLANE_ROWS,),
+            "state/first_sample": (layout.ALL_COLUMNS,),
+            "state/last_sample": (layout.ALL_COLUMNS,),
+            "state/counts": (layout.COUNT_ROWS,),
+            "state/extremes": (layout.EXTREME_ROWS,),
+            "state/losses": (layout.LOSS_ROWS,),
+        }
+        fields: dict[str, tuple[tuple[int, ...], Any]] = {"worlds": ((worlds,), wp.int32)}  # of a launch, by groups
+        for group, struct in _STRUCTS.items():
+            for name, field in struct.vars.items():
+                fields[f"{group}/{name}"] = (worlds, *shapes.get(f"{group}/{name}", ())), field.type.dtype
+        parts = [{name: fields.pop(name) for name in recorded}, fields]
+        self._recorded, self._numbers = (Mirror(part, self.device, self._stream) for part in parts)
+        self.host, arrays = self._numbers.host | self._recorded.host, self._numbers.arrays | self._recorded.arrays
+        self._worlds = arrays["worlds"]
+        self.model, self.drive, self.state, self.record = (_struct(group, arrays) for group in _STRUCTS)
+        self.host["state/status"][:] = int(Status.FINISHED)
 
         self.control = control_of(options)
         self.control.launch_time = LAUNCH_SECONDS
@@ -178,38 +190,9 @@ class Batch:
 
         width = self.columns
         rows = board_rows(self.threads, width) if self._gpu else scratch_rows(options.method, width)
-        self.scratch = self._zeros((worlds, rows, width), wp.float64)
-        self.lists = self._zeros((worlds, list_layout(width).size), wp.int32)
-
-    def _arrays(self, struct: Any, **shapes: tuple[int, ...]) -> Any:
-        """A struct of arrays of zeros; ``shapes``: further axes of an array, after that of the worlds."""
-        filled = struct()
-        for name, field in struct.vars.items():
-            shape, dtype = (len(self.links), *shapes.get(name, ())), field.type.dtype
-            if self._gpu is None or math.prod(shape) == 0:
-                array = self._zeros(shape, dtype)
-            else:
-                mirror = Mirror(shape, dtype, self._gpu, self._stream)
-                self._mirrors[mirror.array.ptr], array = mirror, mirror.array
-                self.bytes += array.capacity
-            setattr(filled, name, array)
-        return filled
-
-    def _zeros(self, shape: tuple[int, ...], dtype: Any) -> wp.array:
-        """An array of zeros on the device, without a copy on the host."""
-        array = wp.zeros(shape, dtype=dtype, device=self.device.warp)
-        self.bytes += array.capacity
-        return array
-
-    def _view(self, array: wp.array) -> NDArray[Any]:
-        """The elements of an array, to be read between launches."""
-        values: NDArray[Any] = self._mirrors[array.ptr].view() if array.ptr in self._mirrors else array.numpy()
-        return values
-
-    def _edit(self, array: wp.array) -> NDArray[Any]:
-        """The elements of an array, to be changed between launches."""
-        values: NDArray[Any] = self._mirrors[array.ptr].edit() if array.ptr in self._mirrors else array.numpy()
-        return values
+        self.scratch = wp.zeros((worlds, rows, width), dtype=wp.float64, device=self.device.warp)
+        self.lists = wp.zeros((worlds, list_layout(width).size), dtype=wp.int32, device=self.device.warp)
+        self.bytes: int = self._numbers.bytes + self._recorded.bytes + self.scratch.capacity + self.lists.capacity
 
     def set_chain(
         self, world: int, parameters: Parameters, links: int, radius: float | None = None, own: LinkValues | None = None
@@ -225,14 +208,14 @@ class Batch:
         """
         own = own or alternating(parameters, links)
         self.links[world] = links
-        self._edit(self.model.chains)[world] = constants_of(parameters, own, radius)
-        self._edit(self.model.links)[world, :, :links] = rows_of(own)
+        self.host["model/chains"][world] = constants_of(parameters, own, radius)
+        self.host["model/links"][world, :, :links] = rows_of(own)
 
     def set_floor(self, world: int, points: Array, parameters: Parameters) -> None:
         """Set the floor of a world's chain, by the points of its profile (p, 2), if it is not flat."""
-        self._edit(self.model.faces)[world, : len(points) - 1] = faces_of(points)
+        self.host["model/faces"][world, : len(points) - 1] = faces_of(points)
         if len(points) > 2:
-            self._edit(self.model.cells)[world] = cells_of(points, parameters.link_length, parameters.circle_radius)
+            self.host["model/cells"][world] = cells_of(points, parameters.link_length, parameters.circle_radius)
 
     def load(
         self,
@@ -260,31 +243,29 @@ class Batch:
         """
         marks = 0 if has_frame_marks else -1
         self.set_state(world, **_BEGINNING, next_frame=marks, softness=softness, attempts_before=attempts_before)
-        self._set(self.record, world, {"sample_count": 0, "frame_count": 0})
+        self.host["record/sample_count"][world] = self.host["record/frame_count"][world] = 0
         self.place(world, position, velocity)
         self.resume(world, stop_time, stop_status)
 
     def set_state(self, world: int | Sequence[int], **values: float | Array) -> None:
         """Set fields of :class:`State` of a world, or of several."""
-        self._set(self.state, world, values)
+        for name, value in values.items():
+            self.host[f"state/{name}"][world] = value
 
     def set_drive(self, world: int, **values: float | Array) -> None:
         """Set fields of :class:`Drive` of a world."""
-        self._set(self.drive, world, values)
-
-    def _set(self, struct: Any, world: int | Sequence[int], values: Mapping[str, float | Array]) -> None:
         for name, value in values.items():
-            self._edit(getattr(struct, name))[world] = value
+            self.host[f"drive/{name}"][world] = value
 
     def place(self, world: int | Sequence[int], position: Array, velocity: Array) -> None:
         """Give a chain of n links another place and rates, (n, 3) each, or w chains, (w, n, 3); losses start anew."""
         rows = np.concatenate([position, velocity], axis=-1).swapaxes(-1, -2)
-        self._edit(self.state.links)[world, :, : rows.shape[-1]] = rows
+        self.host["state/links"][world, :, : rows.shape[-1]] = rows
         self.set_state(world, is_fresh=1)
 
     def motions(self, worlds: Sequence[int], links: int) -> tuple[Array, Array]:
         """Positions and velocities, (w, n, 3) each, of chains that all have n links."""
-        rows = self._view(self.state.links)[worlds, :, :links].transpose(0, 2, 1)
+        rows = self.host["state/links"][worlds, :, :links].transpose(0, 2, 1)
         return rows[..., :3], rows[..., 3:]
 
     def resume(self, world: int | Sequence[int], stop_time: float, stop_status: Status) -> None:
@@ -300,7 +281,7 @@ class Batch:
 
     def plane(self, world: int) -> Array:
         """The plane of a world's chain, if it tilts: (PLANE_VALUES,), see :mod:`warpchain.kernels.layout`."""
-        return np.array(self._view(self.state.plane)[world, : layout.PLANE_VALUES])
+        return np.array(self.host["state/plane"][world, : layout.PLANE_VALUES])
 
     def features(self, **wanted: Any) -> Features:
         """What the kernel of these worlds is compiled for; ``wanted``: what the options do not say."""
@@ -344,25 +325,23 @@ class Batch:
                 numbers = wp.array(np.asarray(worlds, dtype=np.int32), dtype=wp.int32, device=self.device.warp)
                 wp.launch(kernel, dim=len(worlds), inputs=[numbers, *arrays], device=self.device.warp)
             return
-        order = np.array([world for worlds in groups.values() for world in worlds], dtype=np.int32)
-        if not np.array_equal(self._order.view()[: len(order)], order):
-            self._order.edit()[: len(order)] = order
+        order = [world for worlds in groups.values() for world in worlds]
+        self.host["worlds"][: len(order)] = order
         self._stream.wait_stream(self._gpu.filling)
-        for mirror in (self._order, *self._mirrors.values()):
-            mirror.upload()
+        self._numbers.upload()
         ready = self._stream.record_event()
         for lane in self._lanes:
             lane.wait_event(ready)
         first = 0
         for kernel, worlds, lane in zip(kernels, groups.values(), itertools.cycle(self._lanes), strict=False):
-            numbers = self._order.array[first : first + len(worlds)]
+            numbers = self._worlds[first : first + len(worlds)]
             self._gpu.launch(kernel, len(worlds), [numbers, *arrays], self.threads, lane)
             first += len(worlds)
         for lane in self._lanes:
             self._stream.wait_event(lane.record_event())
-        for mirror in self._mirrors.values():
-            if mirror.array.ptr not in self._constant:
-                mirror.download()
+        self._numbers.download()
+        if self.records:
+            self._recorded.download()
         self._done = self._stream.record_event()
 
     def is_done(self) -> bool:
@@ -377,27 +356,27 @@ class Batch:
 
     def position(self, world: int) -> Array:
         """(n, 3): x, y [m], θ [rad]."""
-        return self._view(self.state.links)[world, :3, : self.links[world]].T.copy()
+        return self.host["state/links"][world, :3, : self.links[world]].T.copy()
 
     def velocity(self, world: int) -> Array:
         """(n, 3): their rates."""
-        return self._view(self.state.links)[world, 3:, : self.links[world]].T.copy()
+        return self.host["state/links"][world, 3:, : self.links[world]].T.copy()
 
     def status(self, world: int) -> Status:
         """Status of the world."""
-        return Status(int(self._view(self.state.status)[world]))
+        return Status(int(self.host["state/status"][world]))
 
     def statuses(self) -> NDArray[np.int32]:
         """Statuses of all worlds, as numbers; a view, not to be changed."""
-        return self._view(self.state.status)
+        return self.host["state/status"]
 
     def time(self, world: int) -> float:
         """Time [s] since loading."""
-        return float(self._view(self.state.time)[world])
+        return float(self.host["state/time"][world])
 
     def counts(self, world: int) -> dict[str, int]:
         """Counters since loading."""
-        row = self._view(self.state.counts)[world]
+        row = self.host["state/counts"][world]
         return {name: int(value) for name, value in zip(COUNTS, row, strict=True)}
 
     def attempts(self, world: int) -> int:
@@ -407,25 +386,25 @@ class Batch:
 
     def extremes(self, world: int) -> dict[str, float]:
         """Greatest joint opening and depths [m] since loading."""
-        row = self._view(self.state.extremes)[world]
+        row = self.host["state/extremes"][world]
         return {name: float(value) for name, value in zip(EXTREMES, row, strict=True)}
 
     def losses(self, world: int) -> dict[str, float]:
         """Energy [J] lost since loading, by cause."""
-        row = self._view(self.state.losses)[world]
+        row = self.host["state/losses"][world]
         return {name: float(value) for name, value in zip(LOSSES, row, strict=True)}
 
     def first_sample(self, world: int) -> Array:
         """The sample taken when the run began: (SAMPLE_COLUMNS,), see :mod:`warpchain.kernels.layout`."""
-        return np.array(self._view(self.state.first_sample)[world])
+        return np.array(self.host["state/first_sample"][world])
 
     def last_sample(self, world: int) -> Array:
         """The chain's latest sample: (SAMPLE_COLUMNS,), that of the final state if its run has ended."""
-        return np.array(self._view(self.state.last_sample)[world])
+        return np.array(self.host["state/last_sample"][world])
 
     def watched(self, world: int, row: int) -> float:
         """An entry of :attr:`State.watch` that is −1 until it is set, and then not negative; NaN while it is not."""
-        entry = float(self._view(self.state.watch)[world, row])
+        entry = float(self.host["state/watch"][world, row])
         return entry if entry >= 0 else math.nan
 
     def unloaded_at(self, world: int) -> float:
@@ -435,15 +414,15 @@ class Batch:
 
     def drain(self, world: int) -> Recorded:
         """Take what launches have recorded since it was last taken."""
-        n, record = self.links[world], self.record
-        taken, count = (int(self._view(array)[world]) for array in (record.sample_count, record.frame_count))
-        self._set(record, world, {"sample_count": 0, "frame_count": 0})
-        rows = self._view(record.frames)[world, :count]
-        loads = self._view(record.frame_loads)[world, :count, : 3 * n]
+        n, names = self.links[world], ("samples", "frame_times", "frames", "frame_loads")
+        samples, times, frames, loads = (self.host[f"record/{name}"][world] for name in names)
+        taken, count = (int(self.host[f"record/{name}"][world]) for name in ("sample_count", "frame_count"))
+        self.host["record/sample_count"][world] = self.host["record/frame_count"][world] = 0
+        rows = frames[:count]
         return Recorded(
-            samples=self._view(record.samples)[world, :taken].copy(),
-            times=self._view(record.frame_times)[world, :count].copy(),
+            samples=samples[:taken].copy(),
+            times=times[:count].copy(),
             frames=rows[:, : 2 * n].reshape(-1, 2, n).transpose(0, 2, 1).copy(),
-            loads=loads.reshape(-1, 3, n).transpose(0, 2, 1).copy(),
+            loads=loads[:count, : 3 * n].reshape(-1, 3, n).transpose(0, 2, 1).copy(),
             planes=rows[:, 2 * self.state.links.shape[2] :].reshape(-1, layout.PLANE_VALUES).copy(),
         )

@@ -43,7 +43,7 @@ def fixed_steps(device: str, method: str, fixed_body: str) -> dict[str, np.ndarr
         batch.load(world, position, velocity, stop_time=STEPS * FIXED_STEP, stop_status=Status.FINISHED)
         batch.set_drive(world, sprocket_speed=-50.0)
         batch.set_drive(world, motion=motion_rows(((0.01, 0.002, -0.01, 5.0),), 8.0, 0.02))
-        batch._edit(batch.state.step)[world] = FIXED_STEP
+        batch.set_state(world, step=FIXED_STEP)
     moves = fixed_body == "floor and sprocket"
     batch.run(range(2), batch.features(fixed_body="floor" if moves else fixed_body, moving_sprocket=moves))
     worlds = range(2)
