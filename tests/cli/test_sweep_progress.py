@@ -42,7 +42,9 @@ def test_without_a_terminal_lines_of_progress_are_printed(
             main(["sweep", str(tmp_path / "tiny.yaml"), "-o", str(tmp_path / name), "--workers", "1"])
         lines = [line for line in capsys.readouterr().err.splitlines() if " of 80 walks" in line]
         assert bool(lines) == (every == 0.0)
-    assert lines[-1].startswith("80 of 80 walks   ") and " a second   0 s left   80 time_limit" in lines[-1]
+    assert (
+        lines[-1].startswith("[##########] 80 of 80 walks   ") and " a second   0 s left   80 time_limit" in lines[-1]
+    )
 
 
 def test_an_estimate_says_time_and_size(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -234,8 +234,8 @@ def _run_in_folder(
             executor, pulse = held.enter_context(pulsing_threads(at_once))
         if missing:
             tasks = _tasks(planned, missing, at_once if pulse is None else 1)  # threads take turns on a GPU
-            given = (planned, str(store.directory), store.stamp), (kinds.threads, pulse)
-            submitted = (executor.submit(run_shards, *given[0], tuple(task), *given[1]) for task in tasks)
+            where, how = (str(store.directory), store.stamp), (kinds.threads, pulse)
+            submitted = (executor.submit(run_shards, planned, *where, tuple(task), *how) for task in tasks)
             _follow(submitted, 2 * at_once, pulse, planned, store, missing, progress, report)
         counts = counts_text(progress) or "nothing to do"
         store.log(f"complete after {progress.seconds:.1f} s: {counts}")
@@ -352,7 +352,8 @@ def _follow(
     try:
         while True:
             with losses_named():
-                pending |= set(itertools.islice(tasks, at_once - len(pending)))
+                for future in itertools.islice(tasks, at_once - len(pending)):
+                    pending.add(future)
                 if not pending:
                     break
                 finished, pending = concurrent.futures.wait(pending, POLL, concurrent.futures.FIRST_COMPLETED)
