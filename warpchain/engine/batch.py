@@ -123,7 +123,6 @@ class Batch:
         keeps_loads: bool = False,
         tilts: bool = False,
         faces: int = 1,
-        threads: int | None = None,
     ) -> None:
         """Allocate a batch. All worlds are idle (status FINISHED) until a chain is loaded.
 
@@ -137,7 +136,6 @@ class Batch:
             keeps_loads: Keep force and moment of every joint with each frame.
             tilts: Keep the plane of the chain with samples and frames.
             faces: Most faces of a floor that is not flat.
-            threads: Threads of every block on a GPU, at least as many as links; None: as many as the longest needs.
         """
         self.options = options
         self.device = start_device(options.device)
@@ -147,7 +145,7 @@ class Batch:
         self._stream: Any = self._gpu.stream() if self._gpu else None
         self._done: Any = None
         self._lanes = [self._gpu.stream() for _ in range(LANES)] if self._gpu else []
-        self.threads = (threads or block_threads(longest)) if self._gpu else 1
+        self.threads = block_threads(longest) if self._gpu else 1
 
         self.records = keeps_samples or frame_every is not None
         samples, frames = CAPACITY_SAMPLES * keeps_samples, CAPACITY_FRAMES * (frame_every is not None)

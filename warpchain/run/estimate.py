@@ -59,7 +59,7 @@ def estimate_sweep(
     at_once = 1 if kinds.on_gpu else workers or processors()
     count = min(len(indices), GPU_PILOTS if kinds.on_gpu else max(PILOTS, 2 * at_once))
     pilots = [planned.planned(int(indices[place])) for place in np.linspace(0, len(indices) - 1, count).astype(int)]
-    kinds.compile()
+    kinds.compile(count)
     with concurrent.futures.ThreadPoolExecutor(at_once) as threads:
         found = list(threads.map(_tried, [planned] * at_once, [pilots[number::at_once] for number in range(at_once)]))
     seconds, *motions = np.sum(found, axis=0) / count

@@ -18,7 +18,6 @@ import numpy as np
 from pydantic import Field
 
 from warpchain.engine.devices import gpu_turn, has_gpu_turn, start_device
-from warpchain.engine.kernel_choice import shared_threads
 from warpchain.engine.processors import processors
 from warpchain.inputs.options import Options, on_gpu
 from warpchain.inputs.sections import SECTION_OF, by_section, takes_fields
@@ -229,13 +228,13 @@ def _run_in_folder(
         if missing and executor is None:
             progress.compiling = True
             report(progress)
-            kinds.compile()
+            kinds.compile(walks - before)
             progress.compiling = False
             executor, pulse = held.enter_context(pulsing_threads(at_once))
         if missing:
             tasks = _tasks(planned, missing, at_once if pulse is None else 1)  # threads take turns on a GPU
-            where, how = (str(store.directory), store.stamp), (kinds.threads, pulse)
-            submitted = (executor.submit(run_shards, planned, *where, tuple(task), *how) for task in tasks)
+            where = str(store.directory), store.stamp
+            submitted = (executor.submit(run_shards, planned, *where, tuple(task), pulse) for task in tasks)
             _follow(submitted, 2 * at_once, pulse, planned, store, missing, progress, report)
         counts = counts_text(progress) or "nothing to do"
         store.log(f"complete after {progress.seconds:.1f} s: {counts}")
@@ -266,14 +265,7 @@ def shard_size(walks: int) -> int:
     return max(1, min(SHARD_WALKS, walks // SHARDS))
 
 
-def run_shards(
-    planned: Sweep,
-    directory: str,
-    stamp: str,
-    shards: Sequence[Shard],
-    threads: int | None = None,
-    pulse: Pulse | None = None,
-) -> None:
+def run_shards(planned: Sweep, directory: str, stamp: str, shards: Sequence[Shard], pulse: Pulse | None = None) -> None:
     """Run the walks of some shards and write each shard as soon as its walks are over; what a worker does.
 
     Args:
@@ -281,7 +273,6 @@ def run_shards(
         directory: The sweep's folder.
         stamp: What the folder has to be, see `SweepFolder.stamp`.
         shards: The shards.
-        threads: Of every block on a GPU; None: as many as its chain needs.
         pulse: Counts the walks that are over, and stops the work: unfinished shards are not written.
     """
     stop = None if pulse is None else pulse.stop
@@ -297,8 +288,8 @@ def run_shards(
         return under_way[number].setup
 
     with gpu_turn((setup.options.device for setup in setups), stop):
-        compile_kernels(setups, threads)  # all at once: a walk that needs one would wait for it alone
-        for number, run in run_setups(setups, draw=draw, keeps=keeps, threads=threads, stop=stop):
+        compile_kernels(setups)  # all at once: a walk that needs one would wait for it alone
+        for number, run in run_setups(setups, draw=draw, keeps=keeps, stop=stop):
             shard, row = places[number]
             if pulse is not None:
                 pulse.beat()
@@ -315,7 +306,6 @@ class Kinds:
     Attributes:
         devices: of all walks.
         on_gpu: Whether all walks go to a GPU.
-        threads: Of every block if the sweep runs on a GPU with one method; None: as many as a chain needs.
     """
 
     def __init__(self, planned: Sweep) -> None:
@@ -323,14 +313,11 @@ class Kinds:
         axes = (*Options.model_fields, "links", "start", "plane")
         self._setups = [setup for block in planned.blocks for setup in block.fixed_in(block.cells_along(axes))]
         self.devices = {setup.options.device for setup in self._setups}
-        self.on_gpu, methods = all(map(on_gpu, self.devices)), {setup.options.method for setup in self._setups}
-        links = (setup.scene.links for setup in self._setups)
-        alike = self.on_gpu and len(methods) == 1
-        self.threads = shared_threads(methods.pop(), links, planned.walk_count) if alike else None
+        self.on_gpu = all(map(on_gpu, self.devices))
 
-    def compile(self) -> None:
-        """Load every kernel that they need into this process, compiled if need be."""
-        compile_kernels(self._setups, self.threads)
+    def compile(self, walks: int) -> None:
+        """Load every kernel that so many walks of them need into this process, compiled if need be."""
+        compile_kernels(self._setups, walks)
 
 
 def _follow(

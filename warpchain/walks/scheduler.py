@@ -3,7 +3,7 @@
 import threading
 import time
 from collections import defaultdict, deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from warpchain.engine.batch import Batch
@@ -23,6 +23,15 @@ WORLDS_OF_BLOCK = 2
 
 With more, every walk takes longer, and so does the end of a run, when the GPU empties.
 """
+SHARED_THREADS = 192
+"""Most threads of a block that chains of several lengths share."""
+SHARED_WALKS = 2000
+"""Most walks that share such blocks; of more, each has a block of its own size.
+
+Kernels for blocks of different sizes compete for the instruction cache of a multiprocessor. With older kernels the 504
+walks of Figure 6 (60 to 180 links, os32, one H200) took 6.4 s in blocks of five sizes and 5.3 s in blocks of 192
+threads, some of them idle; 1008 walks 10.8 and 8.5 s, 2016 walks 15.8 and 15.5 s.
+"""
 BATCHES_PER_GPU = 4
 """While the host handles one of them, the others go on and fill the device."""
 NAP = 5e-4
@@ -35,7 +44,6 @@ def run_setups(
     draw: Callable[[int], Setup] | None = None,
     keeps: Sequence[Keep] | None = None,
     slots: int | None = None,
-    threads: int | None = None,
     stop: threading.Event | None = None,
     watch: Callable[[WalkRun], None] | None = None,
 ) -> Iterator[tuple[int, WalkRun]]:
@@ -51,39 +59,39 @@ def run_setups(
             frames equally often.
         slots: Number of chains that run at the same time. Default: on a GPU as many as fill it; on a CPU, where one
             core does a launch, one, which stays in the cache.
-        threads: Of every block on a GPU, see `warpchain.engine.kernel_choice.shared_threads`; no bit depends on it.
         stop: When set, the walks are abandoned after the launch that is under way.
         watch: Called after each launch of each walk.
     """
-    alike: dict[tuple[Options, int, int], list[int]] = defaultdict(list)
-    for place, setup in enumerate(setups):
-        options, links = setup.options, setup.scene.links
-        alike[options, layout.padded_width(links), _block_size(setup, threads)].append(place)
 
     def begin(place: int, batch: Batch, world: int) -> WalkRun:
         setup = setups[place] if draw is None else draw(place)
         return WalkRun(batch, world, setup, NOTHING if keeps is None else keeps[place])
 
     def group(places: list[int]) -> list[BatchRun]:
-        places.sort(key=lambda place: -setups[place].scene.links)
         kept = [] if keeps is None else [keeps[place] for place in places]
-        batches, capacity = _batches([setups[place] for place in places], kept, slots, threads)
+        batches, capacity = _batches([setups[place] for place in places], kept, slots)
         waiting = deque(places)
         return [BatchRun(batch, waiting, capacity, begin, watch) for batch in batches]
 
-    # long chains take longest: they begin first, so that the run does not wait for them in the end
-    longest_first = sorted(alike.items(), key=lambda item: item[0][1:], reverse=True)
-    yield from _run_groups((group(places) for _, places in longest_first), stop)
+    yield from _run_groups(map(group, _groups(setups, len(setups))), stop)
 
 
-def _block_size(setup: Setup, threads: int | None) -> int:
-    """Threads that carry a walk's chain."""
-    return (threads or block_threads(setup.scene.links)) if on_gpu(setup.options.device) else 1
+def _groups(setups: Sequence[Setup], walks: int) -> list[list[int]]:
+    """Places of setups whose walks run on the same kernels, for so many walks in all.
+
+    Long chains take longest: they begin first, so that the run does not wait for them in the end.
+    """
+    alike: dict[tuple[int, int, Options], list[int]] = defaultdict(list)
+    for place, setup in enumerate(setups):
+        links, size = setup.scene.links, block_threads(setup.scene.links)
+        shares = not on_gpu(setup.options.device) or (walks <= SHARED_WALKS and size <= SHARED_THREADS)
+        alike[layout.padded_width(links), 0 if shares else size, setup.options].append(place)
+    for places in alike.values():
+        places.sort(key=lambda place: -setups[place].scene.links)
+    return sorted(alike.values(), key=lambda places: -setups[places[0]].scene.links)
 
 
-def _batches(
-    setups: Sequence[Setup], keeps: Sequence[Keep], slots: int | None, threads: int | None
-) -> tuple[list[Batch], int]:
+def _batches(setups: Sequence[Setup], keeps: Sequence[Keep], slots: int | None) -> tuple[list[Batch], int]:
     """Batches for walks of equal options, and how many chains would fill the device.
 
     On a CPU it is one batch, on a GPU several, with as many worlds in all as are of use and fit.
@@ -103,7 +111,6 @@ def _batches(
         "frame_interval": max(intervals, default=0.0),
         "tilts": any(scene.plane == "tilting" for scene in scenes),
         "faces": max(map(face_count, scenes)),
-        "threads": threads,
     }
     if not on_gpu(options.device):
         return [Batch(slots or 1, **kept)], slots or 1
@@ -124,17 +131,18 @@ def most_worlds(longest: int, **kept: Any) -> int:
     return max(1, min(filling, one.device.free_memory // 2 // one.bytes))
 
 
-def compile_kernels(setups: Iterable[Setup], threads: int | None = None) -> None:
+def compile_kernels(setups: Sequence[Setup], walks: int | None = None) -> None:
     """Load every kernel that these walks need, and compile it if need be, before anybody waits for it alone.
 
     Args:
-        setups: The walks.
-        threads: As for :func:`run_setups`.
+        setups: The walks, or one of each kind.
+        walks: Their number; None: that of the setups.
     """
     wanted: set[tuple[str, Features, int]] = set()
-    for setup in setups:
-        size = _block_size(setup, threads)
-        wanted |= {(setup.options.device, features, size) for features in phase_features(setup).values()}
+    for places in _groups(setups, len(setups) if walks is None else walks):
+        device, links = setups[places[0]].options.device, setups[places[0]].scene.links
+        features = {each for place in places for each in phase_features(setups[place]).values()}
+        wanted |= {(device, each, block_threads(links) if on_gpu(device) else 1) for each in features}
     with gpu_turn(device for device, _, _ in wanted):
         load_kernels((start_device(device), features, size) for device, features, size in wanted)
 

@@ -109,17 +109,20 @@ def test_a_walk_gives_the_same_bits_in_any_batch(device: str, monkeypatch: pytes
     together = outcomes(setups)
     assert [outcomes([setup])[0] for setup in setups] == together
     assert outcomes(setups[::-1], slots=2)[::-1] == together
-    assert outcomes(setups, threads=64) == together
+    monkeypatch.setattr(scheduler, "SHARED_WALKS", 0)
+    assert outcomes(setups) == together
     monkeypatch.setattr("warpchain.engine.batch.LAUNCH_SECONDS", 0.0)
     assert outcomes(setups * 3) == together * 3
 
 
 @pytest.mark.usefixtures("gpu")
 @pytest.mark.parametrize("method", ["explicit", "rkf78", "dp5", "bs32"])
-def test_a_walk_gives_the_same_bits_in_any_block(method: str) -> None:
-    """In the block of its own size, or in one that it shares with the longest chain, see `shared_threads`."""
+def test_a_walk_gives_the_same_bits_in_any_block(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the block of its own size, or in one that it shares with the longest chain."""
     setups = [brief_setup(links, links=links, device="cuda", method=method) for links in (30, 90, 180)]
-    assert outcomes(setups, threads=192) == outcomes(setups)
+    shared = outcomes(setups)
+    monkeypatch.setattr(scheduler, "SHARED_WALKS", 0)
+    assert outcomes(setups) == shared
 
 
 def test_memory_that_holds_few_chains_only_takes_longer(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
