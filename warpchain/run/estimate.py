@@ -11,10 +11,11 @@ import numpy as np
 
 from warpchain.engine.devices import gpu_turn
 from warpchain.engine.processors import processors
-from warpchain.run.sweep_run import Kinds, checked_part, on_device
+from warpchain.inputs.options import on_gpu
+from warpchain.run.sweep_run import checked_part, kinds_of, on_device
 from warpchain.sweeps.plan import PlannedWalk, Sweep, load_sweep
 from warpchain.walks.rows import row_type
-from warpchain.walks.scheduler import run_setups
+from warpchain.walks.scheduler import compile_kernels, run_setups
 from warpchain.walks.walk_result import MOTION
 
 PILOTS: Final = 16
@@ -55,11 +56,12 @@ def estimate_sweep(
     """Try walks that are evenly spread over a sweep; arguments and errors as of :func:`warpchain.sweep`."""
     planned = load_sweep(source, **{name: value for name, value in replaced.items() if value is not None})
     planned = planned if device is None else on_device(planned, device)
-    indices, kinds = planned.indices, Kinds(planned)
-    at_once = 1 if kinds.on_gpu else workers or processors()
-    count = min(len(indices), GPU_PILOTS if kinds.on_gpu else max(PILOTS, 2 * at_once))
+    indices, kinds = planned.indices, kinds_of(planned)
+    uses_gpu = all(on_gpu(setup.options.device) for setup in kinds)
+    at_once = 1 if uses_gpu else workers or processors()
+    count = min(len(indices), GPU_PILOTS if uses_gpu else max(PILOTS, 2 * at_once))
     pilots = [planned.planned(int(indices[place])) for place in np.linspace(0, len(indices) - 1, count).astype(int)]
-    kinds.compile(count)
+    compile_kernels(kinds, count)
     with concurrent.futures.ThreadPoolExecutor(at_once) as threads:
         found = list(threads.map(_tried, [planned] * at_once, [pilots[number::at_once] for number in range(at_once)]))
     seconds, *motions = np.sum(found, axis=0) / count

@@ -210,13 +210,14 @@ def _run_in_folder(
     report: OnProgress,
 ) -> None:
     """Run what is missing in a folder."""
-    kinds, pulse, at_once = Kinds(planned), None, workers or processors()
+    kinds, pulse, at_once = kinds_of(planned), None, workers or processors()
     if executor is None:
-        if has_gpu_turn() and any(map(on_gpu, kinds.devices)):
+        devices = {setup.options.device for setup in kinds}
+        if has_gpu_turn() and any(map(on_gpu, devices)):
             raise InputError("device: this thread is in the middle of a walk on a GPU; begin a sweep when it is over")
-        for device in kinds.devices:
+        for device in devices:
             start_device(device)  # refuses one that is not there before anything is written
-        if kinds.on_gpu:
+        if all(map(on_gpu, devices)):
             at_once = 1  # the others would wait for it
     size = shard_size(planned.walk_count)
     with SweepFolder.open(folder, planned, fresh=fresh, shard_size=size, part=part) as store, ExitStack() as held:
@@ -228,7 +229,7 @@ def _run_in_folder(
         if missing and executor is None:
             progress.compiling = True
             report(progress)
-            kinds.compile(walks - before)
+            compile_kernels(kinds, walks - before)
             progress.compiling = False
             executor, pulse = held.enter_context(pulsing_threads(at_once))
         if missing:
@@ -300,24 +301,10 @@ def run_shards(planned: Sweep, directory: str, stamp: str, shards: Sequence[Shar
                 write_shard(directory, stamp, shard, rows.pop(shard), motions.pop(shard))
 
 
-class Kinds:
-    """Setups with all options, numbers of links and starts that walks of a sweep have, but not with all else.
-
-    Attributes:
-        devices: of all walks.
-        on_gpu: Whether all walks go to a GPU.
-    """
-
-    def __init__(self, planned: Sweep) -> None:
-        """Those of a sweep."""
-        axes = (*Options.model_fields, "links", "start", "plane")
-        self._setups = [setup for block in planned.blocks for setup in block.fixed_in(block.cells_along(axes))]
-        self.devices = {setup.options.device for setup in self._setups}
-        self.on_gpu = all(map(on_gpu, self.devices))
-
-    def compile(self, walks: int) -> None:
-        """Load every kernel that so many walks of them need into this process, compiled if need be."""
-        compile_kernels(self._setups, walks)
+def kinds_of(planned: Sweep) -> list[Setup]:
+    """Setups with all options, numbers of links and starts that walks of a sweep have, but not with all else."""
+    axes = (*Options.model_fields, "links", "start", "plane")
+    return [setup for block in planned.blocks for setup in block.fixed_in(block.cells_along(axes))]
 
 
 def _follow(
