@@ -71,8 +71,6 @@ class WalkRun:
         drive_time: Simulated time [s] before the release.
         drift: How far the loop moved while it was last watched on its sprocket, relative to its height or width; NaN if
             it was not watched.
-        drive_counts: Counters (:data:`warpchain.engine.tallies.COUNTS`) of the time before the release.
-        drive_extremes: Greatest opening and depths [m] of the time before the release.
         is_free: Whether the chain walks without a sprocket, and all that its start brings has been done.
         recorder: What is kept of the motion since the release.
     """
@@ -85,8 +83,7 @@ class WalkRun:
         self.status = Status.RUNNING
         self.raised = self.drift = self._at_full_speed = math.nan
         self.drive_time = 0.0
-        self.drive_counts = dict.fromkeys(COUNTS, 0)
-        self.drive_extremes = dict.fromkeys(EXTREMES, 0.0)
+        self._before = {"counts": np.zeros(len(COUNTS), int), "extremes": np.zeros(len(EXTREMES))}  # the release
         self.is_free = self._released = False
         self._batch, self._world = batch, world
         self._hold_softness = 0.0
@@ -133,7 +130,7 @@ class WalkRun:
             if batch.status(world) != Status.FINISHED:
                 return
             self.drive_time = batch.time(world)
-            self.drive_counts, self.drive_extremes = batch.counts(world), batch.extremes(world)
+            self._before = {name: batch.host[f"state/{name}"][world].copy() for name in self._before}
             free_since = float(np.fmax(self._at_full_speed, batch.unloaded_at(world)))
             self._release(batch.position(world), batch.velocity(world), hanging)
             self.recorder.release(self.drive_time, self.raised, free_since)
@@ -192,14 +189,15 @@ class WalkRun:
     @property
     def counts(self) -> dict[str, int]:
         """Counters of all phases so far."""
-        now = self._batch.counts(self._world)
-        return {name: self.drive_counts[name] + now[name] for name in COUNTS} if self._released else now
+        before = self._before["counts"] if self._released else 0
+        return dict(zip(COUNTS, (before + self._batch.host["state/counts"][self._world]).tolist(), strict=True))
 
     @property
     def extremes(self) -> dict[str, float]:
         """Greatest opening and depths [m] of all phases so far."""
-        now = self._batch.extremes(self._world)
-        return {name: max(self.drive_extremes[name], now[name]) for name in EXTREMES} if self._released else now
+        now = self._batch.host["state/extremes"][self._world]
+        now = np.fmax(self._before["extremes"], now) if self._released else now
+        return dict(zip(EXTREMES, now.tolist(), strict=True))
 
     @property
     def attempts(self) -> int:
@@ -325,8 +323,7 @@ class WalkRun:
             **take_snapshot(self._batch, self._world),
             "setup": self.setup.fingerprint,
             **{f"run/{name}": np.array(getattr(self, name)) for name in _OF_THE_RUN},
-            "run/counts": np.array([self.drive_counts[name] for name in COUNTS]),
-            "run/extremes": np.array([self.drive_extremes[name] for name in EXTREMES]),
+            **{f"run/{name}": values for name, values in self._before.items()},
         }
 
     def _go_on(self, start: State) -> float | None:
@@ -344,8 +341,7 @@ class WalkRun:
             return None
         for name in _OF_THE_RUN:
             setattr(self, name, memory[f"run/{name}"].item())
-        self.drive_counts = dict(zip(COUNTS, memory["run/counts"].tolist(), strict=True))
-        self.drive_extremes = dict(zip(EXTREMES, memory["run/extremes"].tolist(), strict=True))
+        self._before = {name: memory[f"run/{name}"] for name in self._before}
         is_kept, interval = start.is_placed_as_in(self.setup), self.recorder.keep.frame_interval
         restore(batch, world, {name: part for name, part in memory.items() if is_kept or name not in CACHES})
         batch.set_state(world, next_frame=np.floor(start.time / interval) if interval > 0 else -1)
@@ -407,7 +403,7 @@ class WalkRun:
             velocity,
             stop_time=self._walk_end,
             stop_status=Status.TIME_LIMIT,
-            attempts_before=self.drive_counts["accepted"] + self.drive_counts["rejected"],
+            attempts_before=int(self._before["counts"][[layout.ACCEPTED, layout.REJECTED]].sum()),
             softness=self._hold_softness,
             has_frame_marks=self.recorder.keep.frame_interval > 0,
         )
