@@ -209,11 +209,18 @@ class Batch:
         self.host["model/chains"][world] = constants_of(parameters, own, radius)
         self.host["model/links"][world, :, :links] = rows_of(own)
 
-    def set_floor(self, world: int, points: Array, parameters: Parameters) -> None:
-        """Set the floor of a world's chain, by the points of its profile (p, 2), if it is not flat."""
-        self.host["model/faces"][world, : len(points) - 1] = faces_of(points)
+    def set_floor(self, world: int, points: Array, laws: Array) -> None:
+        """Set the floor of a world's chain, which is set, if it is not flat.
+
+        Args:
+            world: Index.
+            points: Of its profile, (p, 2).
+            laws: Coefficients of restitution and friction of its p − 1 faces, (p − 1, 2).
+        """
+        self.host["model/faces"][world, : len(points) - 1] = faces_of(points, laws)
         if len(points) > 2:
-            self.host["model/cells"][world] = cells_of(points, parameters.link_length, parameters.circle_radius)
+            chain = self.host["model/chains"][world]
+            self.host["model/cells"][world] = cells_of(points, 2 * chain["half_length"], chain["circle_radius"])
 
     def load(
         self,

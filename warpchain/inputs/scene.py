@@ -36,7 +36,7 @@ LONGEST: Final = 1e6
 STEEPEST: Final = 80.0
 """Greatest angle of a slope [°]."""
 RIGHT_ANGLE: Final = math.pi / 2
-OF_LINKS: Final = ("link_masses", "link_inertias", "viscous_frictions", "coulomb_frictions")
+OF_LINKS: Final = ("link_masses", "link_inertias", "viscous_frictions", "coulomb_frictions", "link_radii")
 """Fields with a number for each link or joint."""
 LISTS: Final = (*OF_LINKS, "release", "floor")
 """Fields that take lists, so that they are no axes of a sweep."""
@@ -136,7 +136,11 @@ class Scene(Section):
     floor: Annotated[
         Annotated[Literal["flat"], Tag("(flat)")] | Annotated[Points, Tag("(points)")],
         Discriminator(lambda given: "(flat)" if isinstance(given, str) else "(points)"),
-    ] = Field(default="flat", description="flat, or a profile [[x, y], …] in m, whose ends go on straight")
+    ] = Field(
+        default="flat",
+        description="flat, or a profile [[x, y], …] in m, whose ends go on straight; [x, y, e, μ] gives "
+        "restitution and friction of the line that begins there",
+    )
     slope: float = number_field(
         0.0, "°", "of an endless floor; positive: it falls the way the chain walks", ge=-STEEPEST, le=STEEPEST
     )
@@ -183,6 +187,9 @@ class Scene(Section):
     charm_inertia: float = number_field(
         0.0, "kg m²", "moment of inertia of the charm about that centre, added likewise", ge=0, le=1e12
     )
+    charm_radius: float | None = number_field(
+        None, "m", "radius of both circles of charm_link; null: of its own", gt=0, le=1e3
+    )
     stiff_joint: int = number_field(
         0, "1", "joint that is stiff: the one at the end of this link", ge=0, le=MOST_LINKS - 1
     )
@@ -200,6 +207,7 @@ class Scene(Section):
     link_inertias: _Numbers = number_field(None, "kg m²", "moment of inertia of each link; null: of its kind")
     viscous_frictions: _Numbers = number_field(None, "N m s", "viscous_friction of each joint; null: the same for all")
     coulomb_frictions: _Numbers = number_field(None, "N m", "coulomb_friction of each joint; null: the same for all")
+    link_radii: _Numbers = number_field(None, "m", "radius of both circles of each link; null: circle_radius")
 
     @model_validator(mode="after")
     def _goes_together(self) -> Self:
@@ -213,7 +221,7 @@ class Scene(Section):
             if values is not None and len(values) != self.links:
                 raise InputError(f"{name}: {len(values)} numbers for {self.links} links; give one for each")
             if values is not None and name.startswith("link") and min(values) == 0:
-                raise InputError(f"{name}[{values.index(0)}]: 0 is no {name[5:-2]}; give more")
+                raise InputError(f"{name}[{values.index(0)}]: 0 is too little; give more")
         if self.slope != 0 and self.floor != "flat":
             raise InputError(f"slope: {self.slope} of a floor that is a profile; give slope: 0, or floor: flat")
         if self.plane == "tilting" and floor_points(self) is not None:
@@ -236,8 +244,15 @@ class Scene(Section):
 def floor_points(scene: Scene) -> Array | None:
     """Points of the floor's profile [m], shape (p, 2); None if it is flat."""
     if scene.floor != "flat":
-        return np.array(scene.floor)
+        return np.array([point[:2] for point in scene.floor])
     return slope_points(scene.slope) if scene.slope != 0 else None
+
+
+def floor_laws(scene: Scene, parameters: Parameters) -> Array:
+    """Coefficients of restitution and friction of each straight face of the floor, shape (faces, 2)."""
+    usual = (parameters.floor_restitution, parameters.floor_friction)
+    points = ((), ()) if scene.floor == "flat" else scene.floor
+    return np.array([point[2:] or usual for point in points[:-1]])
 
 
 def floor_body(scene: Scene) -> str:
@@ -256,10 +271,8 @@ def face_count(scene: Scene) -> int:
 def link_values(scene: Scene, parameters: Parameters) -> LinkValues:
     """What each link and joint of the chain of a walk has of its own."""
     values = alternating(parameters, scene.links)
-    given = (scene.link_masses, scene.link_inertias, scene.viscous_frictions, scene.coulomb_frictions)
-    rows = (values.mass, values.inertia, values.viscous_friction, values.coulomb_friction)
-    for row, own in zip(rows, given, strict=True):
-        if own is not None:
+    for row, name in zip(vars(values).values(), OF_LINKS, strict=True):
+        if (own := getattr(scene, name)) is not None:
             row[:] = own
     if scene.mass_gradient:
         growth = 1 + scene.mass_gradient * np.linspace(-1.0, 1.0, scene.links)
@@ -267,9 +280,28 @@ def link_values(scene: Scene, parameters: Parameters) -> LinkValues:
         values.inertia[:] *= growth
     values.mass[scene.charm_link] += scene.charm_mass
     values.inertia[scene.charm_link] += scene.charm_inertia
+    if scene.charm_radius is not None:
+        values.radius[scene.charm_link] = scene.charm_radius
     values.viscous_friction[scene.stiff_joint] *= scene.stiff_joint_factor
     values.coulomb_friction[scene.stiff_joint] *= scene.stiff_joint_factor
     return values
+
+
+def check_links(scene: Scene, parameters: Parameters) -> None:
+    """Check that links that have circles of their own are longer than these are wide.
+
+    Raises:
+        InputError: they are not.
+    """
+    if scene.link_radii is None and scene.charm_radius is None:
+        return
+    radii = link_values(scene, parameters).radius
+    if not radii.max() < parameters.link_length / 2:
+        field = "charm_radius" if scene.charm_radius == radii.max() else f"link_radii[{radii.argmax()}]"
+        raise InputError(
+            f"scene.{field}: {radii.max()} is not smaller than half the link length {parameters.link_length / 2}; "
+            "give less"
+        )
 
 
 def check_parity(scene: Scene, parameters: Parameters, path: str = "scene.links") -> None:
@@ -358,10 +390,11 @@ def check_scene(scene: Scene, parameters: Parameters) -> None:
     A scene that starts as an ellipse has no sprocket, so nothing is asked of that.
 
     Raises:
-        InputError: links of two kinds are odd in number, the chain is too short for its sprocket, or the sprocket too
-            small, or `contact_radius` finds none, or the links are too point-like for the load factor that is given, or
-            the frequency is one of minutes.
+        InputError: circles are too wide, links of two kinds are odd in number, the chain is too short for its
+            sprocket, or the sprocket too small, or `contact_radius` finds none, or the links are too point-like for the
+            load factor that is given, or the frequency is one of minutes.
     """
+    check_links(scene, parameters)
     check_parity(scene, parameters)
     if scene.start == "ellipse":
         return

@@ -12,7 +12,15 @@ from warpchain.inputs.floor import check_above
 from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL, Options, replaced_by
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.parameters import preset as parameter_preset
-from warpchain.inputs.scene import OF_LINKS, Scene, check_links_on_gpu, check_parity, check_scene, floor_points
+from warpchain.inputs.scene import (
+    OF_LINKS,
+    Scene,
+    check_links,
+    check_links_on_gpu,
+    check_parity,
+    check_scene,
+    floor_points,
+)
 from warpchain.inputs.state import DEFAULT_PRESET, Setup, State
 from warpchain.inputs.validation import InputError, shown, validated
 from warpchain.kernels.methods.method import find_method
@@ -21,7 +29,16 @@ __all__ = ["DEFAULT_PRESET", "Setup", "combined", "continued", "options_beside",
 
 OF_THE_WALK: Final = (
     *("walk_limit", "walk_until", "distance_limit", "floor", "slope"),
-    *(*OF_LINKS, "mass_gradient", "charm_mass", "charm_inertia", "charm_link", "stiff_joint", "stiff_joint_factor"),
+    *(
+        *OF_LINKS,
+        "mass_gradient",
+        "charm_mass",
+        "charm_inertia",
+        "charm_radius",
+        "charm_link",
+        "stiff_joint",
+        "stiff_joint_factor",
+    ),
 )
 """Fields of the scene that matter after the release, and may change there."""
 
@@ -131,6 +148,7 @@ def continued(state: State, sections: Mapping[str, Mapping[str, object]]) -> Set
     scene = validated(Scene, {**vars(before.scene), **sections["scene"]}, "scene")
     parameters = before.parameters.with_values(sections["parameters"]) if sections["parameters"] else before.parameters
     _check_can_tilt(scene, options)
+    check_links(scene, parameters)
     check_parity(scene, parameters)
     check_links_on_gpu(scene.links, options.device, "start")
     for name in OF_THE_WALK[:2]:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from warpchain.pictures.chain import (
     ABOVE,
     SIDE,
+    circle_radii,
     draw_chain,
     draw_ground,
     floor_height,
@@ -105,7 +106,7 @@ def film_strip(walk: "WalkResult", figure: Figure | None = None) -> Figure:
     colors = colormaps["viridis"](0.9 * walk.frame_time / (walk.frame_time[-1] or 1.0))[:, :3]
     center = center_in_room(walk)
     path = np.stack([np.interp(walk.frame_time, walk.time, row) for row in center.T], axis=1)
-    radius = walk.setup.parameters.circle_radius
+    radius = circle_radii(walk)
     shown = _instants(path, float(np.ptp(joints[0, :, 0])))
     for title, axes, view in views:
         for frame in shown:
@@ -117,7 +118,7 @@ def film_strip(walk: "WalkResult", figure: Figure | None = None) -> Figure:
         axes = panel(_LEFT + number * close_up_width, _FOOT, close_up_width - 0.1, lower)
         draw_chain(axes, joints[close_up.frame], radius, SIDE, _link_colors(colors[close_up.frame]), edge=0.6)
         _frame_close_up(axes, side, walk, close_up, "abcd"[number], walk.frame_time[close_up.frame])
-    _write_times(side, walk.frame_time[shown], joints[shown, :, :2], colors[shown], 1.2 * radius, 1 / scale)
+    _write_times(side, walk.frame_time[shown], joints[shown, :, :2], colors[shown], 1.2 * radius.max(), 1 / scale)
     style: dict[str, Any] = {"frameon": False, "ncols": 2, "borderaxespad": 0.0, "fontsize": "small"}
     place = (1 - _RIGHT / paper[0], 1 - 0.08 / paper[1])
     figure.legend(*side.get_legend_handles_labels(), loc="upper right", bbox_to_anchor=place, **style)
@@ -211,7 +212,7 @@ def _close_ups(walk: "WalkResult") -> list[_CloseUp]:
 
     They are the first touch of the floor, the first self-contact, the collapse and the end, as far as they happen.
     """
-    joints, radius = walk.frame_joints, walk.setup.parameters.circle_radius
+    joints, radius = walk.frame_joints, circle_radii(walk).max()
     above, last = from_floor(walk, joints), len(joints) - 1
     found: dict[int, tuple[str, Array]] = {}
     touching = np.flatnonzero(above.min(axis=1) < 1.02 * radius)

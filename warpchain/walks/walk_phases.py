@@ -17,7 +17,15 @@ from warpchain.engine.snapshot import CACHES, change, restore, take_snapshot
 from warpchain.engine.sprocket_motion import motion_rows
 from warpchain.engine.tallies import CONTACTS, COUNTS, EXTREMES, LOST
 from warpchain.inputs.floor import circles_of, raised_by
-from warpchain.inputs.scene import contact_radius, floor_body, floor_points, joint_radius, link_values, settling_time
+from warpchain.inputs.scene import (
+    contact_radius,
+    floor_body,
+    floor_laws,
+    floor_points,
+    joint_radius,
+    link_values,
+    settling_time,
+)
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.inputs.state import State
@@ -366,18 +374,17 @@ class WalkRun:
 
     def _raise(self, position: Array) -> float:
         """How far a chain at this position must be raised to its clearance [m]."""
-        clearance, parameters = self.setup.scene.clearance, self.setup.parameters
+        clearance, length, radius = self.setup.scene.clearance, self.setup.parameters.link_length, self._links.radius
         if self._floor is None:
-            return clearance - lowest_point(position, parameters)
-        circles = circles_of(position, parameters.link_length)
-        return raised_by(self._floor, circles, parameters.circle_radius, clearance)
+            return clearance - lowest_point(position, length, radius)
+        return raised_by(self._floor, circles_of(position, length), np.tile(radius, 2), clearance)
 
     def _set_floor(self) -> None:
         """Set the floor, and how far the chain may walk on it."""
         scene = self.setup.scene
         self._batch.set_drive(self._world, farthest=(scene.distance_limit or 0.0) * self._level)
         if self._floor is not None:
-            self._batch.set_floor(self._world, self._floor, self.setup.parameters)
+            self._batch.set_floor(self._world, self._floor, floor_laws(scene, self.setup.parameters))
 
     def _release(self, position: Array, velocity: Array, hanging: float = math.nan) -> None:
         """Begin the walk of a chain; ``hanging``: how far it must be raised as it hung on its sprocket at rest [m]."""

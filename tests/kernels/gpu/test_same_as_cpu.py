@@ -22,6 +22,7 @@ from tests.support.blocks_under_test import (
     launch_blocks,
     launch_chains,
 )
+from tests.support.kernels_under_test import common_laws
 from tests.support.unlike_links import unlike_links
 from warpchain.engine.batch import Batch
 from warpchain.engine.kernel_choice import most_registers
@@ -53,7 +54,7 @@ def test_fixed_steps_equal_a_cpu_kernel(method: str, fixed_body: str, self_conta
     ours, theirs = (batch_of(chains, method=method, self_contact=self_contact) for _ in range(2))
     for batch in (ours, theirs):
         for world in range(2):
-            batch.set_floor(world, HILLS, SOFT)
+            batch.set_floor(world, HILLS, common_laws(HILLS, SOFT))
     features = ours.features(fixed_body=fixed_body)
     launch_blocks(ours, features, 40, block_dim=block_dim)
     launch_chains(theirs, features, 40)
