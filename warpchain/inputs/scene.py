@@ -139,7 +139,7 @@ class Scene(Section):
     ] = Field(
         default="flat",
         description="flat, or a profile [[x, y], …] in m, whose ends go on straight; [x, y, e, μ] gives "
-        "restitution and friction of the line that begins there",
+        "the line from there its own e and μ",
     )
     slope: float = number_field(
         0.0, "°", "of an endless floor; positive: it falls the way the chain walks", ge=-STEEPEST, le=STEEPEST
@@ -187,9 +187,7 @@ class Scene(Section):
     charm_inertia: float = number_field(
         0.0, "kg m²", "moment of inertia of the charm about that centre, added likewise", ge=0, le=1e12
     )
-    charm_radius: float | None = number_field(
-        None, "m", "radius of both circles of charm_link; null: of its own", gt=0, le=1e3
-    )
+    charm_radius: float | None = number_field(None, "m", "radius of circles of charm_link; null: its own", gt=0, le=1e3)
     stiff_joint: int = number_field(
         0, "1", "joint that is stiff: the one at the end of this link", ge=0, le=MOST_LINKS - 1
     )
@@ -207,7 +205,7 @@ class Scene(Section):
     link_inertias: _Numbers = number_field(None, "kg m²", "moment of inertia of each link; null: of its kind")
     viscous_frictions: _Numbers = number_field(None, "N m s", "viscous_friction of each joint; null: the same for all")
     coulomb_frictions: _Numbers = number_field(None, "N m", "coulomb_friction of each joint; null: the same for all")
-    link_radii: _Numbers = number_field(None, "m", "radius of both circles of each link; null: circle_radius")
+    link_radii: _Numbers = number_field(None, "m", "radius of circles of each link; null: circle_radius")
 
     @model_validator(mode="after")
     def _goes_together(self) -> Self:
