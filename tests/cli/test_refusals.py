@@ -35,7 +35,7 @@ REFUSED = {
     "walk --set mu_fc=0.3 --set floor_friction=0.3": "parameters.floor_friction: given twice on the command line;",
     "walk -o new --device cuda:98": "options.device: there is no cuda:98 on this machine",
     "walk --config nowhere.yaml": "nowhere.yaml: No such file",
-    "walk -o new --frame-interval 0": "frame_interval: 0 is no positive time in s",
+    "walk -o new --frame-interval 0": "frame_interval: Input should be greater than",
     "walk --animate gif": "--animate: there is no folder to write to; add -o DIR",
     "walk -o new --animate avi": "Invalid value for '--animate'",
     "walk --frobnicate": "No such option: --frobnicate (Possible options: --animate); see warpchain walk --help",

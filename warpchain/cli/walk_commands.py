@@ -87,7 +87,6 @@ def walk(
     from warpchain.inputs.validation import InputError, checked, printable
     from warpchain.inputs.yaml_files import parse_yaml
     from warpchain.run.progress_bar import changing_line, walk_progress_text
-    from warpchain.sweeps.sweep_file import read_walk_file
     from warpchain.walks.one_walk import run_walk
 
     named = {"links": links, "frequency": frequency, "start": start}
@@ -102,6 +101,8 @@ def walk(
         replaced = replaced_by(given["options"])
         preset, own = base.preset, {name: getattr(base, name).model_dump(exclude=replaced) for name in SECTIONS}
     elif config is not None:
+        from warpchain.sweeps.sweep_file import read_walk_file  # its grammar takes long to build
+
         file_preset, own = read_walk_file(config)
         preset = preset or file_preset
         if preset is None:

@@ -3,11 +3,14 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import Field
 
 from warpchain.engine.devices import gpu_turn, versions
 from warpchain.inputs.options import Options
 from warpchain.inputs.setup import Setup, check_has_joint_forces
-from warpchain.inputs.validation import InputError, checked_positive, plain, shown
+from warpchain.inputs.validation import InputError, checked, plain
 from warpchain.walks.motion import LONGEST_INTERVAL, Keep
 from warpchain.walks.scheduler import run_setups
 from warpchain.walks.walk_phases import WalkRun
@@ -50,8 +53,8 @@ def run_walk(
 ) -> WalkResult:
     """Run a walk whose setup is complete, samples drawn; the seed is only noted. The rest is as of `warpchain.walk`."""
     started = time.perf_counter()
-    frame_every, between = _frame_marks(plain(frame_interval, "frame_interval"), setup.options)
-    before = _time_before(plain(record_before, "record_before"), frame_every) if setup.has_drive else 0.0
+    frame_every, between = _frame_marks(frame_interval, setup.options)
+    before = _time_before(record_before, frame_every) if setup.has_drive else 0.0
 
     if record_loads:
         check_has_joint_forces(setup.options)
@@ -84,12 +87,8 @@ def _frame_marks(frame_interval: object, options: Options) -> tuple[int | None, 
     """
     if frame_interval is None:
         return None, 0.0
-    interval = checked_positive(frame_interval, "frame_interval", "time in s")
-    if not SHORTEST_INTERVAL <= interval < LONGEST_INTERVAL:
-        raise InputError(
-            f"frame_interval: {shown(interval)} is not between {SHORTEST_INTERVAL} s and {LONGEST_INTERVAL} s; "
-            "give a time between, or None"
-        )
+    between = Annotated[float, Field(ge=SHORTEST_INTERVAL, lt=LONGEST_INTERVAL)]
+    interval = checked(frame_interval, "frame_interval", between, "s")
     samples = interval / options.record_interval
     return (round(samples), 0.0) if samples > 0.999 else (1, float(interval))
 
@@ -98,11 +97,7 @@ def _time_before(record_before: float | None, frame_every: int | None) -> float:
     """Time [s] before the release that is kept, or an `InputError`."""
     if record_before is None:
         return RECORD_BEFORE if frame_every is not None else 0.0
-    is_number = isinstance(record_before, int | float) and not isinstance(record_before, bool)
-    if not (is_number and 0 <= record_before <= LONGEST_INTERVAL):
-        raise InputError(
-            f"record_before: {shown(record_before)} is not a time in s from 0 to {LONGEST_INTERVAL}; give one, or None"
-        )
-    if record_before > 0 and frame_every is None:
+    before = checked(record_before, "record_before", Annotated[float, Field(ge=0, le=LONGEST_INTERVAL)], "s")
+    if before > 0 and frame_every is None:
         raise InputError("record_before: a time is given, but frame_interval is None; give a frame_interval as well")
-    return float(record_before)
+    return float(before)
