@@ -11,6 +11,7 @@ from tests.oracle_model.circular_loop import circular_loop
 from tests.support.setups import setup_walk
 from warpchain import Chains, InputError, simulate, walk
 from warpchain.engine.batch import Batch
+from warpchain.walks import one_walk
 
 SOFT = warpchain.preset("soft")
 SETUP = setup_walk("soft", {}, None)
@@ -30,8 +31,8 @@ def nothing_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object, **__: object) -> None:
         raise ComputedError
 
-    for name in ("compile", "launch", "run"):
-        monkeypatch.setattr(Batch, name, refuse)
+    monkeypatch.setattr(Batch, "start", refuse)
+    monkeypatch.setattr(one_walk, "compile_kernels", refuse)
 
 
 def changed(value: complex) -> Any:

@@ -123,7 +123,7 @@ def walk(
             seed=number,
             frame_interval=interval,
             record_loads=record_loads,
-            on_progress=show and (lambda progress: show(walk_progress_text(progress))),
+            on_progress=lambda progress: show(walk_progress_text(progress)),
         )
     if as_json:
         print(json.dumps(result.to_dict(), indent=2, allow_nan=False))

@@ -188,7 +188,7 @@ class Chains:
         numbers = self._numbers(chains)
         rates = checked_array(velocity, "velocity", len(numbers), self._links, 3)
         if numbers:
-            self._batch.set_velocities(numbers, rates)
+            self._batch.place(numbers, self.motions(numbers)[0], rates)
 
     def run(
         self,
