@@ -9,6 +9,7 @@ import warpchain
 from tests.support import command_line
 from tests.support.command_line import Command
 from tests.support.made_walks import assert_same
+from warpchain.inputs.options import Options
 from warpchain.inputs.validation import InputError
 from warpchain.walks.walk_result import WalkResult
 
@@ -106,8 +107,6 @@ def test_a_method_beside_like_brings_its_settings(
     command: Command, saved: Path, monkeypatch: pytest.MonkeyPatch, line: str, expected: dict[str, object]
 ) -> None:
     """A method means the same as in a new walk."""
-    from warpchain.inputs.options import Options
-
     seen = []
 
     def run_walk(setup: object, **_: object) -> None:

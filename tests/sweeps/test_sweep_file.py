@@ -43,19 +43,12 @@ def test_values_and_layout() -> None:
 
 def test_blocks_inherit_and_override() -> None:
     """A block takes from the top level what it does not say itself, value by value; a grid beats inherited values."""
+    own = {"preset": "paper", "samples": 2, "sampler": "latin_hypercube", "scene": {"start": "ellipse"}}
+    own |= {"options": {"method": "bs32"}, "distributions": {"floor_friction": "fixed"}}
     sweep = load_sweep(
         blocks(
             {"grid": {"links": [60]}},
-            {
-                "preset": "paper",
-                "samples": 2,
-                "sampler": "latin_hypercube",
-                "scene": {"start": "ellipse"},
-                "options": {"tolerance": 1e-9},
-                "distributions": {"floor_friction": "fixed"},
-                "grid": {"frequency": [10, 20], "tolerance": [1e-5]},
-            }
-            | {"options": {"method": "bs32"}},
+            own | {"grid": {"frequency": [10, 20], "tolerance": [1e-5]}},
             {"grid": {"preset": ["paper", "soft"]}},
             scene={"links": 90, "frequency": 15},
             options={"tolerance": 1e-7},
@@ -63,18 +56,19 @@ def test_blocks_inherit_and_override() -> None:
             distributions={"floor_friction": {"gaussian": {"sigma": 0.01}}},
         )
     )
-    assert [block.name for block in sweep.blocks] == ["b0", "b1", "b2"]
-    assert [block.first_cell for block in sweep.blocks] == [0, 1, 3]
+    assert [(block.name, block.first_cell) for block in sweep.blocks] == [("b0", 0), ("b1", 1), ("b2", 3)]
     assert [block.sampler for block in sweep.blocks] == ["random", "latin_hypercube", "random"]
     assert sweep.walk_count == 13
     first, second, paper, soft = (sweep.planned(index).setup for index in (0, 2, 3, 4))
-    assert (first.preset, first.scene.links, first.scene.start) == ("soft", 60, "rest")
-    assert (first.scene.frequency, first.options.tolerance, first.options.method) == (15, 1e-7, "hybrid")
-    assert (second.preset, second.scene.links, second.scene.start) == ("paper", 90, "ellipse")
-    assert (second.scene.frequency, second.options.tolerance, second.options.method) == (20, 1e-5, "bs32")
+    for setup, *expected in (
+        (first, "soft", 60, "rest", 15, 1e-7, "hybrid"),
+        (second, "paper", 90, "ellipse", 20, 1e-5, "bs32"),
+    ):
+        scene, options = setup.scene, setup.options
+        found = [setup.preset, scene.links, scene.start, scene.frequency, options.tolerance, options.method]
+        assert found == expected
     assert second.parameters.floor_friction == 0.3 != first.parameters.floor_friction
-    assert (paper.preset, paper.parameters.joint_stiffness) == ("paper", 1e9)
-    assert (soft.preset, soft.parameters.joint_stiffness) == ("soft", 1e7)
+    assert [(each.preset, each.parameters.joint_stiffness) for each in (paper, soft)] == [("paper", 1e9), ("soft", 1e7)]
 
 
 @pytest.mark.parametrize(
