@@ -97,8 +97,7 @@ def circles_of(position: Array, link_length: float) -> Array:
 def check_above(points: Array | None, position: Array, link_length: float, path: str) -> None:
     """Check that the middle of no circle of links (n, 3) is below the floor, where it would never come out.
 
-    Raises:
-        InputError: one is; the message begins with `path`.
+    If one is, an `InputError` begins with `path`.
     """
     circles = circles_of(position, link_length)
     depth = -(circles[:, 1] if points is None else distances(points, circles))

@@ -20,6 +20,7 @@ from pydantic import Field
 from warpchain.engine.devices import gpu_turn, has_gpu_turn, start_device
 from warpchain.engine.processors import processors
 from warpchain.inputs.options import Options, on_gpu
+from warpchain.inputs.scene import LISTS
 from warpchain.inputs.sections import SECTION_OF, by_section, takes_fields
 from warpchain.inputs.setup import DEFAULT_PRESET, Setup
 from warpchain.inputs.validation import InputError, Whole, by_name, checked, checked_path, plain, shown, validated
@@ -76,7 +77,8 @@ def sweep(
         out: Folder of the results. A sweep that was killed goes on where it was, and leaves the same bytes. A sweep
             with more samples than the folder, and else the same, adds them; latin hypercubes do not grow.
         settings: Whatever :func:`walk` takes; a list, an array or a range ``{"from":, "to":, "step":}`` is an axis of
-            the grid. The last axis varies fastest. Beside these the keys of a sweep file:
+            the grid, and so are names with floors, releases or lists of numbers for links. The last axis varies
+            fastest. Beside these the keys of a sweep file:
         grid: Further axes, which come before those of the settings.
         points: Parameter sets, as a table or a mapping: quantity → its value in each set. They are one more axis,
             ``point``, beside the grid.
@@ -178,7 +180,8 @@ def sweep_of_keywords(given: Mapping[str, object], out: str | os.PathLike[str] |
     if isinstance(content.get("preset"), list):
         values = {"preset": content.pop("preset"), **values}
     for name, value in by_name(values).items():
-        key = "grid" if isinstance(value, list | dict) else SECTION_OF[name]
+        is_axis = isinstance(value, dict) or (isinstance(value, list) and name not in LISTS)
+        key = "grid" if is_axis else SECTION_OF[name]
         others = content.setdefault(key, {})
         if isinstance(others, dict):  # the check of the content refuses anything else
             if name in by_name(others):
