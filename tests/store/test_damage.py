@@ -60,7 +60,7 @@ def test_damage_is_refused_or_does_no_harm(tmp_path: Path, kind: str) -> None:
         read: Callable[[], Any] = lambda: walk_numbers(path)  # noqa: E731
     else:
         run(tmp_path / "sweep")
-        path = tmp_path / "sweep/shards/0-000001.h5" if kind == "shard" else tmp_path / "sweep/sweep.json"
+        path = tmp_path / "sweep/shards/000001.h5" if kind == "shard" else tmp_path / "sweep/sweep.json"
         read = lambda: sweep_numbers(tmp_path / "sweep")  # noqa: E731
     if kind == "merged":
         path = tmp_path / "all.h5"
@@ -127,7 +127,7 @@ def status_of(*arguments: object) -> int | str | None:
 # What is in a folder
 
 
-@pytest.mark.parametrize("name", ["sweep.json", "lock", "shards/0-000000.h5", "log.txt"])
+@pytest.mark.parametrize("name", ["sweep.json", "lock", "shards/000000.h5", "log.txt"])
 def test_pipes_in_a_folder_are_refused(tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
     """Nobody waits for a pipe that nobody writes to."""
     run(tmp_path)

@@ -24,13 +24,14 @@ from tests.support.stopped_calls import is_stopped
 from tests.support.synthetic_sweep import LONG_SWEEP, SHARD_SIZE, SWEEP, content, run, synthetic_rows, write
 from warpchain.inputs.validation import InputError, InputWarning
 from warpchain.store import folder
-from warpchain.store.folder import SweepFolder, read_rows
+from warpchain.store.folder import SweepFolder
 from warpchain.store.manifest import Manifest, read_manifest
 from warpchain.store.shards import write_shard
+from warpchain.store.sweep_result import load
 from warpchain.version import NUMERICS_VERSION
 
-FIRST, SECOND = "0-000000.h5", "0-000001.h5"
-SHARDS = Manifest.of(SWEEP, SHARD_SIZE).shards
+FIRST, SECOND = "000000.h5", "000001.h5"
+SHARDS = Manifest.of(SWEEP, SHARD_SIZE).wanted
 CHANGED = replace(SWEEP, seed=7, name="changed")
 
 
@@ -79,13 +80,13 @@ def test_a_sweep_is_written_and_read(tmp_path: Path) -> None:
         folder = opened.directory
         walks = np.concatenate([shard.walks for shard in opened.missing()])
         assert walks.tolist() == SWEEP.indices.tolist() and {len(shard) for shard in opened.missing()} == {20}
-        assert len(read_rows(folder, opened.manifest)[1]) == 0
+        assert load(folder).missing_count == 160
         for shard in reversed(opened.missing()):
             write(opened, shard, synthetic_rows(SWEEP, shard))
         assert opened.missing() == []
         opened.log("ended")
-        expected = np.concatenate([synthetic_rows(SWEEP, shard) for shard in SHARDS])
-        assert read_rows(folder, opened.manifest)[1].tobytes() == expected.tobytes()
+        dx = np.concatenate([block.dx.ravel() for block in load(folder).blocks.values()])
+        assert dx.tobytes() == np.concatenate([synthetic_rows(SWEEP, shard)["dx"] for shard in SHARDS]).tobytes()
     assert sorted(os.listdir(folder)) == ["lock", "log.txt", "shards", "sweep.json", "sweep.yaml"]
     assert len(os.listdir(folder / "shards")) == 8
     assert yaml.safe_load((folder / "sweep.yaml").read_text()) == SWEEP.canonical()
@@ -133,7 +134,7 @@ def test_every_step_of_opening_may_be_the_last(tmp_path: Path, fresh: bool, monk
 def test_unfinished_files_go(tmp_path: Path) -> None:
     """What a killed process had half written is cleared away; hidden files of others are not."""
     run(tmp_path)
-    parts = [".sweep.0123abcd.part.json", "shards/.0-000000.0123abcd.part.h5"]
+    parts = [".sweep.0123abcd.part.json", "shards/.000000.0123abcd.part.h5"]
     for name in (*parts, ".nfs0123", "shards/.keep"):
         (tmp_path / name).write_bytes(b"half")
     open_folder(tmp_path).close()
@@ -169,7 +170,7 @@ def test_workers_may_write_the_same_shard(tmp_path: Path) -> None:
         shards = opened.missing()[:2] * 20
         list(threads.map(lambda shard: write(opened, shard, synthetic_rows(SWEEP, shard)), shards))
     assert content(tmp_path / "race") == content(tmp_path / "threads")
-    assert len(read_rows(tmp_path / "race", read_manifest(tmp_path / "race"))[1]) == 40
+    assert load(tmp_path / "race").missing_count == 120
 
 
 # Refusals
@@ -195,7 +196,7 @@ def test_other_numerics_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(folder, "NUMERICS_VERSION", 99)
     with refused(InputError, tmp_path, f"numerics {NUMERICS_VERSION}, but this warpchain has 99", "start anew"):
         open_folder(tmp_path)
-    assert len(read_rows(tmp_path, read_manifest(tmp_path))[1]) == 160
+    assert load(tmp_path).missing_count == 0
 
 
 @pytest.mark.parametrize("fresh", [False, True])
@@ -257,5 +258,5 @@ def test_a_full_disk(tmp_path: Path) -> None:
     """A disk that fills up in the middle: a clear line, nothing lost, and the sweep goes on once there is room."""
     done = play("full_disk", tmp_path / "full", namespace=True)
     writing, opening = done["messages"]
-    assert "0-000001.h5: cannot be written (No space left on device); make room" in writing
+    assert ".h5: cannot be written (No space left on device); make room" in writing
     assert "make room" in opening and done["missing"] == 0

@@ -137,7 +137,7 @@ def play_race(directory: Path) -> None:
         for _ in range(4):
             children.append(os.fork())
             if not children[-1]:
-                for _, shard in itertools.product(range(10), store.manifest.shards[:2]):
+                for _, shard in itertools.product(range(10), store.manifest.wanted[:2]):
                     write(store, shard, synthetic_rows(SWEEP, shard))
                 os._exit(0)
         print(json.dumps([os.waitpid(child, 0)[1] for child in children]))
