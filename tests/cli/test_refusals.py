@@ -126,7 +126,7 @@ def test_names_of_files_are_printed_without_control_characters(command: Command,
 
 
 def test_a_folder_cannot_hide_its_name(command: Command, tmp_path: Path) -> None:
-    """The name in a folder's sweep.json may have been changed; the table of the sweep writes escapes."""
+    """The name in a folder may have been changed; the table of the sweep writes escapes."""
     result = make_sweep(tmp_path / "s", content())
     result.sweep["name"] = ESCAPE
     with contextlib.redirect_stdout(io.StringIO()) as out:

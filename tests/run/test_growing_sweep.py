@@ -77,5 +77,5 @@ def test_killed_while_it_grows_a_sweep_loses_nothing(tmp_path: Path) -> None:
     assert load(folder).missing_count > 0
     sweep(large, folder, workers=1)
     assert data_of(folder) == expected
-    assert (folder / "sweep.json").read_bytes() == (whole / "sweep.json").read_bytes()
+    assert (folder / "sweep.h5").read_bytes() == (whole / "sweep.h5").read_bytes()
     assert rows_of(load(folder)) == rows_of(sweep(large, tmp_path / "fresh", workers=1))

@@ -174,8 +174,8 @@ def test_no_sweep_no_result(tmp_path: Path, single: Path) -> None:
     for nothing, problem in ((tmp_path, "no sweep in this folder"), (tmp_path / "none", "is not there")):
         with pytest.raises(InputError, match=f"{nothing}: {problem}"):
             load(nothing)
-    with pytest.raises(InputError, match=r"sweep\.json: not an HDF5 file; give a folder of a sweep"):
-        load(single / "sweep.json")
+    with pytest.raises(InputError, match=r"sweep\.yaml: not an HDF5 file; give a folder of a sweep"):
+        load(single / "sweep.yaml")
     run(tmp_path)
     path = tmp_path / "shards/000001.h5"
     path.write_bytes(path.read_bytes()[:-1])

@@ -116,7 +116,7 @@ def play_killed(directory: Path) -> None:
         time.sleep(rng.uniform(0.0, 0.01))
         os.kill(child, signal.SIGKILL)
         kills += os.WIFSIGNALED(os.waitpid(child, 0)[1])
-        if (directory / "sweep.json").exists():  # at any moment the folder can be read
+        if (directory / "sweep.h5").exists():  # at any moment the folder can be read
             states.add(load(directory).missing_count)
     run(directory, LONG_SWEEP, shard_size=4)
     print(json.dumps({"kills": kills, "states": len(states)}))

@@ -1,6 +1,6 @@
 """The folder of a sweep, as the one process that runs the sweep holds it.
 
-    DIR/sweep.json     what the folder belongs to, see `Manifest`; written first, replaced when the sweep grows
+    DIR/sweep.h5       what the folder belongs to, see `Manifest`; written first, replaced when the sweep grows
     DIR/sweep.yaml     the resolved sweep, for people and to run again
     DIR/shards/        000003.h5 holds the rows of some walks, and what is kept of their motion
     DIR/log.txt        what the runs of the sweep did, with times
@@ -46,7 +46,7 @@ LOCK_TRIES: Final = 5
 LOCK_PAUSE: Final = 0.02
 """Time [s] between two of them."""
 
-_PART: Final = re.compile(r"\.(?:sweep|\d{6,})\.[0-9a-f]{8}\.part\.(?:json|yaml|h5)")
+_PART: Final = re.compile(r"\.(?:sweep|\d{6,})\.[0-9a-f]{8}\.part\.(?:yaml|h5)")
 _HOLDER: Final = re.compile(r"process \d+ on \S*")
 
 _YAML_HEAD: Final = """\
@@ -140,11 +140,11 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
             warnings.warn(f"{problem}; its walks are computed again", InputWarning, stacklevel=4)
 
     def _describe(self) -> None:
-        """Write what the folder says of its sweep, if that is new; sweep.yaml is never older than sweep.json."""
+        """Write what the folder says of its sweep, if that is new; sweep.yaml is never older than sweep.h5."""
         description = self.directory / "sweep.yaml"
         if read_manifest(self.directory).sweep.digest() != self.manifest.sweep.digest():
             remove_output(description)
-            write_whole(self.directory / "sweep.json", self.manifest.text())
+            write_whole(self.directory / "sweep.h5", self.manifest.image())
         if not description.exists():
             sweep = self.manifest.sweep.canonical()
             text = yaml.safe_dump(sweep, sort_keys=False, allow_unicode=True)
@@ -229,15 +229,15 @@ def _prepared(folder: Path, sweep: Sweep, manifest: Manifest, fresh: bool) -> Ma
         The manifest that the folder is to have; a grown one is not written yet.
     """
     _clear_leftovers(folder)
-    named = folder / "sweep.json"
+    named = folder / "sweep.h5"
     if not named.exists():
         for name in OWN:
             if (folder / name).exists():
                 raise InputError(f"{folder / name}: in the way of a sweep; give another folder")
-        write_whole(named, manifest.text())
+        write_whole(named, manifest.image())
     elif fresh:
         _discard(folder)
-        write_whole(named, manifest.text())
+        write_whole(named, manifest.image())
     else:
         manifest = _continued(folder, sweep, manifest)
     make_folder(folder / "shards")

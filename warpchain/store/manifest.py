@@ -1,14 +1,12 @@
-"""The manifest of a sweep's folder, sweep.json: which sweep the folder holds; and which walks a shard has.
+"""The manifest of a sweep's folder, sweep.h5: which sweep the folder holds; and which walks a shard has.
 
 A shard is a file with the rows of some walks, each keyed by its block, cell and sample; no list says which they are. A
 sweep that is given more samples gets further shards, for those of its walks that are not there.
 """
 
-import hashlib
 import itertools
 import json
 import os
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,25 +16,21 @@ from typing import Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.hdf5_files import open_regular
-from warpchain.inputs.validation import DamagedFileError, InputError
+from warpchain.hdf5_files import hdf5_image, reading_hdf5
+from warpchain.inputs.validation import InputError
 from warpchain.sweeps.designs import EXTENSIBLE
 from warpchain.sweeps.plan import Sweep
-from warpchain.version import FORMAT_VERSION, NUMERICS_VERSION, package_versions, version_refusal
+from warpchain.version import NUMERICS_VERSION, package_versions
 from warpchain.walks.rows import KEYS, Rows, row_type
 
 Folder = str | os.PathLike[str]
 
-OWN: Final = ("sweep.json", "sweep.yaml", "shards", "log.txt")
+OWN: Final = ("sweep.h5", "sweep.yaml", "shards", "log.txt")
 """What a sweep has in its folder, beside the lock."""
-MOST_BYTES: Final = 2**24
-"""Size of the largest sweep.json that is read; 12 axes of 10,000 values take 3 MB."""
+KIND: Final = "warpchain sweep"
 
 FIRST_SHARDS: Final = 32
 """Most walks in each of the first four shards."""
-
-_HEAD: Final = re.compile(rb'\{\s*"format": "warpchain sweep",\s*"format_version": (\d{1,9}),')
-_CHECKED: Final = re.compile(rb'(.*),\n "sha256": "([0-9a-f]{64})"\n\}\n', re.DOTALL)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,19 +117,11 @@ class Manifest:
                 found.append(Shard(self.digest, self.row_type, self.keys[places], walks[places]))
         return found
 
-    def text(self) -> str:
-        """Content of sweep.json; its last line has the SHA-256 of the text before the comma in front of it."""
-        content = {
-            "format": "warpchain sweep",
-            "format_version": FORMAT_VERSION,
-            "numerics_version": self.numerics_version,
-            "shard_size": self.shard_size,
-            "part": self.part,
-            "versions": self.versions,
-            "sweep": self.sweep.canonical(),
-        }
-        text = json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False).removesuffix("\n}")
-        return f'{text},\n "sha256": "{hashlib.sha256(text.encode()).hexdigest()}"\n}}\n'
+    def image(self) -> bytes:
+        """Content of sweep.h5."""
+        given = {"numerics_version": self.numerics_version, "shard_size": self.shard_size, "part": self.part}
+        texts = {"versions": json.dumps(self.versions), "sweep": json.dumps(self.sweep.canonical(), ensure_ascii=False)}
+        return hdf5_image(KIND, lambda file: file.attrs.update(given | texts))
 
 
 def _bounds(walks: int, most: int) -> list[int]:
@@ -164,31 +150,20 @@ def read_manifest(directory: Folder) -> Manifest:
     Raises:
         OSError: the folder cannot be read.
         InputError: there is no sweep in it, or one of another version of warpchain.
-        DamagedFileError: its sweep.json is damaged.
+        DamagedFileError: its sweep.h5 is damaged.
     """
-    path = Path(directory) / "sweep.json"
-    try:
-        with open_regular(path) as file:
-            text = file.read(MOST_BYTES + 1)
-    except (FileNotFoundError, NotADirectoryError):
+    path = Path(directory) / "sweep.h5"
+    if not os.path.lexists(path):
         if not os.path.exists(directory):
-            raise InputError(f"{directory}: is not there; give the folder of a sweep, or a merged file") from None
-        there = "a saved walk, no sweep" if (Path(directory) / "walk.h5").exists() else "no sweep"
-        raise InputError(f"{directory}: {there} in this folder; give the folder of one, or a merged file") from None
-    if len(text) > MOST_BYTES:
-        raise InputError(f"{path}: over {MOST_BYTES} bytes, the limit of a sweep.json; give the folder of a sweep")
-    head, checked = _HEAD.match(text), _CHECKED.fullmatch(text)
-    if head is not None and (refusal := version_refusal(int(head[1]), "run the sweep again in another folder")):
-        raise InputError(f"{path}: {refusal}")
-    if head is None or checked is None or hashlib.sha256(checked[1]).hexdigest() != checked[2].decode():
-        raise DamagedFileError(
-            f"{path}: damaged, or not of warpchain; give the folder of a sweep, or put a copy of the file there"
+            raise InputError(f"{directory}: is not there; give the folder of a sweep, or a merged file")
+        known = {"walk.h5": "a saved walk, no sweep", "sweep.json": "a sweep of an earlier warpchain, which reads it,"}
+        there = next((text for name, text in known.items() if (Path(directory) / name).exists()), "no sweep")
+        raise InputError(f"{directory}: {there} in this folder; give the folder of one, or a merged file")
+    with reading_hdf5(path, KIND, "give the folder of a sweep, or put a copy of the file there") as file:
+        return Manifest(
+            stored_sweep(path, json.loads(file.attrs["sweep"])),
+            int(file.attrs["shard_size"]),
+            int(file.attrs["numerics_version"]),
+            json.loads(file.attrs["versions"]),
+            (int(file.attrs["part"][0]), int(file.attrs["part"][1])),
         )
-    content = json.loads(text)
-    return Manifest(
-        stored_sweep(path, content["sweep"]),
-        content["shard_size"],
-        content["numerics_version"],
-        content["versions"],
-        tuple(content["part"]),
-    )

@@ -35,9 +35,9 @@ FOREIGN: Final = "a shard of another sweep; move it out of this folder"
 
 
 def stamp(directory: Folder) -> str:
-    """What tells whether the folder still holds the same sweep: the SHA-256 of its sweep.json."""
+    """What tells whether the folder still holds the same sweep: the SHA-256 of its sweep.h5."""
     try:
-        with open_regular(Path(directory) / "sweep.json") as file:
+        with open_regular(Path(directory) / "sweep.h5") as file:
             return hashlib.sha256(file.read()).hexdigest()
     except (FileNotFoundError, NotADirectoryError):
         problem = "no sweep in this folder; give the folder of one, which every worker can reach by this path"
