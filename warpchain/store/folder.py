@@ -64,11 +64,13 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         directory: the folder.
         manifest: what it belongs to, and how its walks are laid out in shards.
         lock: descriptor of the lock.
+        found: of each walk in the order of `Manifest.keys` whether it was there when the folder was opened.
     """
 
     directory: Path
     manifest: Manifest
     lock: int
+    found: NDArray[np.bool_]
 
     @property
     def stamp(self) -> str:
@@ -102,7 +104,8 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         _refuse_strangers(path)
         lock = _locked(path)
         try:
-            folder = cls(path, _prepared(path, sweep, Manifest.of(sweep, shard_size, part), fresh), lock)
+            manifest = _prepared(path, sweep, Manifest.of(sweep, shard_size, part), fresh)
+            folder = cls(path, manifest, lock, np.zeros(len(manifest.keys), bool))
             folder._check()
             folder._describe()
         except BaseException:
@@ -118,9 +121,9 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
             file.write(f"{now}  {text}\n")
 
     def missing(self) -> list[Shard]:
-        """The shards that are not there yet, in order; errors as of `read_rows`."""
-        rows, _ = read_rows(self.directory, self.manifest)
-        return self.manifest.left(np.concatenate([block["status"].ravel() for block in rows]) != MISSING)
+        """The shards that are not there yet, in order; errors as of `shard_files`."""
+        written = set(shard_files(self.directory))
+        return [shard for shard in self.manifest.left(self.found) if shard.name not in written]
 
     def close(self) -> None:
         """Let other processes have the folder."""
@@ -131,9 +134,10 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         self.close()
 
     def _check(self) -> None:
-        """Refuse a folder with foreign shards, and delete damaged ones."""
+        """Refuse a folder with foreign shards, delete damaged ones, and note which walks are there."""
         damaged: dict[str, str] = {}
-        read_rows(self.directory, self.manifest, damaged)
+        rows, _ = read_rows(self.directory, self.manifest, damaged)
+        self.found[:] = np.concatenate([block["status"].ravel() for block in rows]) != MISSING
         for name, problem in damaged.items():
             remove_output(self.directory / "shards" / name)
             self.log(f"{problem}; deleted, its walks are computed again")
