@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,6 @@ from warpchain.walks.walk_result import WalkResult
 if TYPE_CHECKING:
     import pandas
     import xarray
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
 Array = NDArray[Any]
@@ -156,33 +155,28 @@ class SweepResult:
 
     def plot(
         self,
-        kind: Literal["lines", "map"] | None = None,
         quantity: str = "dx",
         x: str | None = None,
-        ax: "Axes | None" = None,
         figure: "Figure | SubFigure | None" = None,
     ) -> "Figure | SubFigure":
         """Draw the mean of a quantity over the grids of all blocks, with its standard error.
 
         Args:
-            kind: `lines` or `map`; None for lines, unless two axes have many values.
             quantity: a column of numbers, such as `dx`, `walk_time`, `bounces` or a drawn quantity.
             x: the axis along x, such as `frequency`; by default the frequency if it has three values or more, else the
                 longest axis of numbers.
-            ax: where to draw a figure of one panel.
             figure: an empty figure to draw into; by default a new one.
 
         Returns:
-            The figure, that of `ax` if it is given.
+            The figure.
 
         Raises:
             InputError: no block has such a column or axis, or there is nothing to show: no axis of several values, or
                 no walk that has the quantity.
-            ValueError: the kind is unknown, or `ax` is given together with `figure` or for several panels.
         """
         from warpchain.pictures.grid_figure import draw_grid
 
-        return draw_grid(self.cell_statistics(quantity), quantity_of(quantity), kind, x=x, ax=ax, figure=figure)
+        return draw_grid(self.cell_statistics(quantity), quantity_of(quantity), x=x, figure=figure)
 
     def to_xarray(self) -> "xarray.Dataset | xarray.DataTree":
         """The only block as a data set, or several as a tree with one child each."""
