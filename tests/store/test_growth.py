@@ -1,5 +1,6 @@
 """Folders of sweeps that are given more samples: shards stay, walks are those of the larger sweep, kills do no harm."""
 
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -147,6 +148,17 @@ def test_samples_that_do_not_grow_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="but a latin_hypercube of 8 samples has other points; give samples: 4"):
         make_sweep(tmp_path, content(samples=8, sampler="latin_hypercube"), drawn_distance)
     assert files(tmp_path) == before
+
+
+def test_a_shard_of_the_larger_sweep_is_foreign_to_the_smaller(tmp_path: Path) -> None:
+    """It holds walks that the smaller one does not have: its name is told, nothing is read from it."""
+    run(tmp_path / "small", load_sweep(content(samples=2)))
+    for samples in (2, 5):
+        run(tmp_path / "large", load_sweep(content(samples=samples)))
+    (name,) = set(shards(tmp_path / "large")) - set(shards(tmp_path / "small"))
+    shutil.copy(tmp_path / "large" / name, tmp_path / "small" / name)
+    with pytest.raises(InputError, match=f"{name}: a shard of another sweep; move it out of this folder"):
+        load(tmp_path / "small")
 
 
 def test_a_reader_meets_a_sweep_that_begins_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
