@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from warpchain.kernels.contacts.fixed_body import BODIES
+
 COMPILER_FLAGS = (
     "-march=native -ffp-contract=fast -mllvm=-inline-threshold=40000 -mllvm=-inline-cold-callsite-threshold=3000"
 )
@@ -31,9 +33,9 @@ class Features:
     @property
     def is_driven(self) -> bool:
         """Whether there is a driven sprocket: loads and links may change at a sample."""
-        return self.fixed_body == "sprocket"
+        return BODIES[self.fixed_body].is_driven
 
     @property
     def has_floor(self) -> bool:
         """Whether there is a floor of any kind."""
-        return self.fixed_body not in ("none", "sprocket")
+        return self.fixed_body != "none" and not self.is_driven

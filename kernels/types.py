@@ -35,7 +35,7 @@ class Chain:
     joint_damping: wp.float64  # b [N s/m]
     inverse_smoothing: wp.float64  # 1/ω_c [s/rad]
     gravity: wp.float64  # g [m/s²], along −y
-    circle_radius: wp.float64  # r [m], of a link's two circles
+    circle_radius: wp.float64  # r [m], the greatest of the links' circles; of one link's, see with_circles
     half_width: wp.float64  # h [m], of a link, across the plane of the chain
     tangential_restitution: wp.float64  # e_t
     floor_restitution: wp.float64  # e_fc
@@ -54,6 +54,14 @@ class Chain:
     up_y: wp.float64
     up_z: wp.float64
     origin_height: wp.float64
+
+
+@wp.func
+def with_circles(chain: Chain, radius: wp.float64) -> Chain:
+    """The chain as one of its links has it, whose two circles have this radius [m]."""
+    own = chain
+    own.circle_radius = radius
+    return own
 
 
 CHAIN_NUMBERS: Any = Chain.numpy_dtype()  # type: ignore[attr-defined]

@@ -32,10 +32,11 @@ STOREYS = (
     ("files", "status", "version"),
     ("kernels/cpu", "kernels/gpu"),
     ("kernels/events",),
+    ("kernels/features",),
     ("kernels/contacts", "kernels/methods"),
     ("kernels/physics",),
     ("kernels/types",),
-    ("kernels/layout", "kernels/codes", "kernels/features"),
+    ("kernels/layout", "kernels/codes"),
 )
 """Wings, from top to bottom: imports go downwards only."""
 KERNELS_FOR_ALL = {"kernels/codes", "kernels/features", "kernels/layout", "kernels/methods"}

@@ -130,10 +130,10 @@ def test_content_of_a_sweep(content: Any) -> None:
 def test_command_lines(monkeypatch: pytest.MonkeyPatch, words: list[tuple[str, str]], more: list[str]) -> None:
     """`--set NAME=VALUE` comes to the walk, or ends in one line with exit status 2."""
 
-    def begin(setups: Any, **_: object) -> Any:
+    def begin(setups: Any) -> Any:
         raise SystemExit(0)
 
-    monkeypatch.setattr(one_walk, "run_setups", begin)
+    monkeypatch.setattr(one_walk, "compile_kernels", begin)
     sets = [word for name, value in words for word in ("--set", f"{name}={value}")]
     err = io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True)
     with contextlib.redirect_stderr(err), pytest.raises(SystemExit) as end:

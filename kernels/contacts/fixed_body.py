@@ -139,6 +139,7 @@ class Body:
         face: ``face(ground)`` → its Face but for its motion.
         motion: ``motion(face, drive, world, time)`` → its Face at a time [s].
         in_cells: Whether it has many faces, found through cells, and corners.
+        is_driven: Whether it holds and drives a chain before its release, and is no floor.
         lesser_gap: ``lesser_gap(chain, left_x, left_y, right_x, right_y)``, if that is less work than two surfaces.
     """
 
@@ -146,13 +147,14 @@ class Body:
     face: Any = nowhere
     motion: Any = unmoved
     in_cells: bool = False
+    is_driven: bool = False
     lesser_gap: Any = None
 
 
 BODIES = {
     "none": Body(surface=None),
     "floor": Body(floor_surface),
-    "sprocket": Body(sprocket_surface, motion=turning_sprocket, lesser_gap=lesser_sprocket_gap),
+    "sprocket": Body(sprocket_surface, motion=turning_sprocket, is_driven=True, lesser_gap=lesser_sprocket_gap),
     "moving sprocket": Body(moving_sprocket_surface, motion=moved_sprocket),
     "slope": Body(slope_surface, first_face),
     "terrain": Body(terrain_surface, in_cells=True),
@@ -261,8 +263,8 @@ def link_and_body(name: str):
             push = chain.push_rate * wp.max(ZERO, -gap)
             lever_x = face.x - link.x
             lever_y = face.y - link.y
-            e = chain.floor_restitution
-            mu = chain.floor_friction
+            e = face.restitution
+            mu = face.friction
             link = struck(chain, link, gap, nx, ny, lever_x, lever_y, push * nx, push * ny, e, mu)
         return link
 

@@ -9,6 +9,7 @@ from warpchain.kernels.layout import (
     LEFT_X,
     LEFT_Y,
     OMEGA,
+    RADIUS,
     RIGHT_X,
     RIGHT_Y,
     STRANDS_APART,
@@ -17,7 +18,7 @@ from warpchain.kernels.layout import (
     X,
     Y,
 )
-from warpchain.kernels.physics.elementary import HALF, TWO, ZERO, quotient
+from warpchain.kernels.physics.elementary import HALF, ZERO, quotient
 from warpchain.kernels.types import Chain, Rows
 
 wp.set_module_options({"enable_backward": False})
@@ -63,7 +64,8 @@ def effective_masses(
 
 @wp.func
 def circles_of_links(
-    radius: wp.float64,
+    radius_a: wp.float64,
+    radius_b: wp.float64,
     end_a_x: wp.float64,
     end_a_y: wp.float64,
     end_b_x: wp.float64,
@@ -77,7 +79,7 @@ def circles_of_links(
 
     It returns numbers, not a struct: clang kept a struct in memory, and a pile on the CPU was twice as slow.
 
-    Arguments: the radius of both circles, centres ``end`` of the circles of A and B and centres of mass ``center`` of
+    Arguments: the radii of the circles of A and B, their centres ``end`` and centres of mass ``center`` of
     the links [m].
 
     Returns:
@@ -87,15 +89,17 @@ def circles_of_links(
     """
     dx = end_b_x - end_a_x
     dy = end_b_y - end_a_y
-    touching = TWO * radius
+    touching = radius_a + radius_b
     square = dx * dx + dy * dy
     overlap = square < touching * touching and square > ZERO
     distance = wp.sqrt(square)
     depth = wp.where(overlap, touching - distance, ZERO)
     nx = quotient(dx, distance)
     ny = quotient(dy, distance)
-    px = HALF * (end_a_x + end_b_x)
-    py = HALF * (end_a_y + end_b_y)
+    # the middle of the overlap; for circles of one size to the bit the middle of their centres
+    beyond = HALF * (radius_a - radius_b)
+    px = HALF * (end_a_x + end_b_x) + beyond * nx
+    py = HALF * (end_a_y + end_b_y) + beyond * ny
     ax = px - center_a_x
     ay = py - center_a_y
     bx = px - center_b_x
@@ -148,7 +152,8 @@ def touching_circles(K: Rows, chain: Chain, p: int, q: int, half: int, second: i
         bx = ax
         by = ay
     depth, nx, ny, a_n, a_t, b_n, b_t = circles_of_links(
-        chain.circle_radius,
+        K[RADIUS, link_a],
+        K[RADIUS, link_b],
         ax,
         ay,
         bx,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from warpchain.kernels import layout
 
-GEOMETRY_ROWS = 30
+GEOMETRY_ROWS = 34
 """Rows of the CPU's scratch of contacts, see :mod:`cpu.contacts.self_contacts`."""
 GEOMETRY_COLUMNS = 64
 """Pairs of joints whose contacts are evaluated together, a multiple of 8."""

@@ -32,6 +32,7 @@ from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step
 from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.physics.elementary import ONE, ZERO
 from warpchain.kernels.physics.geometry import whole_lanes
+from warpchain.kernels.physics.load import IS_UNIFORM
 from warpchain.kernels.physics.scaled_loads import write_links
 from warpchain.kernels.types import Chain, Control, Drive, Integers, Model, Record, Rows, State, read_ground
 
@@ -113,9 +114,10 @@ def make_advance(features: Features):
     list_size = list_layout(columns).size
     is_driven = features.is_driven
     face_of = BODIES[features.fixed_body].face
-    fixed_loss, _, _ = of_fixed_body(features.fixed_body)
+    fixed_loss, _, _ = of_fixed_body(features.is_driven)
     # on the sprocket the pauses between impulses are too short for a flight
-    has_flight = find_method(features.method).has_rigid_flight and not (is_driven or features.moving_sprocket)
+    is_held = is_driven or features.moving_sprocket
+    has_flight = find_method(features.method).has_rigid_flight and IS_UNIFORM and not is_held
     joints = rigid_in_flight(features.method, columns) if has_flight else springs(features.method, features.tilts)
     settle, attempt, shrinkage, accept, react = (
         joints.settle,
@@ -135,7 +137,7 @@ def make_advance(features: Features):
     meet_bodies = body_pass(features, plane)
     make_list, meet_links = link_pass(features, joints)
     bound_of_step = step_bound(features, has_flight)
-    sample = sampling(features.fixed_body, features.tilts)
+    sample = sampling(features)
     write_sample, _, _ = VIEWS[features.tilts]
     present = present_chain(is_driven)
 

@@ -31,6 +31,7 @@ from warpchain.kernels.layout import (
     LOST_FIXED,
     MASS,
     OMEGA,
+    RADIUS,
     RIGHT_X,
     RIGHT_Y,
     SINE,
@@ -44,7 +45,7 @@ from warpchain.kernels.layout import (
     Y,
 )
 from warpchain.kernels.physics.elementary import TWO, ZERO, from_order_key, order_bits, order_key
-from warpchain.kernels.physics.geometry import LANES, whole_lanes
+from warpchain.kernels.physics.geometry import LANES, Link, whole_lanes
 from warpchain.kernels.physics.plane import (
     begin_plane_step,
     end_plane_step,
@@ -54,7 +55,7 @@ from warpchain.kernels.physics.plane import (
     place_terms,
     plane_load,
 )
-from warpchain.kernels.types import Chain, Ground, Row, Rows, State
+from warpchain.kernels.types import Chain, Ground, Row, Rows, State, with_circles
 
 wp.set_module_options({"enable_backward": False})
 
@@ -129,10 +130,13 @@ def shift_first_stage(K: Rows, before: Chain, now: Chain):
     a = now.half_length
     i = int(0)
     while i < whole_lanes(now.link_count):
-        arm_x = a * K[COSINE, i]
-        arm_y = a * K[SINE, i]
-        ax, ay, turn = plane_load(now, K[X, i], K[Y, i], arm_x, arm_y)
-        old_ax, old_ay, old_turn = plane_load(before, K[X, i], K[Y, i], arm_x, arm_y)
+        link = Link()
+        link.x = K[X, i]
+        link.y = K[Y, i]
+        link.arm_x = a * K[COSINE, i]
+        link.arm_y = a * K[SINE, i]
+        ax, ay, turn = plane_load(now, i, link, ZERO, ZERO)
+        old_ax, old_ay, old_turn = plane_load(before, i, link, ZERO, ZERO)
         K[STAGES, i] = K[STAGES, i] + (ax - old_ax)
         K[STAGES + 1, i] = K[STAGES + 1, i] + (ay - old_ay)
         K[STAGES + 2, i] = K[STAGES + 2, i] + (turn - old_turn)
@@ -143,11 +147,12 @@ def shift_first_stage(K: Rows, before: Chain, now: Chain):
 def tilting_gap(K: Rows, chain: Chain):
     """Height [m] of the lowest rim of a roller above the floor; negative when it is below."""
     slope = steepness(chain)
-    lowest = order_key(middle_height(chain, slope, K[LEFT_X, 0], K[LEFT_Y, 0]))
+    lowest = FURTHEST
     i = int(0)
     while i < whole_lanes(chain.link_count):
-        left = order_key(middle_height(chain, slope, K[LEFT_X, i], K[LEFT_Y, i]))
-        right = order_key(middle_height(chain, slope, K[RIGHT_X, i], K[RIGHT_Y, i]))
+        own = with_circles(chain, K[RADIUS, i])
+        left = order_key(middle_height(own, slope, K[LEFT_X, i], K[LEFT_Y, i]))
+        right = order_key(middle_height(own, slope, K[RIGHT_X, i], K[RIGHT_Y, i]))
         lowest = wp.min(lowest, wp.where(i < chain.link_count, wp.min(left, right), FURTHEST))
         i += 1
     return from_order_key(lowest) - chain.half_width * wp.abs(chain.up_z)
@@ -174,7 +179,7 @@ def write_touches(K: Rows, chain: Chain, slope: wp.float64):
     i = int(0)
     while i < whole_lanes(chain.link_count):
         touches = link_touches(
-            chain,
+            with_circles(chain, K[RADIUS, i]),
             slope,
             K[LEFT_X, i],
             K[LEFT_Y, i],
@@ -217,7 +222,7 @@ def resolve_tilting_floor(K: Rows, P: Row, own: Chain):
             while lane < wp.static(LANES):
                 i = first + lane
                 link = meet_tilting_floor(
-                    chain,
+                    with_circles(chain, K[RADIUS, i]),
                     slope,
                     B,
                     K[LEFT_X, i],

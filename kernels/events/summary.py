@@ -2,8 +2,25 @@
 
 import warp as wp
 
-from warpchain.kernels.layout import COSINE, INERTIA, LEFT_X, LEFT_Y, MASS, OMEGA, RIGHT_X, RIGHT_Y, SINE, U, V, X, Y
+from warpchain.kernels.layout import (
+    COSINE,
+    INERTIA,
+    LEFT_X,
+    LEFT_Y,
+    MASS,
+    OMEGA,
+    RADIUS,
+    RIGHT_X,
+    RIGHT_Y,
+    SINE,
+    U,
+    V,
+    X,
+    Y,
+)
 from warpchain.kernels.physics.elementary import HALF, ZERO, from_order_key, order_key
+from warpchain.kernels.physics.geometry import Link
+from warpchain.kernels.physics.load import NOTHING, link_energy, weight_energy
 from warpchain.kernels.types import Chain, Rows
 
 wp.set_module_options({"enable_backward": False})
@@ -29,6 +46,20 @@ class Summary:
 
 
 @wp.func
+def moving_link(K: Rows, chain: Chain, i: int) -> Link:
+    """A link, from the rows of the state."""
+    link = Link()
+    link.x = K[X, i]
+    link.y = K[Y, i]
+    link.u = K[U, i]
+    link.v = K[V, i]
+    link.omega = K[OMEGA, i]
+    link.arm_x = chain.half_length * K[COSINE, i]
+    link.arm_y = chain.half_length * K[SINE, i]
+    return link
+
+
+@wp.func
 def summarise(K: Rows, chain: Chain) -> Summary:
     """Sums over the placed links.
 
@@ -46,10 +77,12 @@ def summarise(K: Rows, chain: Chain) -> Summary:
     along = ZERO
     square = ZERO
     area = ZERO
+    further = NOTHING
     left = order_key(K[RIGHT_X, 0])
     right = left
     bottom = order_key(K[RIGHT_Y, 0])
     top = bottom
+    lowest = order_key(wp.float64(wp.inf))
     i = int(0)
     while i < n:
         m = K[MASS, i]
@@ -59,6 +92,7 @@ def summarise(K: Rows, chain: Chain) -> Summary:
         my += m * K[Y, i]
         mu += m * K[U, i]
         mv += m * K[V, i]
+        further += link_energy(chain, i, moving_link(K, chain, i))
         kinetic += HALF * (m * speed + K[INERTIA, i] * K[OMEGA, i] * K[OMEGA, i])
         square += speed
         along += K[U, i] * K[COSINE, i] + K[V, i] * K[SINE, i]
@@ -68,7 +102,9 @@ def summarise(K: Rows, chain: Chain) -> Summary:
         area += K[LEFT_X, i] * K[RIGHT_Y, i] - K[RIGHT_X, i] * K[LEFT_Y, i]
         left = wp.min(left, order_key(K[RIGHT_X, i]))
         right = wp.max(right, order_key(K[RIGHT_X, i]))
-        bottom = wp.min(bottom, wp.min(order_key(K[LEFT_Y, i]), order_key(K[RIGHT_Y, i])))
+        low = wp.min(K[LEFT_Y, i], K[RIGHT_Y, i])
+        bottom = wp.min(bottom, order_key(low))
+        lowest = wp.min(lowest, order_key(low - K[RADIUS, i]))
         top = wp.max(top, order_key(K[RIGHT_Y, i]))
         i += 1
     summary = Summary()
@@ -77,9 +113,9 @@ def summarise(K: Rows, chain: Chain) -> Summary:
     summary.center_u = mu / mass
     summary.center_v = mv / mass
     summary.kinetic = kinetic
-    summary.gravitational = chain.gravity * my
+    summary.gravitational = weight_energy(chain, my) + further
     summary.spring = spring
-    summary.lowest = from_order_key(bottom) - chain.circle_radius
+    summary.lowest = from_order_key(lowest)
     summary.rms_speed = wp.sqrt(square / wp.float64(n))
     summary.height = from_order_key(top) - from_order_key(bottom)
     summary.width = from_order_key(right) - from_order_key(left)

@@ -21,9 +21,9 @@ BOUNCE_PAUSE = wp.constant(wp.float64(0.01))
 """A floor impulse this long [s] after the one before it begins a new bounce."""
 
 
-def of_fixed_body(fixed_body: str) -> tuple[int, int, int]:
-    """Places of the loss, the greatest depth and the counter of impulses of the floor or the sprocket."""
-    if fixed_body == "sprocket":
+def of_fixed_body(is_driven: bool) -> tuple[int, int, int]:
+    """Places of the loss, the greatest depth and the counter of impulses of the sprocket or the floor."""
+    if is_driven:
         return LOSS_SPROCKET, SPROCKET_DEPTH, SPROCKET_IMPULSES
     return LOSS_FLOOR, FLOOR_DEPTH, FLOOR_IMPULSES
 

@@ -18,6 +18,7 @@ from warpchain.kernels.layout import (
     PLANE_TURN_X,
     PLANE_TURN_Y,
     PLANE_VALUES,
+    RADIUS,
     RIGHT_X,
     RIGHT_Y,
     SUM_MASS,
@@ -63,15 +64,17 @@ def in_room(K: Rows, P: Row, chain: Chain, flat: Summary) -> Summary:
     n = chain.link_count
     square = flat.rms_speed * flat.rms_speed * wp.float64(n)
     bottom = order_key(wp.float64(wp.inf))
+    slope = wp.sqrt(P[UP] * P[UP] + P[UP + 1] * P[UP + 1])
     i = int(0)
     while i < n:
         w = across_speed(P, K[X, i], K[Y, i])
         square += w * w
-        left = order_key(component(P, UP, K[LEFT_X, i], K[LEFT_Y, i], ZERO))
-        right = order_key(component(P, UP, K[RIGHT_X, i], K[RIGHT_Y, i], ZERO))
+        # a circle that is smaller than the greatest stays higher; of one size it changes no bit
+        higher = (chain.circle_radius - K[RADIUS, i]) * slope
+        left = order_key(component(P, UP, K[LEFT_X, i], K[LEFT_Y, i], ZERO) + higher)
+        right = order_key(component(P, UP, K[RIGHT_X, i], K[RIGHT_Y, i], ZERO) + higher)
         bottom = wp.min(bottom, wp.min(left, right))
         i += 1
-    slope = wp.sqrt(P[UP] * P[UP] + P[UP + 1] * P[UP + 1])
     extent = chain.circle_radius * slope + chain.half_width * wp.abs(P[UP + 2])
     w = across_speed(P, flat.center_x, flat.center_y)
     summary = flat

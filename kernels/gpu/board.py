@@ -3,10 +3,10 @@
 import warp as wp
 
 from warpchain.kernels import layout
-from warpchain.kernels.gpu.stage import Attempt, Link, Place, constants, read_link
+from warpchain.kernels.gpu.stage import Attempt, Place, constants, read_link
 from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, MASS, OMEGA, RIGHT_X, RIGHT_Y, SINE, THETA, U, V, X, Y
 from warpchain.kernels.physics.elementary import ZERO, cos_sin
-from warpchain.kernels.physics.geometry import end_positions
+from warpchain.kernels.physics.geometry import Link, end_positions
 from warpchain.kernels.types import Chain, Rows, State
 
 wp.set_module_options({"enable_backward": False})

@@ -12,7 +12,6 @@ import warp as wp
 
 from warpchain.kernels.gpu.stage import (
     Attempt,
-    Link,
     Place,
     block_stage,
     greater,
@@ -26,7 +25,7 @@ from warpchain.kernels.gpu.stage import (
 from warpchain.kernels.layout import INVERSE_INERTIA, INVERSE_MASS, THETA
 from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
 from warpchain.kernels.physics.elementary import LARGEST_TURN, ONE, ZERO, cos_sin
-from warpchain.kernels.physics.geometry import turned
+from warpchain.kernels.physics.geometry import Link, turned
 from warpchain.kernels.types import Ground, Rows
 
 wp.set_module_options({"enable_backward": False})

@@ -64,7 +64,7 @@ def block_run(features: Features, touch: TouchLayout, kept_width: int, plane: Bl
         ``store(K, T, P, model, state, record, scratch, control, place, world, time, status, accepted, attempts)``.
     """
     is_driven = features.is_driven
-    fixed_loss, fixed_depth, fixed_count = of_fixed_body(features.fixed_body)
+    fixed_loss, fixed_depth, fixed_count = of_fixed_body(features.is_driven)
     present = present_chain(is_driven)
     load_plane, store_plane = plane.load, plane.store
     write_sample, _, _ = VIEWS[features.tilts]
@@ -170,7 +170,7 @@ def block_sample(features: Features, touch: TouchLayout, plane: BlockPlane):
     so that its first stage must be evaluated again; whether the launch pauses; status.
     """
     is_driven = features.is_driven
-    sample = sampling(features.fixed_body, features.tilts)
+    sample = sampling(features)
     present = present_chain(is_driven)
     store_plane = plane.store
 

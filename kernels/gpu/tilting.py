@@ -35,6 +35,7 @@ from warpchain.kernels.layout import (
     PLANE_SPEED,
     PLANE_TURN_X,
     PLANE_TURN_Y,
+    RADIUS,
     SINE,
     SUMS_OF_MOTION,
     SUMS_OF_PLACES,
@@ -56,7 +57,7 @@ from warpchain.kernels.physics.plane import (
     place_terms,
     plane_load,
 )
-from warpchain.kernels.types import Drive, Ground, Row, Rows, State
+from warpchain.kernels.types import Drive, Ground, Row, Rows, State, with_circles
 
 wp.set_module_options({"enable_backward": False})
 
@@ -174,8 +175,8 @@ def shift_first_stage(K: Rows, lane: int):
     link = read_link(K, lane)
     now = felt_plane(K, own, VALUE_PLANE)
     before = felt_plane(K, own, VALUE_PLANE_BEFORE)
-    ax, ay, turn = plane_load(now, link.x, link.y, link.arm_x, link.arm_y)
-    old_ax, old_ay, old_turn = plane_load(before, link.x, link.y, link.arm_x, link.arm_y)
+    ax, ay, turn = plane_load(now, lane, link, ZERO, ZERO)
+    old_ax, old_ay, old_turn = plane_load(before, lane, link, ZERO, ZERO)
     K[BOARD_FIRST, lane] = K[BOARD_FIRST, lane] + (ax - old_ax)
     K[BOARD_FIRST + 1, lane] = K[BOARD_FIRST + 1, lane] + (ay - old_ay)
     K[BOARD_FIRST + 2, lane] = K[BOARD_FIRST + 2, lane] + (turn - old_turn)
@@ -285,7 +286,7 @@ def block_tilting(block_dim: int) -> BlockPlane:
     def meet(K: Rows, P: Row, M: Row, place: Place, _ground: Ground, _drive: Drive, _world: int, _time: wp.float64):
         lane = place.lane
         barrier()  # the plane and its mass are those of the new state
-        chain = on_plane(constants(K), P, 0)
+        chain = with_circles(on_plane(constants(K), P, 0), K[RADIUS, place.column])
         slope = steepness(chain)
         link = read_link(K, lane)
         left_x, left_y, right_x, right_y = ends_of(link)

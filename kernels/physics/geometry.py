@@ -14,6 +14,19 @@ wp.set_module_options({"enable_backward": False})
 LANES = wp.constant(layout.LANES)
 
 
+@wp.struct
+class Link:
+    """State of a link, with its arm instead of its angle, which no stage needs."""
+
+    x: wp.float64  # [m]
+    y: wp.float64  # [m]
+    u: wp.float64  # ẋ [m/s]
+    v: wp.float64  # ẏ [m/s]
+    omega: wp.float64  # θ̇ [rad/s]
+    arm_x: wp.float64  # [m]
+    arm_y: wp.float64
+
+
 @wp.func
 def whole_lanes(n: int):
     """The number of links, rounded up to whole vectors: loops over so many columns have no remainder."""

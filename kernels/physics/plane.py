@@ -69,6 +69,7 @@ from warpchain.kernels.layout import (
     UP,
 )
 from warpchain.kernels.physics.elementary import HALF, ONE, quotient
+from warpchain.kernels.physics.geometry import Link
 from warpchain.kernels.types import Chain, Row
 
 wp.set_module_options({"enable_backward": False})
@@ -79,11 +80,11 @@ THREE_HALVES = wp.constant(wp.float64(1.5))
 
 
 @wp.func
-def plane_load(chain: Chain, x: wp.float64, y: wp.float64, arm_x: wp.float64, arm_y: wp.float64):
+def plane_load(chain: Chain, _i: int, link: Link, _inverse_mass: wp.float64, _inverse_inertia: wp.float64):
     """Accelerations (ẍ, ÿ [m/s²], θ̈ [rad/s²]) of a link by gravity and the motion of its plane."""
-    across = chain.plane_speed + chain.turn_x * y - chain.turn_y * x
-    about_rod = arm_x * chain.turn_x + arm_y * chain.turn_y
-    across_rod = arm_x * chain.turn_y - arm_y * chain.turn_x
+    across = chain.plane_speed + chain.turn_x * link.y - chain.turn_y * link.x
+    about_rod = link.arm_x * chain.turn_x + link.arm_y * chain.turn_y
+    across_rod = link.arm_x * chain.turn_y - link.arm_y * chain.turn_x
     ax = -chain.gravity * chain.up_x - chain.turn_y * across
     ay = chain.turn_x * across - chain.gravity * chain.up_y
     return ax, ay, -(about_rod * across_rod) * chain.inverse_square

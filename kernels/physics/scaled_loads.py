@@ -35,7 +35,9 @@ from warpchain.kernels.layout import (
     OWN_COULOMB,
     OWN_INERTIA,
     OWN_MASS,
+    OWN_RADIUS,
     OWN_VISCOUS,
+    RADIUS,
     SINE,
     VISCOUS,
     U,
@@ -85,6 +87,7 @@ def write_link(K: Rows, model: Model, world: int, i: int, factor: wp.float64):
     K[INVERSE_INERTIA, i] = ONE / inertia
     K[VISCOUS, i] = factor * model.links[world, OWN_VISCOUS, i]
     K[COULOMB, i] = factor * model.links[world, OWN_COULOMB, i]
+    K[RADIUS, i] = model.links[world, OWN_RADIUS, i]
 
 
 @wp.func

@@ -1,6 +1,6 @@
 """Waves of either direction given to loops at their release: how far do these walk?
 
-    python -m studies.waves.directions run       # twenty minutes of one core → results/directions.csv
+    python -m studies.waves.directions run       # half an hour of one core → results/directions.csv
     python -m studies.waves.directions           # that file → the table of the page
     python -m studies.waves.directions impacts   # prints how large fast waves of this length are about a first impact
     python -m studies.waves.directions given     # prints what else a wave changes of a loop
@@ -36,7 +36,9 @@ RIDING: Final = 0.0598
 """Radius at which joints ride on the sprocket [m]."""
 APART: Final = 0.01
 """Touches of the floor less apart [s] are one impact."""
-VARIANTS: Final = (("none", 0.0), *((way, size) for size in (0.05, 0.15) for way in ("slow", "fast")))
+ALIKE: Final = "none, as slow and high as fast"
+"""A loop without a wave that runs as slowly along itself, and whose lowest joint is as high, as with a fast wave."""
+VARIANTS: Final = (("none", 0.0), *((way, size) for size in (0.05, 0.15) for way in ("slow", "fast", ALIKE)))
 """Direction, and the amplitude of the links' angles [rad]."""
 
 
@@ -47,6 +49,11 @@ def with_wave(
 
     Momentum stays, and angular momentum but for what the bend does to it.
     """
+    if way == ALIKE:
+        moved, speeds = with_wave(position, velocity, parameters, "fast", size, phase)
+        lift = lowest(moved, parameters) - lowest(position, parameters)
+        ratio = running(moved, speeds, parameters) / running(position, velocity, parameters)
+        return position + np.array([0, lift, 0]), velocity * ratio
     links, length, inertia = len(position), parameters.link_length, inertia_of(len(position), parameters)
     speed = running(position, velocity, parameters)
     number = max(3, round(links / LENGTH))
@@ -84,6 +91,12 @@ def running(position: Array, velocity: Array, parameters: warpchain.Parameters) 
     motions, _ = loop_motions(position[None], np.array([parameters.link_length]))
     inertia = inertia_of(len(position), parameters)
     return float(wave_motion(motions[:, RUNNING], velocity[None], inertia[None])[0][0, -1])
+
+
+def lowest(position: Array, parameters: warpchain.Parameters) -> float:
+    """Height [m] of the lowest joint of a loop."""
+    half = 0.5 * parameters.link_length * np.abs(np.sin(position[:, 2]))
+    return float((position[:, 1] - half).min())
 
 
 def _closing(ends: Callable[[Array], NDArray[np.complex128]], values: Array, angle: Array) -> Array:
@@ -205,9 +218,8 @@ def given(links: int, frequency: float) -> dict[tuple[str, float], Array]:
         arms = at[:, :2] - np.average(at[:, :2], axis=0, weights=inertia[:, 0])
         spin = arms[:, 0] * speeds[:, 1] - arms[:, 1] * speeds[:, 0]
         turning = np.sum(inertia[:, 0] * spin + inertia[:, 2] * speeds[:, 2])
-        half = 0.5 * parameters.link_length * np.sin(at[:, 2])
-        lowest = 1000 * min((at[:, 1] - half).min(), (at[:, 1] + half).min())
-        return np.array([np.sum(inertia * speeds**2), turning, running(at, speeds, parameters), lowest])
+        low = 1000 * lowest(at, parameters)
+        return np.array([np.sum(inertia * speeds**2), turning, running(at, speeds, parameters), low])
 
     before, found = numbers_of(position, velocity), {}
     for way, size in VARIANTS[1:]:

@@ -57,6 +57,21 @@ def test_help_is_quick_and_complete(tmp_path: Path) -> None:
     assert min(computed) < 2.5 * min(libraries)
 
 
+def test_a_walk_loads_only_what_it_needs() -> None:
+    """A walk without a file waits neither for the grammar of sweep files nor for libraries of files and figures."""
+    program = (
+        "import sys\n"
+        "from warpchain.cli.main import main\n"
+        "try:\n"
+        f"    main(['walk', *{QUICK}, '--set', 'walk_limit=0.01'])\n"
+        "except SystemExit:\n"
+        "    unneeded = {'warpchain.sweeps.sweep_file', 'h5py', 'matplotlib', 'rich.table', 'scipy', 'xarray'}\n"
+        "    print('loaded', sorted(unneeded & set(sys.modules)))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, encoding="utf-8")
+    assert done.stdout.splitlines()[-1] == "loaded []", done.stderr
+
+
 def test_mp4_without_its_extra_is_refused(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without imageio-ffmpeg an MP4 is refused with the command that installs it, and nothing is written."""
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)

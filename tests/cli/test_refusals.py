@@ -35,7 +35,7 @@ REFUSED = {
     "walk --set mu_fc=0.3 --set floor_friction=0.3": "parameters.floor_friction: given twice on the command line;",
     "walk -o new --device cuda:98": "options.device: there is no cuda:98 on this machine",
     "walk --config nowhere.yaml": "nowhere.yaml: No such file",
-    "walk -o new --frame-interval 0": "frame_interval: 0 is no positive time in s",
+    "walk -o new --frame-interval 0": "frame_interval: Input should be greater than or equal to 0.000001, in s",
     "walk --frobnicate": "No such option: --frobnicate; see warpchain walk --help",
     "walk extra": "Got unexpected extra argument(s) (extra); see warpchain walk --help",
     "walk -o walk.h5": "walk.h5: cannot be written (Not a directory); give a folder that is there",
@@ -67,7 +67,6 @@ REFUSED = {
     "sweep tiny.yaml -o new --gpus 2 --workers 3": "--workers: given together with --gpus; leave one out",
     "sweep tiny.yaml -o new --gpus 2 --scheduler tcp://a:1": "--scheduler: given together with --gpus; leave one out",
     "sweep tiny.yaml -o new --gpus 2 --device cpu": "--device: cpu is given together with --gpus; give cuda",
-    "sweep tiny.yaml -o new --gpus 2": "--gpus: 2 wanted, but CUDA_VISIBLE_DEVICES is '3'; give at most 1",
     "sweep tiny.yaml -o new --device cuda:97": "options.device: there is no cuda:97 on this machine",
     "bench --links 61": "bench.links: 61 is odd",
     "bench --links 60 --links 2": "bench.links: Input should be greater than or equal to 4",
@@ -97,11 +96,8 @@ HOSTILE = [
 
 
 @pytest.mark.parametrize("arguments", [*map(str.split, REFUSED), *HOSTILE], ids=lambda words: " ".join(words)[:60])
-def test_bad_input_is_refused_in_one_line(
-    command: Command, tmp_path: Path, arguments: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_bad_input_is_refused_in_one_line(command: Command, tmp_path: Path, arguments: list[str]) -> None:
     """On stderr; nothing on stdout, and no folder; no walk is run before."""
-    monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "3")
     make_walk().save("walk.h5")
     Path("text.h5").write_text("no walk", encoding="utf-8")
     Path("tiny.yaml").write_text(str(TINY), encoding="utf-8")

@@ -14,13 +14,13 @@ from tests.run.test_sweep_run import TINY
 from tests.support import synthetic_sweep
 from tests.support.synthetic_sweep import SWEEP, synthetic_rows, write
 from warpchain.cli.main import main
-from warpchain.engine.batch import Batch
 from warpchain.run import progress_bar, sweep_run
 from warpchain.run.estimate import estimate_sweep
 from warpchain.run.single_walk import walk
 from warpchain.store.folder import SweepFolder
 from warpchain.store.sweep_result import load
 from warpchain.sweeps.plan import load_sweep
+from warpchain.walks import one_walk
 from warpchain.walks.rows import row_type
 
 
@@ -42,7 +42,9 @@ def test_without_a_terminal_lines_of_progress_are_printed(
             main(["sweep", str(tmp_path / "tiny.yaml"), "-o", str(tmp_path / name), "--workers", "1"])
         lines = [line for line in capsys.readouterr().err.splitlines() if " of 80 walks" in line]
         assert bool(lines) == (every == 0.0)
-    assert lines[-1].startswith("80 of 80 walks   ") and " a second   0 s left   80 time_limit" in lines[-1]
+    assert (
+        lines[-1].startswith("[##########] 80 of 80 walks   ") and " a second   0 s left   80 time_limit" in lines[-1]
+    )
 
 
 def test_an_estimate_says_time_and_size(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -88,14 +90,9 @@ def test_info_tells_rate_and_time_left_of_a_running_sweep(tmp_path: Path, capsys
 
 def test_the_time_of_a_walk_is_without_compilation(monkeypatch: pytest.MonkeyPatch) -> None:
     """Time spent on kernels is not in the wall time of a walk."""
-    compiled, settings = Batch.compile, {"links": 30, "start": "ellipse", "walk_limit": 0.01, "method": "dp5"}
+    settings = {"links": 30, "start": "ellipse", "walk_limit": 0.01, "method": "dp5"}
     walk(preset="soft", **settings)
-
-    def slowly(*arguments: object) -> None:
-        time.sleep(3.0)
-        compiled(*arguments)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(Batch, "compile", slowly)
+    monkeypatch.setattr(one_walk, "compile_kernels", lambda setups: time.sleep(3.0))
     began = time.perf_counter()
     result = walk(preset="soft", **settings)
     assert time.perf_counter() - began > 3.0

@@ -18,6 +18,11 @@ Sprocket = tuple[Array, float, float]
 """Centre (2,) in m, radius that the link circles touch in m, angular velocity in rad/s (anticlockwise > 0)."""
 
 
+def link_radii(n: int, parameters: Parameters) -> Array:
+    """Radius of the circles of each link, (n,), m; the links' own if parameters have `radii`."""
+    return getattr(parameters, "radii", np.full(n, parameters.circle_radius))
+
+
 def collision_impulse(
     v_rel: Array,
     normal: Array,
@@ -99,7 +104,7 @@ def resolve_contacts(
 ) -> tuple[Array, dict[str, int]]:
     """One pass over all touching circles, each contact seeing the velocities that those before it left.
 
-    A link has a circle of radius r at either end. Circles touch when they overlap (gap < 0); a touching contact
+    A link has a circle of its radius at either end. Circles touch when they overlap (gap < 0); a touching contact
     gets the impulse of `collision_impulse` if it approaches, else nothing. Positions never change. Two circles, or
     a circle and the sprocket, with exactly the same centre have no normal and are left alone.
 
@@ -109,7 +114,7 @@ def resolve_contacts(
 
     The point P and the normal: floor (A; y = 0): the circle's lowest point, +y. Sprocket (A): the circle's point
     nearest the sprocket's centre, radially outwards; the surface moves with Ω ẑ × (P − centre). Two links: midway
-    between the circles' centres, from A, the link at joint p, to B, the link at joint q > p.
+    between the points of the circles that are deepest in the other, from A, the link at joint p, to B, that at q > p.
 
     Args:
         position: (n, 3).
@@ -126,7 +131,7 @@ def resolve_contacts(
     velocity = velocity.copy()
     inv_mass = 1 / link_masses(n, parameters)
     inv_inertia = 1 / link_inertias(n, parameters)
-    radius = parameters.circle_radius
+    radii = link_radii(n, parameters)
     counts = {"floor": 0, "sprocket": 0, "self": 0}
 
     def collide(
@@ -160,17 +165,17 @@ def resolve_contacts(
         upwards = np.array([0.0, 1.0])
         for link in range(n):
             for centre in ends[link]:
-                if centre[1] - radius < 0:
-                    counts["floor"] += collide(None, link, centre - radius * upwards, upwards, law)
+                if centre[1] - radii[link] < 0:
+                    counts["floor"] += collide(None, link, centre - radii[link] * upwards, upwards, law)
     if sprocket is not None:
         law = (parameters.sprocket_restitution, parameters.sprocket_friction)
         hub, contact_radius, angular_velocity = sprocket
         for link in range(n):
             for centre in ends[link]:
                 distance = np.hypot(*(centre - hub))
-                if 0 < distance < contact_radius + radius:
+                if 0 < distance < contact_radius + radii[link]:
                     outwards = (centre - hub) / distance
-                    point = centre - radius * outwards
+                    point = centre - radii[link] * outwards
                     surface = angular_velocity * turned(point - hub)
                     counts["sprocket"] += collide(None, link, point, outwards, law, surface)
     if self_contact:
@@ -179,9 +184,10 @@ def resolve_contacts(
         for half, pair in product((0, 1), in_order):
             for a, b, centre_a, centre_b in _circle_pairs(pair, ends, half):
                 distance = np.hypot(*(centre_b - centre_a))
-                if 0 < distance < 2 * radius:
+                if 0 < distance < radii[a] + radii[b]:
                     normal = (centre_b - centre_a) / distance
-                    counts["self"] += collide(a, b, (centre_a + centre_b) / 2, normal, law)
+                    nearest = centre_a + radii[a] * normal, centre_b - radii[b] * normal
+                    counts["self"] += collide(a, b, sum(nearest) / 2, normal, law)
     return velocity, counts
 
 
@@ -197,15 +203,16 @@ def touching_pairs(position: Array, parameters: Parameters) -> list[tuple[int, i
     Circles of the same link or of neighbours never count. Exactly concentric circles do overlap.
     """
     n = len(position)
+    radii = link_radii(n, parameters)
     ends = np.stack(link_ends(position, parameters), axis=1)
     return [
         (p, q)
         for p in range(n)
         for q in range(p + 1, n)
         if any(
-            np.hypot(*(centre_b - centre_a)) < 2 * parameters.circle_radius
+            np.hypot(*(centre_b - centre_a)) < radii[a] + radii[b]
             for half in (0, 1)
-            for _, _, centre_a, centre_b in _circle_pairs((p, q), ends, half)
+            for a, b, centre_a, centre_b in _circle_pairs((p, q), ends, half)
         )
     ]
 

@@ -13,8 +13,7 @@ import yaml
 
 from tests.run.test_sweep_run import TINY, data_of
 from warpchain.cli.main import main
-from warpchain.inputs.validation import InputError
-from warpchain.run.gpu_workers import gpu_workers, visible_gpus
+from warpchain.run.gpu_workers import gpu_workers
 from warpchain.run.progress_bar import SweepProgress
 from warpchain.run.sweep_run import sweep
 from warpchain.run.workers import LostWorkersError
@@ -24,18 +23,26 @@ GPU_OF_WORKER = "__import__('time').sleep(0.5) or __import__('os').environ['CUDA
 
 
 def test_each_worker_has_a_gpu_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Workers see one GPU each, those that this process may use, and too many are refused; a sweep runs on them."""
-    monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "5, GPU-abc,2")
-    assert visible_gpus(2) == ["5", "GPU-abc"]
-    with pytest.raises(
-        InputError, match="--gpus: 4 wanted, but CUDA_VISIBLE_DEVICES is '5, GPU-abc,2'; give at most 3"
-    ):
-        visible_gpus(4)
-    with gpu_workers(2) as executor:
-        seen = list(executor.map(eval, [GPU_OF_WORKER] * 4))
-    assert set(seen) == {"5", "GPU-abc"} and os.environ["CUDA_VISIBLE_DEVICES"] == "5, GPU-abc,2"
-    monkeypatch.delenv("CUDA_VISIBLE_DEVICES")
-    assert visible_gpus(3) == ["0", "1", "2"]
+    """Workers see one GPU each, the first of those that this process may use."""
+    for visible, expected in (("5, GPU-abc,2", {"5", "GPU-abc"}), (None, {"0", "1"})):
+        if visible is None:
+            monkeypatch.delenv("CUDA_VISIBLE_DEVICES")
+        else:
+            monkeypatch.setenv("CUDA_VISIBLE_DEVICES", visible)
+        with gpu_workers(2) as executor:
+            assert set(executor.map(eval, [GPU_OF_WORKER] * 4)) == expected
+        assert os.environ.get("CUDA_VISIBLE_DEVICES") == visible
+
+
+def test_more_gpus_than_there_are_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One line says how many there are, before the folder is made."""
+    monkeypatch.setattr("warpchain.engine.devices.gpu_count", lambda: 1)
+    with pytest.raises(SystemExit) as caught:
+        main(["sweep", "figure6", "-o", str(tmp_path / "sweep"), "--gpus", "2"])
+    assert caught.value.code == 2 and not (tmp_path / "sweep").exists()
+    assert capsys.readouterr().err == "error: --gpus: 2 wanted, but this machine has 1; give at most 1\n"
 
 
 def test_an_exception_ends_what_workers_are_doing(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -154,11 +154,6 @@ def test_all_errors_are_told_at_once(tmp_path):
         ({"samples": 1, "grid": {"links": [28]}}, "sweep.grid.links[0]: 28 links of 0.01268 m do not reach round"),
         ({"samples": 1, "same_samples_along": ["links"]}, "sweep.same_samples_along: 'links' is no axis"),
         ({"preset": "soft", "links": 60, "source": {"version": 1}}, "preset, links: given together with a source"),
-        ({"samples": 1, "floor": [[-1, 0], [1, 0]]}, "sweep.grid.floor: not possible here; give it in scene"),
-        (
-            {"samples": 1, "link_masses": np.full(60, 3e-3)},
-            "sweep.grid.link_masses: not possible here",
-        ),
         ({"samples": 1, "start": ...}, "sweep.scene.start: Input should be"),
         ({"samples": 1, "part": "3/2"}, "part: '3/2' is no part; give k/N"),
         ({"samples": 1, "grid": {"device": ["cpu", "cuda"]}, "device": "cpu"}, "sweep.grid: method is "),

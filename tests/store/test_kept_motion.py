@@ -11,7 +11,7 @@ import xarray
 import warpchain
 from tests.run.test_sweep_run import TINY, brief_setup, data_of
 from tests.support.made_walks import assert_same
-from warpchain.engine.memory import CAPACITY_SAMPLES
+from warpchain.engine.batch import CAPACITY_SAMPLES
 from warpchain.inputs.validation import InputError, InputWarning
 from warpchain.reports.sweep_page import write_report
 from warpchain.run.sweep_run import sweep

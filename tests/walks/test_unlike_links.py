@@ -11,6 +11,7 @@ from tests.support.setups import setup_walk
 from warpchain import InputError, Status, preset
 from warpchain.inputs.link_values import alternating
 from warpchain.inputs.scene import link_values
+from warpchain.pictures.chain import circle_radii, link_outlines
 from warpchain.sweeps.plan import load_sweep
 
 SOFT = preset("soft")
@@ -21,6 +22,7 @@ KINDS = {
     "link_inertias": np.resize([SOFT.inner_inertia, SOFT.outer_inertia], 36),
     "viscous_frictions": [SOFT.viscous_friction] * 36,
     "coulomb_frictions": (SOFT.coulomb_friction,) * 36,
+    "link_radii": [SOFT.circle_radius] * 36,
 }
 """Table 1's chain, value by value."""
 
@@ -57,6 +59,23 @@ def test_a_charm_closes_the_ledger_and_is_read_back(tmp_path: Path) -> None:
     assert again.setup.scene.charm_mass == 0.02
 
 
+def test_a_walk_on_unlike_circles_rests_on_the_widest(tmp_path: Path) -> None:
+    """It closes its ledger, starts at its clearance, rests on circles no deeper than 0.1 mm, and is drawn as it is."""
+    radii = np.resize([4.2e-3, 2.5e-3, 5e-3], 36)
+    walk = warpchain.walk(start="ellipse", clearance=0.012, frame_interval=1e-2, link_radii=radii, **BRIEF)
+    assert walk.status == Status.AT_REST
+    lost = sum(walk.energy[name] for name in ("joint_friction", "joint_damping", "floor", "self_contact", "softening"))
+    assert abs(walk.energy["residual"]) < 1e-3 * lost
+    heights = walk.frame_joints[..., 1]
+    lowest = np.minimum(heights - radii, np.roll(heights, 1, axis=1) - radii).min(axis=1)
+    assert lowest[0] == walk.lowest[0] == pytest.approx(0.012, abs=1e-12)
+    assert -1e-4 < lowest[-1] < 1e-4 and walk.lowest[-1] == pytest.approx(lowest[-1], abs=1e-5)
+    outlines = link_outlines(walk.frame_joints[0], circle_radii(walk))
+    assert 0.012 <= outlines[..., 1].min() < 0.0121  # they are polygons
+    walk.save(tmp_path / "unlike.h5")
+    assert warpchain.load_walk(tmp_path / "unlike.h5").setup == walk.setup
+
+
 def test_rules_change_what_they_say() -> None:
     """A charm one link, a stiff joint one joint, a gradient all links by equal steps; arrays come before rules."""
     usual = alternating(SOFT, 60)
@@ -69,9 +88,11 @@ def test_rules_change_what_they_say() -> None:
     graded = values_of(mass_gradient=0.5)
     assert graded.mass / usual.mass == pytest.approx(np.linspace(0.5, 1.5, 60), rel=1e-14)
     assert graded.inertia / usual.inertia == pytest.approx(np.linspace(0.5, 1.5, 60), rel=1e-14)
+    narrow = values_of(charm_link=7, charm_radius=2e-3)
+    assert np.flatnonzero(narrow.radius != usual.radius).tolist() == [7] and narrow.radius[7] == 2e-3
     both = values_of(link_masses=[1e-3] * 60, charm_link=59, charm_mass=1.0)
     assert both.mass.tolist() == [1e-3] * 59 + [1.001]
-    assert not any(values.alternates for values in (charm, stiff, graded, both)) and usual.alternates
+    assert not any(values.alternates for values in (charm, stiff, graded, narrow, both)) and usual.alternates
 
 
 def test_an_odd_number_of_links_needs_links_of_one_kind_or_values_of_each() -> None:
@@ -92,7 +113,9 @@ def test_an_odd_number_of_links_needs_links_of_one_kind_or_values_of_each() -> N
         ({"charm_link": 60}, "scene.charm_link: 60 is not among 60 links; give 0 to 59"),
         ({"stiff_joint": 60}, "scene.stiff_joint: 60 is not among 60 links; give 0 to 59"),
         ({"link_masses": [1.0, 2.0]}, "scene.link_masses: 2 numbers for 60 links; give one for each"),
-        ({"link_masses": [0.0] * 60}, "scene.link_masses[0]: 0 is no mass; give more"),
+        ({"link_masses": [0.0] * 60}, "scene.link_masses[0]: 0 is too little; give more"),
+        ({"link_radii": [4e-3] * 59 + [0.02]}, "scene.link_radii[59]: 0.02 is not smaller than half the link length "),
+        ({"charm_radius": 0.02, "start": "ellipse"}, "scene.charm_radius: 0.02 is not smaller than half the link "),
         ({"link_inertias": {7: 1e-7}}, "scene.link_inertias: Input should be a valid list, in kg m²; given "),
         ({"coulomb_frictions": [-1.0] * 60}, "scene.coulomb_frictions[0]: Input should be greater than or equal to 0"),
         ({"mass_gradient": 1.0}, "scene.mass_gradient: Input should be less than 1; given 1.0"),

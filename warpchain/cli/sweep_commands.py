@@ -221,10 +221,9 @@ def _executor(gpus: int | None, scheduler: str | None) -> Iterator[Any]:
     """Workers on GPUs, or the client of a Dask cluster; None if neither is asked for."""
     from warpchain.engine.devices import gpu_count
     from warpchain.inputs.validation import InputError
-    from warpchain.run.gpu_workers import gpu_workers, visible_gpus
+    from warpchain.run.gpu_workers import gpu_workers
 
     if gpus is not None:
-        visible_gpus(gpus)
         if gpus > (there := gpu_count()):
             raise InputError(f"--gpus: {gpus} wanted, but this machine has {there}; give at most {there}")
         with gpu_workers(gpus) as executor:

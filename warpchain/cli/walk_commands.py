@@ -83,7 +83,6 @@ def walk(
     from warpchain.inputs.validation import InputError, checked, printable
     from warpchain.inputs.yaml_files import parse_yaml
     from warpchain.run.progress_bar import changing_line, walk_progress_text
-    from warpchain.sweeps.sweep_file import read_walk_file
     from warpchain.walks.one_walk import run_walk
 
     named = {"links": links, "frequency": frequency, "start": start}
@@ -98,6 +97,8 @@ def walk(
         replaced = replaced_by(given["options"])
         preset, own = base.preset, {name: getattr(base, name).model_dump(exclude=replaced) for name in SECTIONS}
     elif config is not None:
+        from warpchain.sweeps.sweep_file import read_walk_file  # its grammar takes long to build
+
         file_preset, own = read_walk_file(config)
         preset = preset or file_preset
         if preset is None:
@@ -118,7 +119,7 @@ def walk(
             seed=number,
             frame_interval=interval,
             record_loads=record_loads,
-            on_progress=show and (lambda progress: show(walk_progress_text(progress))),
+            on_progress=lambda progress: show(walk_progress_text(progress)),
         )
     if as_json:
         print(json.dumps(result.to_dict(), indent=2, allow_nan=False))

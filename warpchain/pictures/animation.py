@@ -23,6 +23,7 @@ from scipy.spatial.transform import Rotation
 from warpchain.files import checked_output, replacing, write_whole
 from warpchain.pictures.chain import (
     SIDE,
+    circle_radii,
     draw_chain,
     draw_ground,
     floor_height,
@@ -168,7 +169,7 @@ def player(walk: "WalkResult", slow: float = 4.0) -> str:
         "time": _whole(times, 1e6),
         "joints": _whole(joints[frames, :, :2].reshape(count, -1)),
         "center": _whole(center),
-        "radius": walk.setup.parameters.circle_radius * 1e4,
+        "radii": _whole(circle_radii(walk)),
         "sprocket": None if sprocket is None else _whole(np.array([*sprocket, walk.sprocket_radius])),
         "view": _whole(box.ravel()),
         "marks": marks,
@@ -214,6 +215,7 @@ class Film:
             ValueError: the walk has no frames or broken ones.
         """
         self._walk, self._joints, self._center = walk, checked_joints(walk), center_in_room(walk)
+        self._radii = circle_radii(walk)
         self._tilts = walk.joints_in_room is not None
         self._view = Rotation.from_euler("yx", _CORNER, degrees=True).as_matrix() if self._tilts else SIDE
         low, high = walk_box(walk, self._joints)
@@ -254,11 +256,11 @@ class Film:
         for artist in self._moving:
             artist.remove()
         walk, axes, joints = self._walk, self._axes, self._joints[frame]
-        parameters, moment = walk.setup.parameters, walk.frame_time[frame]
+        moment = walk.frame_time[frame]
         path = self._project(self._center[: max(1, int(np.searchsorted(walk.time, moment, side="right")))])
         clock: dict[str, Any] = {"ha": "right", "va": "top", "fontsize": 11, "color": INK}
         self._moving = [
-            draw_chain(axes, joints, parameters.circle_radius, self._view, (INNER, OUTER, EDGE), edge=0.45, halo=False),
+            draw_chain(axes, joints, self._radii, self._view, (INNER, OUTER, EDGE), edge=0.45, halo=False),
             *axes.plot(*path, color=INK, linewidth=0.8, zorder=4),
             *axes.plot(*path[:, -1:], "o", color=INK, markersize=5, zorder=4),
             self.figure.text(0.985, 0.975, f"{moment:.3f} s", **clock),

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from warpchain.pictures.chain import (
     ABOVE,
     SIDE,
+    circle_radii,
     draw_chain,
     draw_ground,
     floor_height,
@@ -99,7 +100,7 @@ def film_strip(walk: "WalkResult", figure: Figure | None = None) -> Figure:
     colors = colormaps["viridis"](0.9 * walk.frame_time / (walk.frame_time[-1] or 1.0))[:, :3]
     center = center_in_room(walk)
     path = np.stack([np.interp(walk.frame_time, walk.time, row) for row in center.T], axis=1)
-    radius = walk.setup.parameters.circle_radius
+    radius = circle_radii(walk)
     shown = _instants(path, float(np.ptp(joints[0, :, 0])))
     for title, axes, view in views:
         for frame in shown:
@@ -118,7 +119,7 @@ def film_strip(walk: "WalkResult", figure: Figure | None = None) -> Figure:
         axes.set(xlim=line[[0, -1], 0], ylim=(bottom, bottom + 2 * half_height), yticks=[], xlabel="x / m")
         axes.set_xticks([x for x in MaxNLocator(4).tick_values(*line[[0, -1], 0]) if abs(x - spot[0]) < 0.8 * half])
         axes.set_title(f"{title}, {walk.frame_time[frame]:.3f} s", fontsize="medium", loc="left")
-    _write_times(side, walk.frame_time[shown], joints[shown, :, :2], colors[shown], 1.2 * radius, 1 / scale)
+    _write_times(side, walk.frame_time[shown], joints[shown, :, :2], colors[shown], 1.2 * radius.max(), 1 / scale)
     style: dict[str, Any] = {"frameon": False, "ncols": 2, "borderaxespad": 0.0, "fontsize": "small"}
     place = (1 - _RIGHT / paper[0], 1 - 0.08 / paper[1])
     figure.legend(*side.get_legend_handles_labels(), loc="upper right", bbox_to_anchor=place, **style)
@@ -183,7 +184,7 @@ def _draw_distance(axes: Axes, walk: "WalkResult", low: float, depth: float) -> 
 
 def _moments(walk: "WalkResult") -> list[tuple[int, str, Array]]:
     """At most four frames in order of time, no frame twice, with what happens there and where, (2,)."""
-    joints, radius = walk.frame_joints, walk.setup.parameters.circle_radius
+    joints, radius = walk.frame_joints, circle_radii(walk).max()
     above, last = from_floor(walk, joints), len(joints) - 1
     found: dict[int, tuple[str, Array]] = {}
     touching = np.flatnonzero(above.min(axis=1) < 1.02 * radius)

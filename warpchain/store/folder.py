@@ -35,7 +35,7 @@ from warpchain.files import given_path, make_folder, naming, remove_output, writ
 from warpchain.hdf5_files import open_regular
 from warpchain.inputs.validation import DamagedFileError, InputError, InputWarning
 from warpchain.store.manifest import OWN, Folder, Manifest, Shard, read_manifest
-from warpchain.store.shards import FOREIGN, opened_shard, shard_files, stamp
+from warpchain.store.shards import FOREIGN, opened_shard, rows_of, shard_files, stamp
 from warpchain.sweeps.designs import EXTENSIBLE
 from warpchain.sweeps.plan import Sweep
 from warpchain.version import NUMERICS_VERSION
@@ -180,7 +180,7 @@ def read_rows(
     for name in shard_files(directory):
         try:
             with opened_shard(directory, name, manifest.digest) as file:
-                rows, kept = file["rows"][()], [int(row) for row in file.get("motion", ())]
+                rows, kept = rows_of(file, manifest.row_type), [int(row) for row in file.get("motion", ())]
         except DamagedFileError as error:
             if damaged is None:
                 raise

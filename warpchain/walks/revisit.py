@@ -7,14 +7,12 @@ import numpy as np
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import gpu_turn
 from warpchain.engine.snapshot import restore, take_snapshot
-from warpchain.inputs.options import on_gpu
 from warpchain.inputs.scene import face_count
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError, plain, shown
 from warpchain.status import Status
 from warpchain.walks.moving_plane import state_of_plane
-from warpchain.walks.scheduler import ATTEMPTS
 from warpchain.walks.walk_phases import WalkRun
 
 FINER = 8
@@ -50,18 +48,21 @@ def state_at(setup: Setup, t: object, end: float) -> State:
     with gpu_turn([setup.options.device]):
         batch = Batch(1, setup.scene.links, setup.options, faces=face_count(setup.scene))
         run = WalkRun(batch, 0, setup)
-        attempts = ATTEMPTS["cuda" if on_gpu(setup.options.device) else "cpu"]
+        phases = run.phases()
+        features, attempts = next(phases), batch.attempts_of_launch
         while not _has_come(run, batch, time):
-            before = take_snapshot(batch, 0) if run.is_released else None
-            batch.compile(run.features, batch.links)
-            batch.launch([0], run.features, attempts)
+            before = take_snapshot(batch, 0) if run.is_free else None
+            batch.launch([0], features, attempts)
             if before is not None and batch.time(0) >= time and attempts > 1:
                 restore(batch, 0, before)
                 attempts = max(1, attempts // FINER)
-            elif batch.status(0) != Status.RUNNING and not run.next_phase() and not _has_come(run, batch, time):
-                raise InputError(
-                    f"t: run again, the walk ends as {run.status.label} at {batch.time(0):.6g} s; give less"
-                )
+            elif batch.status(0) != Status.RUNNING and not _has_come(run, batch, time):
+                following = next(phases, None)
+                if following is None:
+                    raise InputError(
+                        f"t: run again, the walk ends as {run.status.label} at {batch.time(0):.6g} s; give less"
+                    )
+                features = following
         return State(
             position=batch.position(0),
             velocity=batch.velocity(0),
@@ -74,4 +75,4 @@ def state_at(setup: Setup, t: object, end: float) -> State:
 
 def _has_come(run: WalkRun, batch: Batch, time: float) -> bool:
     """Whether the walk has come to a time since its release."""
-    return run.is_released and batch.time(0) >= time
+    return run.is_free and batch.time(0) >= time

@@ -31,7 +31,7 @@ def body_pass(features: Features, plane: Plane):
     """
     gap_of, meet = plane.gap, plane.meet
     face_at = BODIES[features.fixed_body].motion
-    _, depth, count = of_fixed_body(features.fixed_body)
+    _, depth, count = of_fixed_body(features.is_driven)
     has_floor = features.has_floor
     moves = features.moving_sprocket
     if moves:

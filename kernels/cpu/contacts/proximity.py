@@ -20,6 +20,7 @@ from warpchain.kernels.layout import (
     LEFT_Y,
     LOST_FIXED,
     OMEGA,
+    RADIUS,
     RIGHT_X,
     RIGHT_Y,
     SINE,
@@ -30,7 +31,7 @@ from warpchain.kernels.layout import (
 )
 from warpchain.kernels.physics.elementary import ONE, TWO, ZERO, from_order_key, order_bits, order_key
 from warpchain.kernels.physics.geometry import LANES, whole_lanes
-from warpchain.kernels.types import Chain, Ground, Rows
+from warpchain.kernels.types import Chain, Ground, Rows, with_circles
 
 wp.set_module_options({"enable_backward": False})
 
@@ -125,7 +126,7 @@ def fixed_contacts(fixed_body: str):
         least = FURTHEST
         i = int(0)
         while i < whole_lanes(chain.link_count):
-            gap = gap_of(chain, ground, face, placed_link(K, i))
+            gap = gap_of(with_circles(chain, K[RADIUS, i]), ground, face, placed_link(K, i))
             K[GAP, i] = wp.where(i < chain.link_count, gap, ONE)
             least = wp.min(least, wp.where(i < chain.link_count, order_key(gap), FURTHEST))
             i += 1
@@ -144,7 +145,7 @@ def fixed_contacts(fixed_body: str):
                     if wp.static(in_cells):
                         if K[GAP, i] >= ZERO:
                             continue
-                    link = meet(chain, ground, face, placed_link(K, i))
+                    link = meet(with_circles(chain, K[RADIUS, i]), ground, face, placed_link(K, i))
                     K[U, i] = link.u
                     K[V, i] = link.v
                     K[OMEGA, i] = link.omega

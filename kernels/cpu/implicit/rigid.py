@@ -47,7 +47,9 @@ from warpchain.kernels.cpu.implicit.rigid_layout import (
 from warpchain.kernels.cpu.implicit.solver import LANES, cyclic_solver, link_at, place_column, row_at, segment_places
 from warpchain.kernels.layout import STAGES, X
 from warpchain.kernels.physics.elementary import HALF, ONE, ZERO, cos_sin, order_bits
+from warpchain.kernels.physics.geometry import Link
 from warpchain.kernels.physics.joint import friction_torque
+from warpchain.kernels.physics.load import link_load
 from warpchain.kernels.physics.rigid_joint import inward_pull, opening_rate_of, pushed, turning_share
 from warpchain.kernels.types import Chain, Rows
 
@@ -239,9 +241,10 @@ def rigid_joints(columns: int) -> RigidJoints:
         c = int(8)
         while c < end:
             ax, ay, turn = pushed_at(S, a, c)
-            S[RATE, c] = ax
-            S[wp.static(RATE + 1), c] = ay - chain.gravity
-            S[wp.static(RATE + 2), c] = S[FREE, c] + turn
+            load_x, load_y, load_turn = link_load(chain, c, Link(), S[INVERSE_MASS, c], S[INVERSE_INERTIA, c])
+            S[RATE, c] = ax + load_x
+            S[wp.static(RATE + 1), c] = ay + load_y
+            S[wp.static(RATE + 2), c] = S[FREE, c] + (turn + load_turn)
             c += 1
 
     def pusher(row: int):

@@ -9,12 +9,13 @@ from warpchain.kernels.contacts.fixed_body import BODIES, Touching, link_and_bod
 from warpchain.kernels.contacts.tilting_floor import greatest_across_speed, middle_height, steepness
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.board import ends_of
-from warpchain.kernels.gpu.stage import Link, Place, Proximity, constants, felt_plane, read_link, vec5d
+from warpchain.kernels.gpu.stage import Place, Proximity, constants, felt_plane, read_link, vec5d
 from warpchain.kernels.gpu.threads import block_maxima, vec4i
-from warpchain.kernels.layout import COSINE, INVERSE_INERTIA, INVERSE_MASS, OMEGA, SINE, U, V
+from warpchain.kernels.layout import COSINE, INVERSE_INERTIA, INVERSE_MASS, OMEGA, RADIUS, SINE, U, V
 from warpchain.kernels.methods.controller import quick_quotient, quick_root
 from warpchain.kernels.physics.elementary import TWO, from_order_key_single, order_bits_single, order_key_single
-from warpchain.kernels.types import Chain, Control, Drive, Ground, Rows, State
+from warpchain.kernels.physics.geometry import Link
+from warpchain.kernels.types import Chain, Control, Drive, Ground, Rows, State, with_circles
 
 wp.set_module_options({"enable_backward": False})
 
@@ -69,7 +70,7 @@ def block_proximity(features: Features, block_dim: int):
             cy = next_end[1] - right_y
             values[0] = order_bits_single(wp.float32(cx * cx + cy * cy))
             if wp.static(tilts):
-                felt = felt_plane(K, constants(K), wp.static(layout.VALUE_PLANE))
+                felt = with_circles(felt_plane(K, constants(K), wp.static(layout.VALUE_PLANE)), K[RADIUS, place.lane])
             if wp.static(has_floor and tilts):
                 slope = steepness(felt)
                 lowest = wp.min(
@@ -78,7 +79,7 @@ def block_proximity(features: Features, block_dim: int):
                 gap = lowest - felt.half_width * wp.abs(felt.up_z)
                 values[1] = order_key_single(wp.float32(-gap))
             elif wp.static(has_fixed):
-                own = constants(K)
+                own = with_circles(constants(K), K[RADIUS, place.lane])
                 gap = gap_of(own, ground, face_of(ground), placed_link(own, link))
                 values[1] = order_key_single(wp.float32(-gap))
             if wp.static(has_self):
@@ -128,7 +129,7 @@ def block_contact(fixed_body: str):
 
     @wp.func
     def meet_body(K: Rows, place: Place, ground: Ground, drive: Drive, world: int, time: wp.float64):
-        chain = constants(K)
+        chain = with_circles(constants(K), K[RADIUS, place.lane])
         link = placed_link(chain, read_link(K, place.lane))
         link.cosine = K[COSINE, place.lane]
         link.sine = K[SINE, place.lane]

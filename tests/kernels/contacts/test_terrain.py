@@ -142,6 +142,37 @@ def test_a_block_of_chain_slides_by_the_formula(degrees, friction, corners):
         assert way[-1] == pytest.approx(0.4**2 / (-2 * gain), rel=1e-2) and abs(speed[-1]) < 1e-3
 
 
+@pytest.mark.parametrize(("first", "second", "until"), [(0.1, 0.3, 0.02), (0.3, 0.1, 0.008)])
+def test_a_block_slides_over_two_segments_by_the_formula(first, second, until):
+    """v²/2g is the sum of μ times way on each; while the block of length 2ℓ crosses, of the mean μ times 2ℓ."""
+    chain = SOFT.with_values({"floor_restitution": 0.0, "floor_friction": 0.9, "circle_radius": 1e-3})
+    position, velocity, _ = lying_chain(0.0, 0.4)
+    position[:, 1] = chain.circle_radius
+    front = position[:, 0].max() + chain.link_length / 2
+    points = [[-1, 0, 0.0, first], [front + until, 0, 0.0, second], [2, 0]]
+    moved = warpchain.simulate(
+        chain, position, velocity, 0.4, times=[0.4], floor=points, self_contact=False, method="os32"
+    )
+    length = 2 * chain.link_length
+    left = 0.4**2 / (2 * chain.gravity) - first * until - (first + second) / 2 * length
+    way = moved.position[0, :, 0].mean() - position[:, 0].mean()
+    assert left > 0 and way == pytest.approx(until + length + left / second, rel=1e-2)
+    assert np.abs(moved.velocity).max() < 1e-2
+
+
+def test_bounces_have_the_restitution_of_their_segment():
+    """Upright links that fall on segments and on a corner rise at e times their speed, so to e² of the height."""
+    points = np.array([[-1.0, 0.0], [0.0, 0.0], [1.0, 0.0], [1.0, -1.0], [2.0, -1.0]])
+    laws = np.array([[0.2, 0.5], [0.9, 0.5], [0.3, 0.5], [0.5, 0.5]])
+    position = np.zeros((4, 3))
+    position[:, 0], position[:, 2] = [-0.5, 0.5, 1.0 + 1e-9, 1.5], np.pi / 2
+    position[:, 1] = PAPER.link_length / 2 + PAPER.circle_radius - 1e-5 - np.array([0, 0, 0, 1])
+    velocity = np.tile([0.0, -1.0, 0.0], (4, 1))
+    contact_pass = ContactPass([Placed(position, velocity, PAPER)], profile=points, laws=laws)
+    contact_pass.run(TERRAIN)
+    assert_allclose(contact_pass.velocity(0)[:, 1], [0.2, 0.9, 0.3, 0.5], rtol=1e-6)
+
+
 @pytest.mark.parametrize("points", [STAIRS, HILLS], ids=["stairs", "hills"])
 def test_a_fall_equals_a_second_program(points):
     """A chain that falls on corners and moves by 5 mm and 0.4 rad is where that program's small steps have it."""

@@ -22,6 +22,7 @@ from tests.support.blocks_under_test import (
     launch_blocks,
     launch_chains,
 )
+from tests.support.kernels_under_test import common_laws
 from tests.support.unlike_links import unlike_links
 from warpchain.engine.batch import Batch
 from warpchain.engine.kernel_choice import most_registers
@@ -53,7 +54,7 @@ def test_fixed_steps_equal_a_cpu_kernel(method: str, fixed_body: str, self_conta
     ours, theirs = (batch_of(chains, method=method, self_contact=self_contact) for _ in range(2))
     for batch in (ours, theirs):
         for world in range(2):
-            batch.set_floor(world, HILLS, SOFT)
+            batch.set_floor(world, HILLS, common_laws(HILLS, SOFT))
     features = ours.features(fixed_body=fixed_body)
     launch_blocks(ours, features, 40, block_dim=block_dim)
     launch_chains(theirs, features, 40)
@@ -135,14 +136,9 @@ def test_samples_frames_and_rest_equal_a_cpu_kernel() -> None:
     for name in ("first_sample", "last_sample"):
         expected = getattr(theirs.state, name).numpy()
         assert np.array_equal(getattr(ours.state, name).numpy(), expected)
-    assert np.array_equal(ours.drain_samples(1), theirs.drain_samples(1))
-    our_loads, their_loads = ours.frame_loads(1), theirs.frame_loads(1)
-    our_times, our_frames = ours.drain_frames(1)
-    their_times, their_frames = theirs.drain_frames(1)
-    assert len(our_times) > 1
-    assert np.array_equal(our_times, their_times)
-    assert np.array_equal(our_frames, their_frames)
-    assert our_loads.shape == (len(our_times), LINKS, 3) and np.array_equal(our_loads, their_loads)
+    recorded, expected = ours.drain(1), theirs.drain(1)
+    assert len(recorded.times) > 1 and recorded.loads.shape == (len(recorded.times), LINKS, 3)
+    assert all(map(np.array_equal, recorded, expected))
 
 
 def test_frames_between_samples_equal_a_cpu_kernel() -> None:
@@ -165,13 +161,11 @@ def test_frames_between_samples_equal_a_cpu_kernel() -> None:
     ours, theirs, coarse = runs
     assert_same(ours, theirs)
     assert_same(theirs, coarse)
-    assert np.array_equal(ours.frame_loads(1), theirs.frame_loads(1))
-    few, _ = coarse.drain_frames(1)
-    our_times, our_frames = ours.drain_frames(1)
-    their_times, their_frames = theirs.drain_frames(1)
-    assert np.array_equal(our_times, their_times) and np.array_equal(our_frames, their_frames)
-    marks = np.floor(our_times / (2.5 * FIXED_STEP) + 1e-9)
-    assert len(few) < 6 and len(our_times) > 12 and np.all(np.diff(marks) >= 1)
+    recorded, expected, few = (batch.drain(1) for batch in runs)
+    assert np.array_equal(recorded.loads, expected.loads)
+    assert np.array_equal(recorded.times, expected.times) and np.array_equal(recorded.frames, expected.frames)
+    marks = np.floor(recorded.times / (2.5 * FIXED_STEP) + 1e-9)
+    assert len(few.times) < 6 and len(marks) > 12 and np.all(np.diff(marks) >= 1)
 
 
 def test_failures_stop_one_chain_and_leave_the_others() -> None:
