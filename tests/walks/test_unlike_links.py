@@ -138,7 +138,7 @@ def test_a_sweep_has_charms_as_an_axis_and_draws_them() -> None:
     assert [setup.scene.charm_mass for setup in setups] == [0, 0.05, 0.1, 0, 0.05, 0.1]
     assert len({setup.scene.mass_gradient for setup in setups}) == 6
     assert sweep.canonical()["blocks"][0]["scene"]["charm_link"] == 7
-    with pytest.raises(InputError, match=r"^sweep\.grid\.link_masses: not possible here; give it in scene"):
+    with pytest.raises(InputError, match=r"^sweep\.grid\.link_masses: no names; give each value one"):
         load_sweep({**content, "grid": {"link_masses": [[1.0] * 60]}})
 
 
