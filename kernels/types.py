@@ -7,8 +7,6 @@ from typing import Any
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
-
 Rows: Any = wp.array2d(dtype=wp.float64)
 """One row for each quantity, one column for each link or joint, see :mod:`layout`."""
 Row: Any = wp.array(dtype=wp.float64)

@@ -2,26 +2,11 @@
 
 import warp as wp
 
+from warpchain.kernels import layout
 from warpchain.kernels.contacts.impulse import collision_impulse, inverse_masses
-from warpchain.kernels.layout import (
-    INVERSE_INERTIA,
-    INVERSE_MASS,
-    LEFT_X,
-    LEFT_Y,
-    OMEGA,
-    RADIUS,
-    RIGHT_X,
-    RIGHT_Y,
-    STRANDS_APART,
-    U,
-    V,
-    X,
-    Y,
-)
+from warpchain.kernels.layout import INVERSE_INERTIA, INVERSE_MASS, LEFT_X, LEFT_Y, OMEGA, STRANDS_APART, U, V, X, Y
 from warpchain.kernels.physics.elementary import HALF, ZERO, quotient
 from warpchain.kernels.types import Chain, Rows
-
-wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
@@ -144,16 +129,16 @@ def touching_circles(K: Rows, chain: Chain, p: int, q: int, half: int, second: i
     """
     after_q = second ^ half
     link_a, link_b = links_of(p, q, half, second, chain.link_count)
-    ax = wp.where(second == 0, K[RIGHT_X, p], K[LEFT_X, p + 1])
-    ay = wp.where(second == 0, K[RIGHT_Y, p], K[LEFT_Y, p + 1])
-    bx = wp.where(after_q == 0, K[RIGHT_X, q], K[LEFT_X, q + 1])
-    by = wp.where(after_q == 0, K[RIGHT_Y, q], K[LEFT_Y, q + 1])
+    ax = wp.where(second == 0, K[layout.RIGHT_X, p], K[LEFT_X, p + 1])
+    ay = wp.where(second == 0, K[layout.RIGHT_Y, p], K[LEFT_Y, p + 1])
+    bx = wp.where(after_q == 0, K[layout.RIGHT_X, q], K[LEFT_X, q + 1])
+    by = wp.where(after_q == 0, K[layout.RIGHT_Y, q], K[LEFT_Y, q + 1])
     if are_neighbours(link_a, link_b, chain.link_count):
         bx = ax
         by = ay
     depth, nx, ny, a_n, a_t, b_n, b_t = circles_of_links(
-        K[RADIUS, link_a],
-        K[RADIUS, link_b],
+        K[layout.RADIUS, link_a],
+        K[layout.RADIUS, link_b],
         ax,
         ay,
         bx,

@@ -18,8 +18,6 @@ from warpchain.kernels import layout
 from warpchain.kernels.physics.elementary import ONE, ZERO, quotient
 from warpchain.kernels.types import Chain, Ground
 
-wp.set_module_options({"enable_backward": False})
-
 SMALLEST = wp.constant(wp.float64(1e-300))
 FAR = wp.constant(wp.float64(1e30))
 LAST_CELL = wp.constant(wp.float64(layout.GROUND_CELLS - 1))

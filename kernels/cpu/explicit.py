@@ -12,15 +12,13 @@ import warp as wp
 from warpchain.kernels import layout
 from warpchain.kernels.layout import STAGE_ROWS, STAGES, U, V, X, Y
 from warpchain.kernels.methods.controller import error_bits
-from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
+from warpchain.kernels.methods.explicit_tableaus import Tableau
 from warpchain.kernels.physics.elementary import LARGEST_TURN, TWO, ZERO, cos_sin, order_bits
 from warpchain.kernels.physics.geometry import Link, end_positions, end_velocities, turned, whole_lanes
 from warpchain.kernels.physics.joint import friction_torque, joint_force, link_acceleration
 from warpchain.kernels.physics.load import link_load
 from warpchain.kernels.physics.plane import plane_load
 from warpchain.kernels.types import Chain, Rows
-
-wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
@@ -112,18 +110,17 @@ def sums_over_stages(velocity: tuple[float, ...], position: tuple[float, ...]):
 
 
 @functools.cache
-def explicit_method(name: str, tilts: bool = False):
+def explicit_method(tableau: Tableau, tilts: bool = False):
     """Warp functions of one tableau: (evaluate the first stage, attempt a step, commit it).
 
     Args:
-        name: Key of :data:`TABLEAUS`.
+        tableau: Its coefficients.
         tilts: Whether the plane of the chain may move; ``chain`` is then on the plane of the middle of the step.
 
     Returns:
         ``first_stage(K, chain)``, ``attempt(K, chain, h, tolerance)`` → bits of the greatest error ratio (see
         :func:`order_bits`), ``commit(K, chain, h)``.
     """
-    tableau = TABLEAUS[name]
     stages = tableau.stages
     reuses_last = tableau.first_same_as_last
     nodes, velocity_weights = tableau.nodes, tableau.velocity_weights
@@ -289,12 +286,8 @@ def explicit_method(name: str, tilts: bool = False):
                     damping += wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 4), i]
             K[layout.LOST_FRICTION, i] = K[layout.LOST_FRICTION, i] + h * friction
             K[layout.LOST_DAMPING, i] = K[layout.LOST_DAMPING, i] + h * damping
-            K[X, i] = K[layout.NEW_X, i]
-            K[Y, i] = K[layout.NEW_Y, i]
-            K[layout.THETA, i] = K[layout.NEW_THETA, i]
-            K[U, i] = K[layout.NEW_U, i]
-            K[V, i] = K[layout.NEW_V, i]
-            K[layout.OMEGA, i] = K[layout.NEW_OMEGA, i]
+            for row in range(6):
+                K[wp.static(X + row), i] = K[wp.static(layout.NEW_X + row), i]
             if wp.static(reuses_last):
                 for row in range(wp.static(STAGE_ROWS)):
                     K[wp.static(STAGES + row), i] = K[wp.static(last_row + row), i]

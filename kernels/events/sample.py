@@ -17,8 +17,6 @@ from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.physics.scaled_loads import drag_shape
 from warpchain.kernels.types import Chain, Control, Drive, Record, Rows, State
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.func
 def next_mark(state: State, control: Control, world: int):

@@ -2,28 +2,12 @@
 
 import warp as wp
 
-from warpchain.kernels.layout import (
-    COSINE,
-    INERTIA,
-    LEFT_X,
-    LEFT_Y,
-    MASS,
-    OMEGA,
-    RADIUS,
-    RIGHT_X,
-    RIGHT_Y,
-    SINE,
-    U,
-    V,
-    X,
-    Y,
-)
+from warpchain.kernels import layout
+from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, MASS, OMEGA, RADIUS, RIGHT_X, RIGHT_Y, SINE, U, V, X, Y
 from warpchain.kernels.physics.elementary import HALF, ZERO, from_order_key, order_key
-from warpchain.kernels.physics.geometry import Link
+from warpchain.kernels.physics.geometry import read_link
 from warpchain.kernels.physics.load import NOTHING, link_energy, weight_energy
 from warpchain.kernels.types import Chain, Rows
-
-wp.set_module_options({"enable_backward": False})
 
 
 @wp.struct
@@ -43,20 +27,6 @@ class Summary:
     width: wp.float64
     loop_speed: wp.float64
     area: wp.float64
-
-
-@wp.func
-def moving_link(K: Rows, chain: Chain, i: int) -> Link:
-    """A link, from the rows of the state."""
-    link = Link()
-    link.x = K[X, i]
-    link.y = K[Y, i]
-    link.u = K[U, i]
-    link.v = K[V, i]
-    link.omega = K[OMEGA, i]
-    link.arm_x = chain.half_length * K[COSINE, i]
-    link.arm_y = chain.half_length * K[SINE, i]
-    return link
 
 
 @wp.func
@@ -92,8 +62,8 @@ def summarise(K: Rows, chain: Chain) -> Summary:
         my += m * K[Y, i]
         mu += m * K[U, i]
         mv += m * K[V, i]
-        further += link_energy(chain, i, moving_link(K, chain, i))
-        kinetic += HALF * (m * speed + K[INERTIA, i] * K[OMEGA, i] * K[OMEGA, i])
+        further += link_energy(chain, i, read_link(K, chain, i))
+        kinetic += HALF * (m * speed + K[layout.INERTIA, i] * K[OMEGA, i] * K[OMEGA, i])
         square += speed
         along += K[U, i] * K[COSINE, i] + K[V, i] * K[SINE, i]
         cx = K[LEFT_X, i + 1] - K[RIGHT_X, i]

@@ -12,16 +12,14 @@ import functools
 import warp as wp
 
 from warpchain.kernels import layout
-from warpchain.kernels.layout import COSINE, OMEGA, SINE, U, V, X, Y
 from warpchain.kernels.methods.controller import error_scale, quick_quotient
+from warpchain.kernels.physics import geometry
 from warpchain.kernels.physics.elementary import order_bits_single
 from warpchain.kernels.physics.geometry import Link, end_positions, end_velocities
 from warpchain.kernels.physics.joint import friction_torque, joint_force, link_acceleration
 from warpchain.kernels.physics.load import link_load
 from warpchain.kernels.physics.plane import plane_load
 from warpchain.kernels.types import Chain, Rows
-
-wp.set_module_options({"enable_backward": False})
 
 LARGEST_SCALE = wp.constant(wp.float32(1e30))
 """Divisors are reduced to this, because :func:`quick_quotient` is 0 beyond 2¹²⁶; the ratio only grows."""
@@ -112,16 +110,7 @@ def write_constants(K: Rows, chain: Chain):
 @wp.func
 def read_link(K: Rows, column: int) -> Link:
     """A link, from the board."""
-    link = Link()
-    link.x = K[X, column]
-    link.y = K[Y, column]
-    link.u = K[U, column]
-    link.v = K[V, column]
-    link.omega = K[OMEGA, column]
-    half_length = constants(K).half_length
-    link.arm_x = half_length * K[COSINE, column]
-    link.arm_y = half_length * K[SINE, column]
-    return link
+    return geometry.read_link(K, constants(K), column)
 
 
 @wp.func

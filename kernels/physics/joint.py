@@ -8,8 +8,6 @@ import warp as wp
 from warpchain.kernels.physics.elementary import tanh
 from warpchain.kernels.types import Chain
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.func
 def joint_force(chain: Chain, opening: wp.float64, opening_rate: wp.float64):

@@ -9,8 +9,6 @@ import warp as wp
 from warpchain.kernels.physics.geometry import Link
 from warpchain.kernels.types import Chain
 
-wp.set_module_options({"enable_backward": False})
-
 NOTHING = wp.constant(wp.float64(-0.0))
 
 IS_UNIFORM = True

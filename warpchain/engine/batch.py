@@ -210,13 +210,7 @@ class Batch:
         self.host["model/links"][world, :, :links] = rows_of(own)
 
     def set_floor(self, world: int, points: Array, laws: Array) -> None:
-        """Set the floor of a world's chain, which is set, if it is not flat.
-
-        Args:
-            world: Index.
-            points: Of its profile, (p, 2).
-            laws: Coefficients of restitution and friction of its p − 1 faces, (p − 1, 2).
-        """
+        """Set the floor of a world whose chain is set: points of a profile (p, 2), e and μ of its faces (p − 1, 2)."""
         self.host["model/faces"][world, : len(points) - 1] = faces_of(points, laws)
         if len(points) > 2:
             chain = self.host["model/chains"][world]

@@ -96,8 +96,8 @@ class Scene(Section):
         Annotated[Literal["flat"], Tag("(flat)")] | Annotated[Points, Tag("(points)")],
         Discriminator(lambda given: "(flat)" if isinstance(given, str) else "(points)"),
     ] = "flat"
-    """flat, or a profile [[x, y], …] in m, whose ends go on straight; [x, y, e, μ] gives restitution and friction of
-    the line that begins there"""
+    """flat, or a profile [[x, y], …] in m, whose ends go on straight; [x, y, e, μ] gives the line from there its own e
+    and μ"""
     slope: float = number_field(0.0, "°", ge=-STEEPEST, le=STEEPEST)
     """of an endless floor; positive: it falls the way the chain walks"""
     distance_limit: float | None = number_field(None, "m", gt=0, le=HIGHEST)
@@ -121,7 +121,7 @@ class Scene(Section):
     charm_inertia: float = number_field(0.0, "kg m²", ge=0, le=1e12)
     """moment of inertia of the charm about that centre, added likewise"""
     charm_radius: float | None = number_field(None, "m", gt=0, le=1e3)
-    """radius of both circles of charm_link; null: of its own"""
+    """radius of circles of charm_link; null: its own"""
     stiff_joint: int = number_field(0, "1", ge=0, le=MOST_LINKS - 1)
     """joint that is stiff: the one at the end of this link"""
     stiff_joint_factor: float = number_field(1.0, "1", ge=0, le=1e6)
@@ -137,7 +137,7 @@ class Scene(Section):
     coulomb_frictions: _Numbers = number_field(None, "N m")
     """coulomb_friction of each joint; null: the same for all"""
     link_radii: _Numbers = number_field(None, "m")
-    """radius of both circles of each link; null: circle_radius"""
+    """radius of circles of each link; null: circle_radius"""
 
     @model_validator(mode="after")
     def _goes_together(self) -> Self:

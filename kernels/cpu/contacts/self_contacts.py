@@ -30,8 +30,6 @@ from warpchain.kernels.layout import LEFT_X, LEFT_Y, RADIUS, RIGHT_X, RIGHT_Y, X
 from warpchain.kernels.physics.elementary import TWO, ZERO, order_bits
 from warpchain.kernels.types import Chain, Integers, Rows
 
-wp.set_module_options({"enable_backward": False})
-
 # Rows of the CPU's scratch of contacts, one column per pair of joints. First four circles, the left-hand and the
 # right-hand one of joint p, likewise of joint q: its own centre [m], the centre of mass of its link [m] and its radius.
 P_LEFT_HAND, P_RIGHT_HAND, Q_LEFT_HAND, Q_RIGHT_HAND = 0, 5, 10, 15

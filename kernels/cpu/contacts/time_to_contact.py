@@ -19,8 +19,6 @@ from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, OMEGA, RADIUS, RIGH
 from warpchain.kernels.physics.elementary import HALF, ONE, TWO, ZERO, order_bits
 from warpchain.kernels.types import Chain, Control, Integers, Rows, State, with_circles
 
-wp.set_module_options({"enable_backward": False})
-
 FLIGHT_SKIN = wp.constant(wp.float64(4.0))
 """The skin of the neighbour list is so many times as wide in a flight, whose steps may move joints by half of it."""
 

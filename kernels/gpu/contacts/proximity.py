@@ -5,7 +5,8 @@ import functools
 import warp as wp
 
 from warpchain.kernels import layout
-from warpchain.kernels.contacts.fixed_body import BODIES, Touching, link_and_body
+from warpchain.kernels.contacts.fixed_body import BODIES, link_and_body
+from warpchain.kernels.contacts.impulse import Touching
 from warpchain.kernels.contacts.tilting_floor import greatest_across_speed, middle_height, steepness
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.board import ends_of
@@ -15,9 +16,7 @@ from warpchain.kernels.layout import COSINE, INVERSE_INERTIA, INVERSE_MASS, OMEG
 from warpchain.kernels.methods.controller import quick_quotient, quick_root
 from warpchain.kernels.physics.elementary import TWO, from_order_key_single, order_bits_single, order_key_single
 from warpchain.kernels.physics.geometry import Link
-from warpchain.kernels.types import Chain, Control, Drive, Ground, Rows, State, with_circles
-
-wp.set_module_options({"enable_backward": False})
+from warpchain.kernels.types import Chain, Control, Drive, Ground, Rows, with_circles
 
 OPENING_MARGIN = wp.constant(wp.float64(1.0 + 1e-6))
 
@@ -44,6 +43,20 @@ def placed_link(chain: Chain, own: Link) -> Touching:
     link.u = own.u
     link.v = own.v
     link.omega = own.omega
+    return link
+
+
+@wp.func
+def touching_link(K: Rows, chain: Chain, place: Place) -> Touching:
+    """A thread's link, from the board, as a fixed body meets it."""
+    link = placed_link(chain, read_link(K, place.lane))
+    link.cosine = K[COSINE, place.lane]
+    link.sine = K[SINE, place.lane]
+    link.mass = K[layout.MASS, place.column]
+    link.inertia = K[layout.INERTIA, place.column]
+    link.inverse_mass = K[INVERSE_MASS, place.column]
+    link.inverse_inertia = K[INVERSE_INERTIA, place.column]
+    link.lost = K[layout.BOARD_LOST_FIXED, place.lane]
     return link
 
 
@@ -130,13 +143,8 @@ def block_contact(fixed_body: str):
     @wp.func
     def meet_body(K: Rows, place: Place, ground: Ground, drive: Drive, world: int, time: wp.float64):
         chain = with_circles(constants(K), K[RADIUS, place.lane])
-        link = placed_link(chain, read_link(K, place.lane))
-        link.cosine = K[COSINE, place.lane]
-        link.sine = K[SINE, place.lane]
-        link.inverse_mass = K[INVERSE_MASS, place.column]
-        link.inverse_inertia = K[INVERSE_INERTIA, place.column]
-        link.lost = K[layout.BOARD_LOST_FIXED, place.lane]
-        link = meet(chain, ground, face_at(face_of(ground), drive, world, time), link)
+        face = face_at(face_of(ground), drive, world, time)
+        link = meet(chain, ground, face, touching_link(K, chain, place))
         K[U, place.lane] = link.u
         K[V, place.lane] = link.v
         K[OMEGA, place.lane] = link.omega
@@ -144,18 +152,3 @@ def block_contact(fixed_body: str):
         return int(link.hits)
 
     return meet_body
-
-
-@functools.cache
-def moving_sprocket_contact():
-    """Warp function: as that of `block_contact` for the moving sprocket; it counts the impulses itself."""
-    meet_sprocket = block_contact("moving sprocket")
-
-    @wp.func
-    def meet_and_count(K: Rows, place: Place, ground: Ground, drive: Drive, state: State, world: int, time: wp.float64):
-        hits = meet_sprocket(K, place, ground, drive, world, time)
-        if hits > 0:
-            wp.atomic_add(state.counts, world, wp.static(layout.SPROCKET_IMPULSES), wp.int64(hits))
-        return hits
-
-    return meet_and_count
