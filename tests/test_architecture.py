@@ -217,6 +217,15 @@ def test_importing_starts_and_loads_nothing() -> None:
     assert (done.stdout, done.stderr) == ("[]\n[]\nNone\n", "")
 
 
+def test_tests_of_a_gpu_start_no_cpu() -> None:
+    """They can be collected on a machine that has nothing but a GPU."""
+    program = (
+        "from warpchain.engine import devices\ndevices.start_device = None\nimport tests.kernels.gpu.test_on_gpu\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, encoding="utf-8", cwd=ROOT)
+    assert done.returncode == 0, done.stderr
+
+
 def test_texts_do_not_point_outside() -> None:
     """No file names a folder of the machine it was written on."""
     outside = ["/".join(("", "work", "")), "/".join(("shared", "")), "/".join(("", "tmp", "plan"))]

@@ -16,6 +16,7 @@ import pytest
 
 from tests.support import command_line
 from tests.support.command_line import Answer, Command, process
+from tests.support.made_walks import make_walk
 from warpchain import load_walk
 from warpchain.cli.main import main
 from warpchain.inputs.parameters import preset
@@ -30,9 +31,9 @@ WALK_MODULE = import_module("warpchain.walks.one_walk")
 
 @pytest.fixture(scope="module")
 def quick_walk(tmp_path_factory: pytest.TempPathFactory) -> tuple[Answer, Path]:
-    """The answer to a quick walk with --json, -o and --animate, and the folder it wrote."""
+    """The answer to a quick walk with --json and -o, and the folder it wrote."""
     folder = tmp_path_factory.mktemp("walk")
-    return process("walk", *QUICK, "--json", "-o", "new/deep", "--animate", "gif", folder=folder), folder
+    return process("walk", *QUICK, "--json", "-o", "new/deep", folder=folder), folder
 
 
 def test_help_is_quick_and_complete(tmp_path: Path) -> None:
@@ -50,7 +51,7 @@ def test_help_is_quick_and_complete(tmp_path: Path) -> None:
         for times, first, last in ((computed, before, between), (libraries, between, after)):
             times.append(last.children_user + last.children_system - first.children_user - first.children_system)
     assert answer.status == 0 and answer.err == ""
-    options = "links frequency preset method tol device start set seed json output animate config frame-interval"
+    options = "links frequency preset method tol device start set seed json output config frame-interval"
     for option in options.split():
         assert f"--{option} " in answer.out
     assert min(computed) < 2.5 * min(libraries)
@@ -71,13 +72,13 @@ def test_a_walk_loads_only_what_it_needs() -> None:
     assert done.stdout.splitlines()[-1] == "loaded []", done.stderr
 
 
-def test_mp4_without_its_extra_is_found_before_the_walk(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without imageio-ffmpeg an MP4 is refused at once, with the command that installs it."""
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    monkeypatch.setattr(WALK_MODULE, "run_walk", None)
-    answer = command("walk", "-o", "new", "--animate", "mp4")
+def test_mp4_without_its_extra_is_refused(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without imageio-ffmpeg an MP4 is refused with the command that installs it, and nothing is written."""
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    make_walk().save("walk.h5")
+    answer = command("animate", "walk.h5", "-o", "walk.mp4")
     assert answer.status == 2 and "pip install 'warpchain[video]'" in answer.err
-    assert not Path("new").exists()
+    assert [path.name for path in Path().iterdir()] == ["walk.h5"]
 
 
 def test_json_is_one_object_with_everything(quick_walk: tuple[Answer, Path]) -> None:
@@ -99,13 +100,12 @@ def test_json_is_one_object_with_everything(quick_walk: tuple[Answer, Path]) -> 
 
 
 def test_output_holds_record_and_pictures(quick_walk: tuple[Answer, Path]) -> None:
-    """The folder holds exactly the record, the film strip and the film, and the record is that walk."""
+    """The folder holds exactly the record and the film strip, and the record is that walk."""
     answer, folder = quick_walk
     assert [path.name for path in folder.iterdir()] == ["new"]
     files = {path.name: path.read_bytes() for path in (folder / "new/deep").iterdir()}
-    assert set(files) == {"walk.h5", "film_strip.png", "walk.gif"}
+    assert set(files) == {"walk.h5", "film_strip.png"}
     assert files["film_strip.png"].startswith(b"\x89PNG")
-    assert files["walk.gif"].startswith(b"GIF89a")
     walk = load_walk(folder / "new/deep/walk.h5")
     assert walk.to_dict() == json.loads(answer.out)
     np.testing.assert_allclose(np.diff(walk.frame_time[:-1]), 2e-3, atol=5e-5)

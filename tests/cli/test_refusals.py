@@ -31,9 +31,8 @@ REFUSED = {
     "walk --set mu_fc=0.3 --set floor_friction=0.3": "parameters.floor_friction: given twice on the command line;",
     "walk -o new --device cuda:98": "options.device: there is no cuda:98 on this machine",
     "walk --config nowhere.yaml": "nowhere.yaml: No such file",
-    "walk --animate gif": "--animate: there is no folder to write to; add -o DIR",
-    "walk -o new --animate avi": "Invalid value for '--animate'",
-    "walk --frobnicate": "No such option: --frobnicate (Possible options: --animate); see warpchain walk --help",
+    "walk -o new --frame-interval 0": "frame_interval: Input should be greater than or equal to 0.000001, in s",
+    "walk --frobnicate": "No such option: --frobnicate; see warpchain walk --help",
     "walk extra": "Got unexpected extra argument(s) (extra); see warpchain walk --help",
     "walk -o walk.h5": "walk.h5: cannot be written (Not a directory); give a folder that is there",
     f"walk -o {'x' * 300}": "xxx",
@@ -110,7 +109,7 @@ def test_names_of_files_are_printed_without_control_characters(command: Command,
 
 
 def test_a_folder_cannot_hide_its_name(command: Command, tmp_path: Path) -> None:
-    """The name in a folder's sweep.json may have been changed; the table of the sweep writes escapes."""
+    """The name in a folder may have been changed; the table of the sweep writes escapes."""
     result = make_sweep(tmp_path / "s", content())
     result.sweep["name"] = ESCAPE
     with contextlib.redirect_stdout(io.StringIO()) as out:

@@ -59,9 +59,9 @@ def test_an_estimate_says_time_and_size(tmp_path: Path, capsys: pytest.CaptureFi
     assert set(tmp_path.iterdir()) == before
     found = estimate_sweep(recorded, workers=1)
     sweep_run.sweep(recorded, tmp_path / "all", workers=1)
-    with h5py.File(tmp_path / "all/shards/0-000000-motion.h5") as file:
+    with h5py.File(tmp_path / "all/shards/000000.h5") as file:
         arrays: list[int] = []
-        file["0"].visititems(lambda name, item: arrays.append(getattr(item, "nbytes", 0)))
+        file["motion/0"].visititems(lambda name, item: arrays.append(getattr(item, "nbytes", 0)))
     rows = load(tmp_path / "all").walk_count * row_type(load_sweep(recorded).blocks[0].drawn).itemsize
     assert found.bytes == pytest.approx(rows + 4 * sum(arrays), rel=0.05)
 
@@ -74,7 +74,7 @@ def test_info_tells_rate_and_time_left_of_a_running_sweep(tmp_path: Path, capsys
             write(opened, shard, synthetic_rows(SWEEP, shard))
         now = time.time()
         os.utime(tmp_path / "lock", (now - 10, now - 10))
-        os.utime(opened.directory / "shards/0-000000.h5", (now - 60, now - 60))  # of an earlier run
+        os.utime(opened.directory / "shards/000000.h5", (now - 60, now - 60))  # of an earlier run
         run("info", str(tmp_path))
         assert "running: 4.0" in (text := capsys.readouterr().out) or "running: 3.9" in text
         assert "walks a second, 25 s left" in text or "26 s left" in text

@@ -96,6 +96,22 @@ def test_an_answer_outside_of_the_bank_is_refused(friction: float, higher: float
         made_bank(160, seed=1).posterior([film])
 
 
+@pytest.mark.parametrize("wrong", ["speed", "origin", "floor", [0, 2, 1, 3], [1, 0, 2, 3], [0, 1, 3, 2]])
+def test_a_film_that_contradicts_itself_is_refused(wrong: Any) -> None:
+    """A speed that is not the loop's, another origin or floor, edges of the outline in another order."""
+    bank = made_bank(160, seed=1)
+    (film,) = films_of(bank, 3, 1, CAMERA, 0)
+    assert film.outline is not None and film.speed is not None
+    changes: dict[str, Any] = {
+        "speed": {"speed": 0.9 * film.speed},
+        "origin": {"center": np.add(film.center, [0.3, 0]), "outline": np.add(film.outline, [0.3, 0.3, 0, 0])},
+        "floor": {"center": np.add(film.center, [0, 0.05])},
+    }
+    given = changes[wrong] if isinstance(wrong, str) else {"outline": film.outline[wrong]}
+    with pytest.raises(InputError, match=r"^films: unlike the bank; check direction, origin, outline, speed"):
+        bank.posterior([dataclasses.replace(film, **given)])
+
+
 def test_films_that_are_not_the_bank_s_are_refused() -> None:
     """Another experiment, more films than repetitions, none, and a bank too small to hold chains out."""
     bank = made_bank(160, seed=1)

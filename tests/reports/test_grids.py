@@ -180,13 +180,13 @@ def test_any_column_of_numbers(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert [Path(path).name for path in capsys.readouterr().out.split()] == ["walk_time_against_gravity.png"]
 
 
-def test_a_figure_or_axes_may_be_given(tmp_path: Path) -> None:
-    """A figure is drawn into given axes with labels and legend of their own, or into a given figure."""
+def test_a_figure_may_be_given(tmp_path: Path) -> None:
+    """It is drawn into, also if it is a part of another."""
     result = make_sweep(tmp_path, sweep({"gravity": GRAVITY, "floor_friction": FRICTION}))
-    figure, other = Figure(), Figure()
-    left, right = figure.subplots(1, 2)
-    assert result.plot(ax=right) is figure and result.plot(figure=other) is other and other.axes
-    assert not left.lines and len(right.lines) == 3 and right.get_legend() is not None and right.get_xlabel()
+    left, right = Figure(layout="constrained").subfigures(1, 2)
+    assert result.plot(figure=right) is right and not left.axes
+    (axes,) = panels(right).values()
+    assert len(lines(axes)) == 3 and legend_texts(right)[0] == "$g$ / m/s²"
 
 
 def test_what_a_walk_does_not_have_is_in_no_mean(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

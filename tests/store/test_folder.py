@@ -1,9 +1,7 @@
 """Folders of sweeps: killed at any moment, gone on with, locked, refused, and full disks."""
 
-import hashlib
 import json
 import os
-import re
 import shutil
 import signal
 import subprocess
@@ -22,13 +20,15 @@ from tests.support.stopped_calls import is_stopped
 from tests.support.synthetic_sweep import LONG_SWEEP, SHARD_SIZE, SWEEP, content, run, synthetic_rows, write
 from warpchain.inputs.validation import InputError, InputWarning
 from warpchain.store import folder
-from warpchain.store.folder import SweepFolder, read_rows
-from warpchain.store.manifest import Manifest, read_manifest
+from warpchain.store.folder import SweepFolder
+from warpchain.store.manifest import Manifest
 from warpchain.store.shards import write_shard
+from warpchain.store.sweep_result import load
+from warpchain.sweeps.plan import Sweep
 from warpchain.version import NUMERICS_VERSION
 
-FIRST, SECOND = "0-000000.h5", "0-000001.h5"
-SHARDS = Manifest.of(SWEEP, SHARD_SIZE).shards
+FIRST, SECOND = "000000.h5", "000001.h5"
+SHARDS = Manifest.of(SWEEP, SHARD_SIZE).wanted
 CHANGED = replace(SWEEP, seed=7, name="changed")
 
 
@@ -92,7 +92,7 @@ def test_every_step_of_opening_may_be_the_last(tmp_path: Path, fresh: bool, monk
             run(folder)
         if not is_stopped(lambda: open_folder(folder, sweep, fresh=fresh).close(), stops, monkeypatch):  # noqa: B023
             break
-        run(folder, sweep, fresh=fresh and "changed" not in (folder / "sweep.json").read_text())
+        run(folder, sweep, fresh=fresh and b"changed" not in (folder / "sweep.h5").read_bytes())
         assert content(folder) == expected, stops
         stops += 1
     assert stops >= 4
@@ -101,7 +101,7 @@ def test_every_step_of_opening_may_be_the_last(tmp_path: Path, fresh: bool, monk
 def test_unfinished_files_go(tmp_path: Path) -> None:
     """What a killed process had half written is cleared away; hidden files of others are not."""
     run(tmp_path)
-    parts = [".sweep.0123abcd.part.json", "shards/.0-000000.0123abcd.part.h5"]
+    parts = [".sweep.0123abcd.part.h5", "shards/.000000.0123abcd.part.h5"]
     for name in (*parts, ".nfs0123", "shards/.keep"):
         (tmp_path / name).write_bytes(b"half")
     open_folder(tmp_path).close()
@@ -137,7 +137,7 @@ def test_workers_may_write_the_same_shard(tmp_path: Path) -> None:
         shards = opened.missing()[:2] * 20
         list(threads.map(lambda shard: write(opened, shard, synthetic_rows(SWEEP, shard)), shards))
     assert content(tmp_path / "race") == content(tmp_path / "threads")
-    assert len(read_rows(tmp_path / "race", read_manifest(tmp_path / "race"))[1]) == 40
+    assert load(tmp_path / "race").missing_count == 120
 
 
 # Refusals
@@ -163,11 +163,11 @@ def test_other_numerics_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(folder, "NUMERICS_VERSION", 99)
     with refused(InputError, tmp_path, f"numerics {NUMERICS_VERSION}, but this warpchain has 99", "start anew"):
         open_folder(tmp_path)
-    assert len(read_rows(tmp_path, read_manifest(tmp_path))[1]) == 160
+    assert load(tmp_path).missing_count == 0
 
 
 @pytest.mark.parametrize("fresh", [False, True])
-@pytest.mark.parametrize("name", ["sweep.yaml", "shards", "log.txt", "sweep.json", "lock"])
+@pytest.mark.parametrize("name", ["sweep.yaml", "shards", "log.txt", "sweep.h5", "lock"])
 def test_files_of_others_are_not_touched(tmp_path: Path, name: str, fresh: bool) -> None:
     """A folder that has such a name for something else is refused, even to start anew."""
     (tmp_path / name).write_text("mine: true")
@@ -194,15 +194,26 @@ def test_a_shard_of_another_sweep_is_refused(tmp_path: Path) -> None:
         open_folder(tmp_path / "one").close()
 
 
-def test_a_sweep_that_is_refused_now_is_named(tmp_path: Path) -> None:
+def test_a_sweep_that_is_refused_now_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A method that was removed since: one line with the file and what to do."""
     run(tmp_path)
-    path = tmp_path / "sweep.json"
-    text, _ = path.read_text().split(',\n "sha256"')
-    text = re.sub(r'"method": "\w+"', '"method": "rodas5p"', text)
-    path.write_text(f'{text},\n "sha256": "{hashlib.sha256(text.encode()).hexdigest()}"\n}}\n')
+    path, content = tmp_path / "sweep.h5", SWEEP.canonical()
+    content["blocks"][0]["options"]["method"] = "rodas5p"
+    with monkeypatch.context() as patched:
+        patched.setattr(Sweep, "canonical", lambda sweep: content)
+        path.write_bytes(Manifest.of(SWEEP, SHARD_SIZE).image())
     with refused(InputError, tmp_path, f"{path}: sweep.blocks[0].options.method: 'rodas5p' was removed", "version"):
-        read_manifest(tmp_path)
+        load(tmp_path)
+
+
+def test_a_folder_of_an_earlier_version_is_refused(tmp_path: Path) -> None:
+    """Its sweep.json is named as what it is; nothing begins there."""
+    (tmp_path / "shards").mkdir()
+    (tmp_path / "sweep.json").write_text("{}")
+    with refused(InputError, tmp_path, "a sweep of an earlier warpchain, which reads it"):
+        load(tmp_path)
+    with refused(InputError, tmp_path, "give another folder"):
+        open_folder(tmp_path)
 
 
 def test_workers_need_the_folder(tmp_path: Path) -> None:
@@ -225,5 +236,5 @@ def test_a_full_disk(tmp_path: Path) -> None:
     """A disk that fills up in the middle: a clear line, nothing lost, and the sweep goes on once there is room."""
     done = play("full_disk", tmp_path / "full", namespace=True)
     writing, opening = done["messages"]
-    assert "0-000001.h5: cannot be written (No space left on device); make room" in writing
+    assert ".h5: cannot be written (No space left on device); make room" in writing
     assert "make room" in opening and done["missing"] == 0

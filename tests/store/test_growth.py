@@ -1,5 +1,6 @@
 """Folders of sweeps that are given more samples: shards stay, walks are those of the larger sweep, kills do no harm."""
 
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -11,15 +12,15 @@ from tests.support.made_sweeps import make_sweep
 from tests.support.stopped_calls import is_stopped
 from tests.support.sweep_content import UNIFORM, blocks, content
 from tests.support.synthetic_sweep import content as files
+from tests.support.synthetic_sweep import run
 from warpchain.inputs.validation import InputError
 from warpchain.store import sweep_result
 from warpchain.store.folder import SweepFolder
-from warpchain.store.manifest import Manifest, Shard, read_manifest
+from warpchain.store.manifest import Manifest, read_manifest
 from warpchain.store.merged_file import merge
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.designs import EXTENSIBLE, SAMPLERS
 from warpchain.sweeps.plan import PlannedWalk, load_sweep
-from warpchain.walks.rows import Rows
 
 
 def two_blocks(first: int, second: int, **changes: Any) -> dict[str, Any]:
@@ -60,6 +61,19 @@ def test_a_grown_sweep_is_the_larger_one(tmp_path: Path, sampler: str) -> None:
     for name in ("grown", "fresh"):
         merge(tmp_path / name, tmp_path / f"{name}.h5")
     assert (tmp_path / "grown.h5").read_bytes() == (tmp_path / "fresh.h5").read_bytes()
+
+
+def test_parts_that_grow_stay_parts_of_the_whole(tmp_path: Path) -> None:
+    """Each part keeps its walks when all are given more samples: no walk is in two, and together they are the whole."""
+    parts = [tmp_path / f"part-{number}" for number in (1, 2, 3)]
+    small, large = (load_sweep(two_blocks(*samples)) for samples in ((4, 2), (7, 2)))
+    for number, folder in enumerate(parts, 1):
+        for sweep in (small, large):
+            run(folder, sweep, part=(number, 3), shard_size=3)
+    merge(parts, tmp_path / "all.h5")
+    run(tmp_path / "whole", large)
+    whole = load(tmp_path / "whole")
+    assert whole.missing_count == 0 and columns(load(tmp_path / "all.h5")) == columns(whole)
 
 
 def test_every_step_of_growing_may_be_the_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -115,12 +129,23 @@ def test_samples_that_do_not_grow_are_refused(tmp_path: Path) -> None:
     assert files(tmp_path) == before
 
 
+def test_a_shard_of_the_larger_sweep_is_foreign_to_the_smaller(tmp_path: Path) -> None:
+    """It holds walks that the smaller one does not have: its name is told, nothing is read from it."""
+    run(tmp_path / "small", load_sweep(content(samples=2)))
+    for samples in (2, 5):
+        run(tmp_path / "large", load_sweep(content(samples=samples)))
+    (name,) = set(data_of(tmp_path / "large")) - set(data_of(tmp_path / "small"))
+    shutil.copy(tmp_path / "large/shards" / name, tmp_path / "small/shards" / name)
+    with pytest.raises(InputError, match=f"{name}: a shard of another sweep; move it out of this folder"):
+        load(tmp_path / "small")
+
+
 def test_a_reader_meets_a_sweep_that_begins_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where a folder is begun anew between its list of walks and its shards, the reader gives the new sweep."""
     make_sweep(tmp_path, content(samples=2), drawn_distance)
     read = sweep_result.read_rows
 
-    def late(directory: Path, manifest: Manifest) -> tuple[list[Shard], Rows]:
+    def late(directory: Path, manifest: Manifest) -> Any:
         monkeypatch.undo()
         other = load_sweep(content(samples=2, seed=8))
         SweepFolder.open(tmp_path, other, fresh=True, shard_size=8).close()

@@ -46,7 +46,7 @@ def single(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A sweep of one block with axes of all types, walks 20 … 39 missing."""
     directory = tmp_path_factory.mktemp("one")
     run(directory, SINGLE)
-    (directory / "shards/0-000001.h5").unlink()
+    (directory / "shards/000035.h5").unlink()
     return directory
 
 
@@ -54,7 +54,7 @@ def test_arrays_have_named_axes(folder: Path) -> None:
     """Every walk is where block, cell and sample say, every column under its name and to the bit."""
     result = load(folder)
     assert result.name == "synthetic" and result.seed == SWEEP.seed and list(result.blocks) == ["rest", "ellipse"]
-    rows = np.concatenate([synthetic_rows(SWEEP, shard) for shard in Manifest.of(SWEEP, SHARD_SIZE).shards])
+    rows = np.concatenate([synthetic_rows(SWEEP, shard) for shard in Manifest.of(SWEEP, SHARD_SIZE).wanted])
     rest, ellipse = result.blocks["rest"], result.blocks["ellipse"]
     assert rest.dims == ("links", "frequency", "sample") and rest.shape == rest.dx.shape == (3, 2, 20)
     assert ellipse.dims == ("gravity", "sample") and ellipse.shape == (5, 8)
@@ -131,10 +131,10 @@ def test_no_sweep_no_result(tmp_path: Path, single: Path) -> None:
     for nothing, problem in ((tmp_path, "no sweep in this folder"), (tmp_path / "none", "is not there")):
         with pytest.raises(InputError, match=f"{nothing}: {problem}"):
             load(nothing)
-    with pytest.raises(InputError, match=r"sweep\.json: not an HDF5 file; give a folder of a sweep"):
-        load(single / "sweep.json")
+    with pytest.raises(InputError, match=r"sweep\.yaml: not an HDF5 file; give a folder of a sweep"):
+        load(single / "sweep.yaml")
     run(tmp_path)
-    path = tmp_path / "shards/0-000001.h5"
+    path = tmp_path / "shards/000001.h5"
     path.write_bytes(path.read_bytes()[:-1])
     with pytest.raises(InputError, match=f"{path}: damaged, cut short or of an earlier warpchain; delete it"):
         load(tmp_path)

@@ -9,9 +9,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
 from tests.support.folded_chains import folded_chain
+from tests.support.unlike_links import UnlikeLinks
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import preset
+from warpchain.inputs.parameters import Parameters, preset
 from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.cpu import loop as cpu_loop
 from warpchain.kernels.features import Features
@@ -24,6 +25,11 @@ SOFT = preset("soft")
 FIXED_STEP = 2e-6  # s
 HILLS = np.array([[-1.0, -0.002], [-0.02, 0.003], [0.0, -0.001], [0.015, 0.002], [0.03, -0.01], [1.0, -0.01]])
 """Points of a floor with corners of both kinds, which heaps cut."""
+
+
+def common_laws(points: Array, parameters: Parameters | UnlikeLinks) -> Array:
+    """Coefficients of all faces of a profile: those of the parameters."""
+    return np.tile([parameters.floor_restitution, parameters.floor_friction], (len(points) - 1, 1))
 
 
 @contextmanager

@@ -12,6 +12,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from tests.support.blocks_under_test import common_laws
 from tests.support.unlike_links import UnlikeLinks
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import start_device
@@ -35,11 +36,6 @@ DEVICE = start_device("cpu").warp
 POISONED_JOINT = 2**30
 LEVEL = np.array([[-1.0, 0.0], [0.0, 0.0], [1.0, 0.0]])
 """Points of a level profile."""
-
-
-def common_laws(points: Array, parameters: Parameters | UnlikeLinks) -> Array:
-    """Coefficients of all faces of a profile: those of the parameters."""
-    return np.tile([parameters.floor_restitution, parameters.floor_friction], (len(points) - 1, 1))
 
 
 compiled = functools.partial(

@@ -153,9 +153,8 @@ def plot(
         else (picture.save(folder) for picture in figures(found, quantity or "dx"))
     )
     count = 0
-    for drawing in drawn:
+    for count, drawing in enumerate(drawn, 1):  # noqa: B007
         print(printable(str(drawing)))
-        count += 1
     if not count and is_walk:
         raise typer.Exit(FAILED)
     if not count:

@@ -18,6 +18,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from warpchain.files import checked_output, replacing, write_whole
 from warpchain.pictures.chain import (
@@ -28,7 +29,6 @@ from warpchain.pictures.chain import (
     floor_height,
     floor_line,
     sprocket_circle,
-    view_from,
     walk_box,
 )
 from warpchain.pictures.style import BLUE, FAINT, GROUND, INK, tidy
@@ -46,8 +46,8 @@ DPI: Final = 100
 INNER, OUTER, EDGE = "#9CCBE6", BLUE, "#00385A"
 """Colours of inner links, of outer links and of their edges."""
 
-_CORNER: Final = view_from(*np.radians((35.0, 22.0)))
-"""The view from the front right, slightly above."""
+_CORNER: Final = (-35.0, 22.0)
+"""View from the front right, slightly above: angles about the vertical, then about what points to the right."""
 _PADDING: Final = np.array([[50, 50], [50, 30]])
 """Pixels to the left and below, and to the right and above."""
 
@@ -216,9 +216,10 @@ class Film:
         """
         self._walk, self._joints, self._center = walk, checked_joints(walk), center_in_room(walk)
         self._radii = circle_radii(walk)
-        self._view = SIDE if walk.joints_in_room is None else _CORNER
+        self._tilts = walk.joints_in_room is not None
+        self._view = Rotation.from_euler("yx", _CORNER, degrees=True).as_matrix() if self._tilts else SIDE
         low, high = walk_box(walk, self._joints)
-        if self._view is SIDE:
+        if not self._tilts:
             box = side_box(walk, self._joints)
         else:  # the floor at least as broad as the chain is high
             broad = max(0.0, high[1] - (high[2] - low[2])) / 2
@@ -233,7 +234,7 @@ class Film:
         self._canvas: Any = FigureCanvasAgg(self.figure)
         share = _PADDING / size
         self._axes = self.figure.add_axes((*share[0], *(1 - share.sum(axis=0))), xlim=box[0], ylim=box[1])
-        if self._view is SIDE:
+        if not self._tilts:
             draw_ground(self._axes, floor_line(walk, *box[0]), box[1, 0])
             self._axes.set(xlabel="$x$ / m", yticks=[], xticks=floor_marks(*box[0]))
             tidy(self._axes)
@@ -264,7 +265,7 @@ class Film:
             *axes.plot(*path[:, -1:], "o", color=INK, markersize=5, zorder=4),
             self.figure.text(0.985, 0.975, f"{moment:.3f} s", **clock),
         ]
-        if self._view is not SIDE:
+        if self._tilts:
             shadow = self._project(np.concatenate([joints, joints[:1]]) * (1.0, 0.0, 1.0))
             self._moving += axes.plot(*shadow, color="#BDBDBD", linewidth=3.0, zorder=1.5)
 

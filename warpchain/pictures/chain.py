@@ -26,18 +26,6 @@ ABOVE: Final = np.eye(3)[[0, 2, 1]]
 """Its upper axis is z, which such a viewer sees grow downwards: invert it."""
 
 
-def view_from(azimuth: float, elevation: float) -> Array:
-    """A view with the vertical upright in the picture.
-
-    Args:
-        azimuth: angle [rad] of the viewer about the vertical: 0 beside the chain, a right angle in front of it.
-        elevation: angle [rad] of the viewer above the floor.
-    """
-    sine, cosine, high, far = np.sin(azimuth), np.cos(azimuth), np.sin(elevation), np.cos(elevation)
-    right, toward = np.array([cosine, 0.0, -sine]), np.array([sine * far, high, cosine * far])
-    return np.stack([right, np.cross(toward, right), toward])
-
-
 def circle_radii(walk: "WalkResult") -> Array:
     """Radius of the circles of each link [m], shape (n,)."""
     return link_values(walk.setup.scene, walk.setup.parameters).radius

@@ -1,6 +1,7 @@
 """The motion of any given chain: what tests and analysts use."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
@@ -18,7 +19,6 @@ from warpchain.inputs.sections import takes_fields
 from warpchain.inputs.state import State, checked_array
 from warpchain.inputs.validation import InputError, checked, plain, shown, validated
 from warpchain.status import Status
-from warpchain.walks.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
@@ -28,6 +28,39 @@ MOST_PLACES = 10_000_000
 """Most links × instants of a trajectory, which take 0.5 GB."""
 _UNSOFTENED = {"soften_pile": False, "soften_drive": False}
 """A given chain has no phases in which joints soften."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Trajectory:
+    """Motion of a chain of n links at t chosen instants, as `warpchain.simulate` returns it.
+
+    Attributes:
+        status: how the simulation ended.
+        time: instants [s], shape (t,).
+        position: x, y [m] and θ [rad] of each link's centre of mass, shape (t, n, 3).
+        velocity: their rates [m/s, m/s, rad/s], shape (t, n, 3).
+        steps_accepted: number of accepted steps.
+        steps_rejected: number of rejected steps.
+        impulses: number of impulses by kind of contact.
+        losses: energy lost by cause [J], positive.
+        greatest_opening: greatest distance between two joined link ends [m].
+        greatest_penetration: greatest overlap by kind of contact [m].
+    """
+
+    status: Status
+    time: Array
+    position: Array
+    velocity: Array
+    steps_accepted: int
+    steps_rejected: int
+    impulses: dict[str, int]
+    losses: dict[str, float]
+    greatest_opening: float
+    greatest_penetration: dict[str, float]
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"<Trajectory of {self.position.shape[1]} links, {len(self.time)} instants: {self.status.label}>"
 
 
 @takes_fields("options", without=("soften_pile", "soften_drive"))

@@ -1,10 +1,8 @@
 """One block of a sweep as arrays with named axes."""
 
-import itertools
 import math
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -39,11 +37,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[Any]
 
-_Variables = dict[str, tuple[tuple[str, ...], Array, dict[str, Any]]]
-"""Name → axes, values and attributes, as xarray takes them."""
-Motion = tuple[Callable[[], "AbstractContextManager[h5py.File]"], str]
-"""What opens the file with a kept motion, and the group in there."""
-
 
 @dataclass(frozen=True, eq=False)
 class Origin:
@@ -77,7 +70,7 @@ class BlockResult:
         drawn: names of the quantities that samples draw; the values are in the columns NAME_drawn.
         columns: name → values.
         origin: what it was computed from.
-        motions: place of a walk in a flat column → where its kept motion is, file by file.
+        motions: of each walk what opens the file with its kept motion, and the group in there; None if there is none.
     """
 
     name: str
@@ -86,7 +79,7 @@ class BlockResult:
     drawn: tuple[str, ...]
     columns: dict[str, Array]
     origin: Origin
-    motions: Mapping[int, Motion]
+    motions: Array
 
     @property
     def dims(self) -> tuple[str, ...]:
@@ -139,21 +132,24 @@ class BlockResult:
 
     def filled_from(self, other: "BlockResult") -> "BlockResult":
         """The same block with the walks that only another result of it has."""
-        columns = {name: np.where(self.is_there, values, other.columns[name]) for name, values in self.columns.items()}
-        return replace(self, columns=columns, motions={**other.motions, **self.motions})
+        there = self.is_there
+        columns = {name: np.where(there, values, other.columns[name]) for name, values in self.columns.items()}
+        return replace(self, columns=columns, motions=np.where(there, self.motions, other.motions))
 
-    @cached_property
+    @property
     def kept(self) -> NDArray[np.bool_]:
         """Whether the motion of a walk was kept and is there, shape `shape`."""
-        return np.isin(np.arange(self.columns["index"].size), list(self.motions)).reshape(self.shape)
+        return np.asarray(self.motions != None)  # noqa: E711 - of each element
 
     def kept_motions(self, places: Iterable[int]) -> "Iterator[tuple[int, h5py.Group]]":
-        """Places in a flat column, of those given, and groups of kept motions, file by file; errors as of `series`."""
-        wanted = set(places)
-        here = ((*self.motions[place], place) for place in self.motions if place in wanted)
-        for opened, walks in itertools.groupby(here, lambda walk: walk[0]):
+        """Places in a flat column and groups of kept motions, file by file; errors as of `series`."""
+        files: dict[Any, list[tuple[int, str]]] = {}
+        for place in places:
+            opened, group = self.motions.flat[place]
+            files.setdefault(opened, []).append((place, group))
+        for opened, walks in files.items():
             with opened() as file:
-                yield from ((place, file[group]) for _, group, place in walks)
+                yield from ((place, file[group]) for place, group in walks)
 
     def series(self, *, sample: int = 0, **at: float | str | None) -> WalkResult:
         """One walk whose motion was kept: `series(links=60, frequency=15, sample=2).time`.
@@ -306,10 +302,18 @@ class BlockResult:
         return array.transpose(*self.dims, "quantity")
 
     def to_xarray(self) -> "xarray.Dataset":
-        """The block as a data set with named coordinates, units and meanings."""
+        """The block as a data set with named coordinates, units and meanings; null among numbers is NaN."""
         import xarray
 
-        coordinates, variables = self.variables()
+        points = self.origin.sweeps[0].blocks[self.number].points
+        along = {name: (name, values) for name, values in self.axes.items()}
+        along |= {"sample": ("sample", np.arange(self.shape[-1]))}
+        along |= {name: (POINT, np.array(values)) for name, values in points.items()}
+        coordinates = {
+            name: (dim, values.astype(float) if values.dtype.kind == "O" else values, self.notes(name))
+            for name, (dim, values) in along.items()
+        }
+        variables = {name: (self.dims, values, self.notes(name)) for name, values in self.columns.items()}
         return xarray.Dataset(variables, coordinates, {"block": self.name})
 
     def to_pandas(self) -> "pandas.DataFrame":
@@ -317,18 +321,6 @@ class BlockResult:
         table = self.to_xarray().to_dataframe().reset_index()
         labels = {MISSING: "missing"} | {int(status): status.label for status in Status}
         return table.assign(status=table["status"].map(labels))
-
-    def variables(self) -> tuple[_Variables, _Variables]:
-        """Coordinates and variables; null among numbers is NaN."""
-        points = self.origin.sweeps[0].blocks[self.number].points
-        along = {name: (name, values) for name, values in self.axes.items()}
-        along |= {"sample": ("sample", np.arange(self.shape[-1]))}
-        along |= {name: (POINT, np.array(values)) for name, values in points.items()}
-        coordinates: _Variables = {
-            name: ((dim,), values.astype(float) if values.dtype.kind == "O" else values, self.notes(name))
-            for name, (dim, values) in along.items()
-        }
-        return coordinates, {name: (self.dims, values, self.notes(name)) for name, values in self.columns.items()}
 
     def notes(self, name: str) -> dict[str, Any]:
         """Attributes of a variable."""

@@ -10,7 +10,7 @@ from warpchain.engine.snapshot import restore, take_snapshot
 from warpchain.inputs.scene import face_count
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.state import State
-from warpchain.inputs.validation import InputError, plain, shown
+from warpchain.inputs.validation import InputError, checked
 from warpchain.status import Status
 from warpchain.walks.moving_plane import state_of_plane
 from warpchain.walks.walk_phases import WalkRun
@@ -33,9 +33,7 @@ def state_at(setup: Setup, t: object, end: float) -> State:
     Raises:
         InputError: there is no such time, or the walk, run again, ends before.
     """
-    time = plain(t, "t")
-    if isinstance(time, bool) or not isinstance(time, int | float):
-        raise InputError(f"t: {shown(time)} is not a time; give a number of seconds")
+    time: float = checked(t, "t", float, "s")
     first = setup.scene.release[-1][0] if setup.scene.release is not None else 0.0  # then the sprocket vanishes
     if setup.start is not None:
         first = setup.start.time
@@ -48,31 +46,21 @@ def state_at(setup: Setup, t: object, end: float) -> State:
     with gpu_turn([setup.options.device]):
         batch = Batch(1, setup.scene.links, setup.options, faces=face_count(setup.scene))
         run = WalkRun(batch, 0, setup)
-        phases = run.phases()
-        features, attempts = next(phases), batch.attempts_of_launch
-        while not _has_come(run, batch, time):
-            before = take_snapshot(batch, 0) if run.is_free else None
-            batch.launch([0], features, attempts)
-            if before is not None and batch.time(0) >= time and attempts > 1:
-                restore(batch, 0, before)
-                attempts = max(1, attempts // FINER)
-            elif batch.status(0) != Status.RUNNING and not _has_come(run, batch, time):
-                following = next(phases, None)
-                if following is None:
-                    raise InputError(
-                        f"t: run again, the walk ends as {run.status.label} at {batch.time(0):.6g} s; give less"
-                    )
-                features = following
-        return State(
-            position=batch.position(0),
-            velocity=batch.velocity(0),
-            setup=replace(setup, start=None),
-            time=batch.time(0),
-            memory=run.memory(),
-            **(state_of_plane(batch.plane(0)) if setup.scene.plane == "tilting" else {}),
-        )
-
-
-def _has_come(run: WalkRun, batch: Batch, time: float) -> bool:
-    """Whether the walk has come to a time since its release."""
-    return run.is_free and batch.time(0) >= time
+        attempts = batch.attempts_of_launch
+        for features in run.phases():
+            while not (has_come := run.is_free and batch.time(0) >= time) and batch.status(0) == Status.RUNNING:
+                before = take_snapshot(batch, 0) if run.is_free else None
+                batch.launch([0], features, attempts)
+                if before is not None and batch.time(0) >= time and attempts > 1:
+                    restore(batch, 0, before)
+                    attempts = max(1, attempts // FINER)
+            if has_come:
+                return State(
+                    position=batch.position(0),
+                    velocity=batch.velocity(0),
+                    setup=replace(setup, start=None),
+                    time=batch.time(0),
+                    memory=run.memory(),
+                    **(state_of_plane(batch.plane(0)) if setup.scene.plane == "tilting" else {}),
+                )
+        raise InputError(f"t: run again, the walk ends as {run.status.label} at {batch.time(0):.6g} s; give less")

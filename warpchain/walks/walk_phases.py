@@ -44,9 +44,6 @@ Array = NDArray[np.float64]
 _OF_THE_RUN = ("raised", "drive_time", "drift", "_at_full_speed", "_has_sprocket")
 """What a run knows of the time before its release."""
 
-PLANE_OUTCOME = ("lateral_drift", "final_tilt", "final_yaw", "greatest_tilt", "fell_at")
-"""Numbers of a walk's outcome that only a plane that tilts has."""
-
 
 def phase_features(setup: Setup) -> dict[str, Features]:
     """What kernels are compiled for in the phases of a walk: `driven`, `moving` (beside a sprocket that moves), `free`.
@@ -258,20 +255,22 @@ class WalkRun:
 
     def _fall(self, is_at_rest: bool) -> dict[str, Any]:
         """What became of the plane; NaN and −1 if it is fixed or was never released."""
-        if not (self._tilts and self._released):
-            return {**dict.fromkeys(PLANE_OUTCOME, math.nan), "fell_over": -1, "fell_before_collapse": -1}
         last = self._batch.last_sample(self._world)
         tilt, yaw = angles(last[layout.PLANE_COLUMN :])
-        collapsed_at, fell_at = (self._batch.watched(self._world, row) for row in (layout.COLLAPSED_AT, layout.FELL_AT))
-        return {
+        rows = (layout.COLLAPSED_AT, layout.FELL_AT, layout.GREATEST_LEAN)
+        collapsed_at, fell_at, lean = (self._batch.watched(self._world, row) for row in rows)
+        found: dict[str, float] = {
             "lateral_drift": float(last[layout.CENTER_Z]) if is_at_rest else math.nan,
             "final_tilt": float(tilt),
             "final_yaw": float(yaw),
-            "greatest_tilt": math.asin(min(1.0, self._batch.watched(self._world, layout.GREATEST_LEAN))),
+            "greatest_tilt": math.asin(min(1.0, lean)),
             "fell_at": fell_at,
             "fell_over": int(not math.isnan(fell_at)),
             "fell_before_collapse": int(fell_at < (math.inf if math.isnan(collapsed_at) else collapsed_at)),
         }
+        if self._tilts and self._released:
+            return found
+        return {name: -1 if isinstance(value, int) else math.nan for name, value in found.items()}
 
     def _ending(self, moment: str, event: str, first: int) -> dict[str, Any]:
         """When an event came, after how many bounces begun, and how long after the last impulse on the floor.

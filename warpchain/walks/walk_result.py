@@ -401,7 +401,7 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
     """
     if os.path.isdir(path):
         record = os.path.join(path, "walk.h5")
-        if not os.path.exists(record) and os.path.exists(os.path.join(path, "sweep.json")):
+        if not os.path.exists(record) and os.path.exists(os.path.join(path, "sweep.h5")):
             raise InputError(f"{path}: the folder of a sweep, not of a saved walk; {WANTED}")
         path = record
     remedy = "run the walk again, or fetch another copy of the file"

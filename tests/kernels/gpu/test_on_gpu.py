@@ -17,8 +17,7 @@ import yaml
 
 from tests.kernels.methods.test_flight import FLIGHTS, exact_flight, greatest
 from tests.run.test_sweep_run import brief_setup, data_of, outcomes
-from tests.support.blocks_under_test import FIXED_STEP, HILLS, SOFT, heap
-from tests.support.kernels_under_test import common_laws
+from tests.support.blocks_under_test import FIXED_STEP, HILLS, SOFT, common_laws, heap
 from warpchain import simulate, sweep, walk
 from warpchain.engine.batch import Batch
 from warpchain.engine.sprocket_motion import motion_rows

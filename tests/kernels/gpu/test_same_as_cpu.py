@@ -18,11 +18,11 @@ from tests.support.blocks_under_test import (
     SOFT,
     assert_same,
     batch_of,
+    common_laws,
     heap,
     launch_blocks,
     launch_chains,
 )
-from tests.support.kernels_under_test import common_laws
 from tests.support.unlike_links import unlike_links
 from warpchain.engine.batch import Batch
 from warpchain.engine.kernel_choice import most_registers
