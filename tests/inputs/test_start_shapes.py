@@ -109,10 +109,3 @@ def test_phase_is_a_fraction_of_the_turn():
     assert_allclose(first[0], [0.0, RADIUS], atol=1e-12)
     assert_allclose(half[0], [0.0, first[:, 1].min()], atol=1e-12)
     assert_allclose(turn, first, atol=1e-12)
-
-
-@pytest.mark.parametrize("links", [4, 16, 28])
-def test_chain_too_short_for_its_sprocket_is_refused(links):
-    """A chain that does not reach round the half circles is an error that says so, never a chain that is not closed."""
-    with pytest.raises(ValueError, match=f"a closed chain of {links} links of {LENGTH} m does not fit this curve"):
-        lay_chain(stadium(RADIUS), links, LENGTH)

@@ -48,7 +48,8 @@ def test_good_input_is_computed() -> None:
         for duration in (0, 0.0, 1.5, np.float32(1), np.int64(1)):
             with pytest.raises(ComputedError):
                 simulate("soft", position, np.zeros((8, 3)), duration, times=(0.0,))
-    for settings in ({}, {"start": "spinning"}, {"start": "ellipse", "seed": 3}, {"setup": SETUP}):
+    numbers = {"seed": np.int32(3), "frame_interval": np.float64(0.02), "record_loads": np.bool_(True)}
+    for settings in ({}, {"start": "spinning"}, {"start": "ellipse", **numbers}, {"setup": SETUP}):
         with pytest.raises(ComputedError):
             walk(**settings)
     with pytest.raises(ComputedError):

@@ -79,17 +79,25 @@ def test_a_throw_gives_the_chain_the_speed_of_the_sprocket() -> None:
     assert thrown.greatest_penetration["sprocket"] < 1e-3
 
 
+LOWERED = [[0.05, 0.0, -0.012, 0.0], [0.07, 0.0, -0.012, 0.0]]
+HYBRID = {"links": 36, "frequency": 15.0, "start": "spinning"}
+PRESSED = {"links": 30, "frequency": 8.0, "start": "spinning", "preset": "soft"}
+
+
 @pytest.mark.parametrize(
-    "settings", [SPUN, {"links": 36, "frequency": 15.0, "start": "spinning"}], ids=["explicit", "hybrid"]
+    ("settings", "release", "deep"),
+    [(SPUN, LOWERED, False), (HYBRID, LOWERED, False), (PRESSED, [[0.2, 0, -0.02, 0]], True)],
+    ids=["explicit", "hybrid", "pressed into the floor"],
 )
-def test_a_walk_goes_on_when_the_sprocket_has_vanished(settings: dict[str, Any]) -> None:
+def test_a_walk_goes_on_when_the_sprocket_has_vanished(settings: dict[str, Any], release: Any, deep: bool) -> None:
     """Lowered onto the floor and stopped, a loop walks less far; from then on its states go on to the bit."""
-    lowered = warpchain.walk(**settings, release=[[0.05, 0.0, -0.012, 0.0], [0.07, 0.0, -0.012, 0.0]])
+    lowered = warpchain.walk(**settings, release=release)
     assert lowered.status.label == "at_rest" and lowered.dx < warpchain.walk(**settings).dx
     assert lowered.energy_error < 1e-2 and lowered.bounces > 0
-    with pytest.raises(InputError, match=r"t: 0.05 s: the sprocket is there until 0.07 s"):
+    with pytest.raises(InputError, match=r"t: 0.05 s: the sprocket is there until 0\.\d+ s, and a state"):
         lowered.state(0.05)
-    state = lowered.state(0.1)
+    state = lowered.state(release[-1][0])
+    assert (state.joints[:, 1] < 0).any() == deep
     assert_rest_of(warpchain.walk(start=state), lowered, state.time)
 
 
