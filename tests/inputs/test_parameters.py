@@ -1,12 +1,10 @@
 """Values of Table 1, presets, slips of units, and what a chain on its sprocket needs."""
 
 import math
-from collections.abc import Mapping
 
 import pytest
 from pydantic import ValidationError
 
-import warpchain
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS, Parameters, preset
 from warpchain.inputs.scene import Scene, check_scene, contact_radius, fewest_links, joint_radius
@@ -68,20 +66,6 @@ def test_presets() -> None:
     with pytest.raises(ValidationError):
         preset("paper").link_length = 0.01
     assert repr(preset("paper").with_values({"gravity": 10}).gravity) == "10.0"
-
-
-@pytest.mark.parametrize(
-    ("values", "line"),
-    [
-        ({"ell": 12.68, "r": 5e-3}, "link_length: 12.68 m is 1000 times Table 1's; give 0.01268"),
-        ({"m_inner": 3.7}, "inner_mass: 3.7 kg is 1000 times Table 1's; give 0.0037"),
-    ],
-)
-def test_mm_and_g_are_refused(values: Mapping[str, float], line: str) -> None:
-    """A length or a mass of Table 1 in thousandths is a slip; nothing is run."""
-    with pytest.raises(InputError) as caught:
-        warpchain.walk(**values)
-    assert str(caught.value) == f"parameters.{line}"
 
 
 def test_contact_and_pitch_radius() -> None:

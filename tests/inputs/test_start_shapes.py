@@ -5,7 +5,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tests.oracle_model import motion_equations
-from tests.oracle_model.circular_loop import circular_loop
 from warpchain import preset
 from warpchain.inputs.start_shapes import ellipse, lay_chain, stadium
 
@@ -92,15 +91,6 @@ def test_ellipse_has_its_aspect(aspect):
         x, y = joints(position).T
         size = np.sqrt(x**2 * aspect + y**2 / aspect)
         assert_allclose(size, size[0], rtol=1e-12)
-
-
-def test_circle_is_the_regular_polygon():
-    """An ellipse of aspect 1 is the regular polygon of the closed form, turning at its rate."""
-    links, speed = 20, 2.0
-    position, velocity = lay_chain(ellipse(1.0), links, LENGTH, speed)
-    polygon, turning = circular_loop(links, PAPER, -speed)
-    assert_allclose(np.hypot(*position[:, :2].T), np.hypot(*polygon[:, :2].T), rtol=1e-12)
-    assert_allclose(velocity[:, 2], turning[:, 2], rtol=1e-10)
 
 
 def test_phase_is_a_fraction_of_the_turn():
