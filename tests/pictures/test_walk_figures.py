@@ -153,13 +153,3 @@ def test_film_strip_shows_two_sides_of_a_plane_that_tilts(tmp_path: Path) -> Non
     assert above.yaxis_inverted() and not side.xaxis_inverted()
     assert_nothing_overlaps(figure, tmp_path / "strip.png")
     np.testing.assert_allclose([scales(axes) for axes in (side, above)], scales(side)[0], rtol=1e-6)
-
-
-@pytest.mark.parametrize("stretch", [0.05, 8.0])
-def test_film_strips_of_short_and_long_walks_fit(stretch: float, tmp_path: Path) -> None:
-    """Labels do not run into another view, however far the chain walked."""
-    walk = make_tilting_walk()
-    far = stretch * 0.6 * np.sin(walk.frame_time)[:, None] * np.array([1.0, 0.0, 0.0])
-    center = walk.center + stretch * 0.6 * np.sin(walk.time)[:, None] * np.array([1.0, 0.0])
-    figure = film_strip(make_tilting_walk(frame_origin=walk.frame_origin + far, center=center))
-    assert_nothing_overlaps(figure, tmp_path / "strip.png")

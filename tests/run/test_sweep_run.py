@@ -68,18 +68,6 @@ def uninterrupted(tmp_path_factory) -> dict[str, bytes]:
     return data_of(folder)
 
 
-def test_walks_do_not_depend_on_their_batch():
-    """Number of slots, order and company change no bit of a walk, with different n, methods and starts in one batch."""
-    setups = [brief_setup(seed) for seed in range(5)]
-    setups += [brief_setup(seed, links=44, start="spinning", hold_limit=0.05) for seed in range(2)]
-    setups += [brief_setup(9, method="rkf78"), brief_setup(9, links=240, method="os32")]
-    alone = [outcomes([setup])[0] for setup in setups]
-    assert outcomes(setups, slots=1) == alone
-    assert outcomes(setups, slots=4) == alone
-    assert outcomes(setups[::-1], slots=3) == alone[::-1]
-    assert len(set(alone)) == len(alone)
-
-
 def test_one_broken_walk_among_a_thousand_changes_no_other():
     """A chain whose mass is forced to NaN ends as not_finite; the other 999 are what they are without it."""
     setups = [brief_setup(seed, walk_limit=5e-4) for seed in range(1000)]

@@ -67,8 +67,9 @@ def test_parts_that_grow_stay_parts_of_the_whole(tmp_path: Path) -> None:
     parts = [tmp_path / f"part-{number}" for number in (1, 2, 3)]
     small, large = (load_sweep(two_blocks(*samples)) for samples in ((4, 2), (7, 2)))
     for number, folder in enumerate(parts, 1):
-        for sweep in (small, large):
-            run(folder, sweep, part=(number, 3), shard_size=3)
+        run(folder, small, part=(number, 3), shard_size=3)
+        min((folder / "shards").glob("[0-9]*.h5")).unlink()  # growth does not wait for the walks before it
+        run(folder, large, part=(number, 3), shard_size=3)
     merge(parts, tmp_path / "all.h5")
     run(tmp_path / "whole", large)
     whole = load(tmp_path / "whole")
