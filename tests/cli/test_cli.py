@@ -1,13 +1,9 @@
 """The command line through its real entry points: `main` in this process, and `python -m warpchain`."""
 
 import json
-import os
 import re
-import select
-import signal
 import subprocess
 import sys
-import time
 from importlib import import_module
 from pathlib import Path
 
@@ -164,41 +160,3 @@ def test_a_defect_is_not_disguised_as_bad_input(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(WALK_MODULE, "run_walk", broken)
     with pytest.raises(ValueError, match="broadcast"):
         main(["walk"])
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="no pseudoterminals")
-def test_terminal_shows_progress_and_ctrl_c_ends_it(tmp_path: Path) -> None:
-    """On a terminal progress is shown; Ctrl-C ends the walk with status 130 and one line, nothing written."""
-    terminal, theirs = os.openpty()
-    walk = subprocess.Popen(
-        [sys.executable, "-m", "warpchain", "walk", *QUICK, "--set", "rest_time=100", "-o", "new"],
-        cwd=tmp_path,
-        env=os.environ | {"TERM": "xterm", "COLUMNS": "100"},
-        stdout=subprocess.PIPE,
-        stderr=theirs,
-        # A shell may have set it to be ignored in its background jobs, which children inherit.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )
-    os.close(theirs)
-    try:
-        seen = _read_until(terminal, rb"walk +0\.[1-9].* m/s.* steps", seconds=120)
-        walk.send_signal(signal.SIGINT)
-        out, _ = walk.communicate(timeout=30)
-        seen += _read_until(terminal, b"interrupted\r\n", seconds=10)
-    finally:
-        walk.kill()
-        walk.wait()
-        os.close(terminal)
-    assert walk.returncode == 130 and out == b""
-    assert b"Traceback" not in seen
-    assert list(tmp_path.iterdir()) == []
-
-
-def _read_until(terminal: int, pattern: bytes, *, seconds: float) -> bytes:
-    """What a terminal shows, up to the first chunk that completes the pattern."""
-    seen, deadline = b"", time.monotonic() + seconds
-    while re.search(pattern, seen) is None:
-        ready, _, _ = select.select([terminal], [], [], max(0.0, deadline - time.monotonic()))
-        assert ready, f"{pattern!r} not in {seen!r}"
-        seen += os.read(terminal, 65536)
-    return seen

@@ -18,12 +18,9 @@ from tests.support.setups import setup_walk
 from warpchain.inputs.sections import SECTION_OF, SECTIONS
 from warpchain.inputs.setup import resolve
 from warpchain.inputs.validation import (
-    DEEPEST,
     LONGEST_LINE,
-    MOST_VALUES,
     InputError,
     field_limits,
-    plain,
 )
 from warpchain.inputs.yaml_files import LARGEST_FILE, read_yaml
 from warpchain.kernels.methods.method import find_method, method_names
@@ -206,14 +203,6 @@ def test_a_hostile_value_is_refused_in_short_lines(kind: str) -> None:
         assert refusal(lambda name=name: setup_walk("soft", {name: value}, None))
     for key in ("seed", "samples", "sampler", "preset", "scene", "grid", "distributions", "record", "blocks"):
         assert refusal(lambda key=key: load_sweep({**SWEEP, key: value})).startswith("sweep")
-
-
-def test_values_have_bounds_of_number_and_depth() -> None:
-    """As many values and as deep as the limits say pass the door, one more does not."""
-    assert plain([0] * (MOST_VALUES - 1)) == [0] * (MOST_VALUES - 1)
-    assert "more than" in refusal(lambda: plain([0] * MOST_VALUES, "grid"))
-    assert plain(nested(DEEPEST - 1)) == nested(DEEPEST - 1)
-    assert "inside of one another" in refusal(lambda: plain(nested(DEEPEST), "grid"))
 
 
 def test_a_refusal_keeps_its_lines() -> None:
