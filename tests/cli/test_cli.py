@@ -10,14 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.support import command_line
 from tests.support.command_line import Answer, Command, process
 from tests.support.made_walks import make_walk
 from warpchain import load_walk
 from warpchain.cli.main import main
 from warpchain.inputs.parameters import preset
-
-command = command_line.command
 
 QUICK = "--links 32 --preset soft --method dp5 --start ellipse --frequency 5".split()
 """A walk of half a simulated second."""

@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 from tests.run.test_sweep_run import TINY, data_of
-from tests.support.command_line import Command, command  # noqa: F401
+from tests.support.command_line import Command
 from warpchain.cli.main import main
 from warpchain.run.sweep_run import sweep
 
@@ -30,7 +30,7 @@ def heard_signal() -> Iterator[None]:
 
 
 def test_an_error_that_a_library_makes_of_an_interrupt_is_one(
-    command: Command,  # noqa: F811
+    command: Command,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """HDF5 calls a read that Ctrl-C breaks off a damaged file; the command says that it was interrupted."""
@@ -64,7 +64,7 @@ class Screen(io.StringIO):
 
 
 def test_terminal_shows_progress_and_ctrl_c_ends_it(
-    command: Command,  # noqa: F811
+    command: Command,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

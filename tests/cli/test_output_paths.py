@@ -8,12 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.support import command_line
 from tests.support.command_line import Answer, Command
 from tests.support.made_sweeps import TOLERANCE, make_sweep
 from tests.support.made_walks import make_walk
-
-command = command_line.command
 
 QUICK = "--links 32 --preset soft --method dp5 --start ellipse --frequency 5".split()
 SWEEP = """\

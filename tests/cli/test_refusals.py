@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from tests.run.test_sweep_run import TINY
-from tests.support import command_line
 from tests.support.command_line import Command
 from tests.support.made_sweeps import make_sweep
 from tests.support.made_walks import make_walk
@@ -15,8 +14,6 @@ from tests.support.sweep_content import content
 from warpchain.cli.terminal import print_sweep
 from warpchain.inputs.yaml_files import parse_yaml
 from warpchain.sweeps.shipped import shipped_sweeps
-
-command = command_line.command
 
 ESCAPE = "\x1b]0;owned\x07\x1b[2J"
 
