@@ -17,7 +17,6 @@ import pytest
 import yaml
 
 from tests.support.setups import setup_walk
-from warpchain.cli.main import main
 from warpchain.inputs.setup import Setup
 from warpchain.run.sweep_run import run_shards, sweep
 from warpchain.status import Status
@@ -195,14 +194,12 @@ def test_a_dask_cluster_of_separate_processes(tmp_path, uninterrupted):
 
 
 @pytest.mark.parametrize("address", ("tls://127.0.0.1:1", "ucx://127.0.0.1:1", "inproc://1", "http://a:1"))
-def test_a_scheduler_that_cannot_be_reached_is_refused(tmp_path, capsys, address):
+def test_a_scheduler_that_cannot_be_reached_is_refused(command, address):
     """Whatever class of error Dask raises: one line, status 2, no folder, and no client that closes itself later."""
     distributed = pytest.importorskip("distributed")
-    with pytest.raises(SystemExit) as caught:
-        main(["sweep", "quickstart", "-o", str(tmp_path / "sweep"), "--scheduler", address])
-    said = capsys.readouterr().err
-    assert caught.value.code == 2 and said.startswith(f"error: --scheduler: '{address}': ") and said.count("\n") == 1
-    assert not (tmp_path / "sweep").exists()
+    answer = command("sweep", "quickstart", "-o", "sweep", "--scheduler", address)
+    assert answer.status == 2 and answer.err.count("\n") == 1 and not Path("sweep").exists()
+    assert answer.err.startswith(f"error: --scheduler: '{address}': ")
     clients = [each for each in gc.get_objects() if isinstance(each, distributed.Client)]
     assert clients and all(client.status == "closed" for client in clients)
 
