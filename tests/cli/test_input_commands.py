@@ -13,7 +13,6 @@ from warpchain.store.folder import SweepFolder
 from warpchain.sweeps.plan import Sweep, load_sweep
 from warpchain.sweeps.sweep_file import sweep_schema
 
-QUICK = "--links 32 --preset soft --method dp5 --start ellipse --set walk_limit=1e-6 --json".split()
 ROOT = Path(__file__).parents[2]
 
 

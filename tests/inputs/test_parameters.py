@@ -8,7 +8,6 @@ from pydantic import ValidationError
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS, Parameters, preset
 from warpchain.inputs.scene import Scene, check_scene, contact_radius, fewest_links, joint_radius
-from warpchain.inputs.setup import resolve
 from warpchain.inputs.validation import InputError
 
 TABLE_1 = {
@@ -96,9 +95,3 @@ def test_fewest_links_is_the_polygon(sides: int, kind: str) -> None:
     with pytest.raises(InputError, match=rf"^scene\.links: {sides} links .* give at least {sides + 2}$"):
         check_scene(scene, outside)
     check_scene(Scene.model_validate({**scene.model_dump(), "start": "ellipse"}), outside)
-
-
-def test_the_shortest_chains() -> None:
-    """30 links reach round the sprocket of Table 1, 4 round one smaller than a link."""
-    assert resolve("paper", scene={"links": 30}, options={}, parameters={}).scene.links == 30
-    assert fewest_links(Scene(links=4), preset("paper").with_values({"sprocket_radius": 1e-4})) == 4

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 import warpchain
-from tests.hard_cases.starts import dropped
 from tests.support.setups import setup_walk
 from warpchain.inputs.sections import SECTION_OF, SECTIONS
 from warpchain.inputs.setup import resolve
@@ -132,15 +131,6 @@ def test_refusals_say_what_to_give(settings: dict[str, Any], message: str) -> No
     """The field's path, what it should be with its unit, and what was given."""
     text = refusal(lambda: setup_walk("paper", settings))
     assert text.startswith(message) and "\n" not in text
-
-
-def test_a_chain_that_starts_inside_the_floor_is_refused() -> None:
-    """A given chain must lie above the profile that it is given with."""
-    floor = [[-1, 0.02], [1, 0.02]]
-    text = refusal(lambda: warpchain.simulate("soft", *dropped(), 0.1, floor=floor))
-    assert re.fullmatch(
-        r"position: link \d+ starts [\d.]+ m inside the floor; raise the chain, or lower the floor", text
-    )
 
 
 @pytest.mark.parametrize("method", [name for name in method_names() if not find_method(name).runs_on_gpus])

@@ -93,6 +93,10 @@ REFUSED: dict[Callable[..., object], list[tuple[dict[str, Any], str]]] = {
         ({"seed": True}, r"seed: Input should be a valid integer; given True"),
         ({"setup": SETUP, "links": 60}, r"links: given together with setup, which is complete; leave one out"),
         ({"setup": {"links": 60}}, r"setup: \{'links': 60\} is none of a walk; give setup of a WalkResult, .*"),
+        ({"record_before": -0.1}, r"record_before: Input should be .*; given -0\.1"),
+        ({"record_before": True}, r"record_before: Input should be .*; given True"),
+        ({"record_before": np.inf}, r"record_before: Input should be .*; given inf"),
+        ({"record_before": 0.1, "frame_interval": None}, ".*frame_interval is None; give a frame_interval.*"),
         ({"frame_interval": 1e300}, r"frame_interval: .*"),  # its number of samples must fit into 64 bits
         ({"frame_interval": 9e-7}, r"frame_interval: .*"),
         ({"record_interval": 1e-300}, r"(options\.record_interval|frame_interval): .*"),
