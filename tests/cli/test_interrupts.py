@@ -30,8 +30,7 @@ def heard_signal() -> Iterator[None]:
 
 
 def test_an_error_that_a_library_makes_of_an_interrupt_is_one(
-    command: Command,
-    monkeypatch: pytest.MonkeyPatch,
+    command: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """HDF5 calls a read that Ctrl-C breaks off a damaged file; the command says that it was interrupted."""
 
@@ -64,9 +63,7 @@ class Screen(io.StringIO):
 
 
 def test_terminal_shows_progress_and_ctrl_c_ends_it(
-    command: Command,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """On a terminal progress is shown; Ctrl-C ends the walk with status 130 and one line, nothing written."""
     screen = Screen()
