@@ -6,9 +6,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, Literal
 
+import numpy as np
 import typer
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from warpchain import InputError
 
@@ -20,6 +22,8 @@ FAINT: Final = "#777777"
 GROUND: Final = "#E3E3E3"
 DASHES: Final[Any] = (0, (4, 3))
 
+DRAWN: Final = "_drawn"
+"""End of the names of columns with what a sample has drawn."""
 DISTANCE: Final = "distance walked $Δx$ / m"
 FREQUENCY: Final = "frequency of the sprocket $ν$ / Hz"
 
@@ -30,6 +34,14 @@ def run_study(main: Callable[..., None]) -> None:
         typer.run(main)
     except (InputError, OSError) as error:
         sys.exit(str(error))
+
+
+def drawn_terms(columns: Mapping[str, Any]) -> list[NDArray[np.float64]]:
+    """What each walk has drawn, as terms of a linear fit: sine and cosine of the phase, and all else, standardised."""
+    drawn = {name: np.asarray(values, float) for name, values in columns.items() if name.endswith(DRAWN)}
+    plain = [values for name, values in drawn.items() if name != f"phase{DRAWN}" and values.std() > 0]
+    turn = 2 * np.pi * drawn[f"phase{DRAWN}"]
+    return [np.sin(turn), np.cos(turn), *((values - values.mean()) / values.std() for values in plain)]
 
 
 def table(head: str | Iterable[str], rows: Iterable[Iterable[object]]) -> str:
