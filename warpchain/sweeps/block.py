@@ -142,13 +142,14 @@ class Block:
     def _located(self, error: InputError, cell: tuple[int, ...]) -> str:
         """The text of an error about a cell, with the path of the value that it names."""
         where, _, problem = str(error).partition(": ")
-        name = where.rpartition(".")[2]
+        name, bracket, number = where.rpartition(".")[2].partition("[")
+        within = bracket + number  # of a value that is a list
         at = dict(zip(self.axes, cell, strict=True))
         if name in self.points:
-            return f"{self.path}.points.{name}[{at[POINT]}]: {problem}"
+            return f"{self.path}.points.{name}[{at[POINT]}]{within}: {problem}"
         if name in at:
             key = self.axes[name][at[name]] if name in self.named else at[name]
-            return f"{path_of(f'{self.path}.grid.{name}', key)}: {problem}"
+            return f"{path_of(f'{self.path}.grid.{name}', key)}{within}: {problem}"
         place = ", ".join(f"{name} {self.axes[name][number]}" for name, number in at.items())
         return f"{self.path}.{where}: {problem}" + (f" (in the cell {place})" if place else "")
 
