@@ -217,7 +217,7 @@ class WalkResult:
         warning = f", energy error {error:.1e}" if error > MOST_ENERGY_ERROR else ", inaccurate" * bool(self.warnings())
         return (
             f"<WalkResult {self.status.label}: dx {self.dx:.4g} m in {self.walk_time:.4g} s, "
-            f"{self.bounces} bounces, {self.setup.described}, {self.setup.preset}{warning}>"
+            f"{self.bounces} bounce{'s' * (self.bounces != 1)}, {self.setup.described}, {self.setup.preset}{warning}>"
         )
 
     @property
