@@ -48,6 +48,15 @@ def test_samples_are_physical(
     assert drawn.circle_radius < drawn.link_length / 2
 
 
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 2**128 - 1), radius=st.floats(6.3e-3, 6.3399e-3))
+def test_a_drawn_link_has_room_for_circles_of_one_link(seed: int, radius: float) -> None:
+    """Lengths that a wide charm leaves no room for are drawn again; no sample of a sound scene is refused."""
+    scene = Scene(charm_radius=radius, start="ellipse")
+    drawn = sampled(Setup("paper", preset("paper"), scene, Options()), random_generator(seed)).parameters
+    assert drawn.link_length > 2 * radius
+
+
 def test_hopeless_draw_is_an_error() -> None:
     """A mean far outside the bounds ends in a clear error after a limited number of draws."""
     base = Parameters.model_construct(**{**preset("paper").model_dump(), "inner_mass": -1.0})

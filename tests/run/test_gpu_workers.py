@@ -34,15 +34,16 @@ def test_each_worker_has_a_gpu_of_its_own(monkeypatch: pytest.MonkeyPatch) -> No
         assert os.environ.get("CUDA_VISIBLE_DEVICES") == visible
 
 
+@pytest.mark.parametrize(("there", "remedy"), [(1, "give at most 1"), (0, "leave it out, to run on the processor")])
 def test_more_gpus_than_there_are_are_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    there: int, remedy: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """One line says how many there are, before the folder is made."""
-    monkeypatch.setattr("warpchain.engine.devices.gpu_count", lambda: 1)
+    monkeypatch.setattr("warpchain.engine.devices.gpu_count", lambda: there)
     with pytest.raises(SystemExit) as caught:
         main(["sweep", "figure6", "-o", str(tmp_path / "sweep"), "--gpus", "2"])
     assert caught.value.code == 2 and not (tmp_path / "sweep").exists()
-    assert capsys.readouterr().err == "error: --gpus: 2 wanted, but this machine has 1; give at most 1\n"
+    assert capsys.readouterr().err == f"error: --gpus: 2 wanted, but this machine has {there}; {remedy}\n"
 
 
 def test_an_exception_ends_what_workers_are_doing(monkeypatch: pytest.MonkeyPatch) -> None:

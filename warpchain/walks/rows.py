@@ -11,15 +11,13 @@ from warpchain.engine.tallies import CONTACTS, LOST
 from warpchain.inputs.distributions import DRAWABLE
 from warpchain.inputs.validation import FIELDS, field_unit
 from warpchain.walks.faults import FAULTS, MOST_ENERGY_ERROR, energy_error, faults
+from warpchain.walks.faults import LENGTHS as LENGTHS
 from warpchain.walks.walk_result import NUMBERS, WalkResult
 
 Rows = NDArray[np.void]
 
 KEYS: Final = np.dtype([("block", "<i4"), ("cell", "<i4"), ("sample", "<i4")])
 """What a row is found by: number of its block, of its cell in C order over the axes, of its sample in the cell."""
-
-LENGTHS: Final = ("link_length", "circle_radius")
-"""Against which openings and penetrations are held."""
 
 MISSING: Final = -1
 """Status of a walk that has not been computed yet; no code of `Status` is negative."""
@@ -171,14 +169,14 @@ def faults_of_columns(
 
     Args:
         columns: of a sweep, by name.
-        lengths: `LENGTHS` [m] before anything was drawn, along the axes of the columns.
+        lengths: the least of each of `LENGTHS` [m] before anything was drawn, along the axes of the columns.
     """
     own = dict(lengths)
     for name in own:
         if (column := drawn_column(name)) in columns:  # NaN in rows of blocks that do not draw it
             own[name] = np.where(np.isnan(columns[column]), own[name], columns[column])
     deepest = np.max([columns[f"penetration_{kind}"] for kind in CONTACTS], axis=0)
-    return faults(columns["energy_error"], columns["greatest_opening"], deepest, **own)
+    return faults(columns["energy_error"], columns["greatest_opening"], deepest, own)
 
 
 def fault_remedies(blocks: Iterable[Mapping[str, NDArray[np.bool_]]]) -> dict[str, int]:

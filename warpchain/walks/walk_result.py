@@ -41,7 +41,7 @@ from warpchain.kernels import layout
 from warpchain.loop.stationary_loop import BEFORE, FIELDS, BeforeRelease
 from warpchain.pictures.walk_shape import Kind
 from warpchain.status import Status
-from warpchain.walks.faults import FAULTS, MOST_ENERGY_ERROR, energy_error, faults
+from warpchain.walks.faults import FAULTS, LENGTHS, MOST_ENERGY_ERROR, energy_error, faults, least
 from warpchain.walks.landmarks import RELEASE, bounces
 from warpchain.walks.moving_plane import in_room
 from warpchain.walks.stored_state import read_state, write_state
@@ -217,7 +217,7 @@ class WalkResult:
         warning = f", energy error {error:.1e}" if error > MOST_ENERGY_ERROR else ", inaccurate" * bool(self.warnings())
         return (
             f"<WalkResult {self.status.label}: dx {self.dx:.4g} m in {self.walk_time:.4g} s, "
-            f"{self.bounces} bounces, {self.setup.described}, {self.setup.preset}{warning}>"
+            f"{self.bounces} bounce{'s' * (self.bounces != 1)}, {self.setup.described}, {self.setup.preset}{warning}>"
         )
 
     @property
@@ -228,9 +228,11 @@ class WalkResult:
 
     def warnings(self) -> list[str]:
         """Why the walk is inaccurate, each with what to try: energy, joints or contacts; empty if it is not."""
-        deepest, parameters = max(self.greatest_penetration.values()), self.setup.parameters
-        lengths = (self.greatest_opening, deepest, parameters.link_length, parameters.circle_radius)
-        return [FAULTS[name] for name, found in faults(self.energy_error, *lengths).items() if found]
+        values = vars(self.setup.scene) | vars(self.setup.parameters)
+        lengths = {name: least(values[name]) for name in LENGTHS}
+        deepest = max(self.greatest_penetration.values())
+        found = faults(self.energy_error, self.greatest_opening, deepest, lengths)
+        return [FAULTS[name] for name, is_there in found.items() if is_there]
 
     def state(self, t: float) -> State:
         """The chain at the end of its first step at or after a time, as samples and frames are taken.
