@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from warpchain.engine.tallies import CONTACTS, LOST
 from warpchain.inputs.distributions import DRAWABLE
 from warpchain.inputs.validation import FIELDS, field_unit
-from warpchain.walks.faults import FAULTS, MOST_ENERGY_ERROR, energy_error, faults
+from warpchain.walks.faults import MOST_ENERGY_ERROR, energy_error, faults
 from warpchain.walks.walk_result import NUMBERS, WalkResult
 
 Rows = NDArray[np.void]
@@ -179,14 +179,3 @@ def faults_of_columns(
             own[name] = np.where(np.isnan(columns[column]), own[name], columns[column])
     deepest = np.max([columns[f"penetration_{kind}"] for kind in CONTACTS], axis=0)
     return faults(columns["energy_error"], columns["greatest_opening"], deepest, **own)
-
-
-def fault_remedies(blocks: Iterable[Mapping[str, NDArray[np.bool_]]]) -> dict[str, int]:
-    """What inaccurate walks mean and what to try → number of walks of all blocks; only what there is.
-
-    Args:
-        blocks: as of `faults_of_columns`, for each block.
-    """
-    found = list(blocks)
-    counts = {remedy: sum(int(block[name].sum()) for block in found) for name, remedy in FAULTS.items()}
-    return {remedy: count for remedy, count in counts.items() if count}
