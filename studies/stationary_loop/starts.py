@@ -12,7 +12,7 @@ import typer
 from numpy.typing import NDArray
 
 import warpchain
-from studies.common import read_rows, run_study, table, write_rows, write_tables
+from studies.common import minus, of_cells, over_cells, publish, read_rows, run_study, table, write_rows
 
 Array = NDArray[np.float64]
 Key = tuple[str, int, float, float]
@@ -32,10 +32,9 @@ def reduced(paths: list[str]) -> list[dict[str, Any]]:
     found: dict[Key, list[Array]] = {}
     for path in paths:
         for name, block in warpchain.load(path).blocks.items():
-            axes = [name for name in block.dims if name != "sample"]
             values = np.stack([np.asarray(block.columns[quantity]) for quantity in QUANTITIES])
-            for place in np.ndindex(values.shape[1:-1]):
-                at = {axis: float(block.axes[axis][i]) for axis, i in zip(axes, place, strict=True)}
+            for place, numbers in of_cells(block):
+                at = dict(zip(block.axes, map(float, numbers), strict=True))
                 key = name, int(at["links"]), at["frequency"], at.get("further_hold", 0.0)
                 found.setdefault(key, []).append(values[(slice(None), *place)])
     rows = []
@@ -68,9 +67,8 @@ def _ratio(one: dict[str, float], other: dict[str, float]) -> tuple[float, float
 
 def _mean(ratios: list[tuple[float, float]]) -> str:
     """Mean over cells ± standard error, with χ² of none in any."""
-    sizes, errors = np.array(ratios).T
-    mean, error = 100 * sizes.mean(), 100 * np.sqrt(np.sum(errors**2)) / len(sizes)
-    return f"{mean:+.2f} ± {error:.2f} % (χ² {np.sum((sizes / errors) ** 2):.1f} of {len(sizes)})"
+    over = over_cells(*np.array(ratios).T)
+    return f"{100 * over.mean:+.2f} ± {100 * over.error:.2f} % (χ² {over.chi2:.1f} of {len(over)})"
 
 
 def _with_error(cell: dict[str, float], quantity: str, scale: float = 1.0, digits: int = 4) -> str:
@@ -137,8 +135,7 @@ def make(folders: Annotated[list[str] | None, typer.Argument()] = None) -> None:
         "swing": over_time(cells, "swing", "release_center_x", 1e3, 2),
         "swing in distance": over_time(cells, "swing", "dx"),
     }
-    signs = {name: text.replace("-", "−").replace("−−−", "---") for name, text in tables.items()}
-    write_tables(Path(__file__).parent / "README.md", signs)
+    publish(Path(__file__).parent, {name: minus(text) for name, text in tables.items()}, {})
 
 
 if __name__ == "__main__":

@@ -69,16 +69,6 @@ def assert_refused(answer: Answer, status: int, *words: str) -> None:
         assert word in answer.err
 
 
-@pytest.mark.parametrize("line", [*OUTPUTS, "walk -o {}", "sweep some.yaml -o {}"])
-def test_an_empty_path_is_refused(command: Command, line: str) -> None:
-    """It is not taken for the current folder; status 2, one line, nothing written."""
-    prepare()
-    before = content()
-    answer = command(*("" if word == "{}" else word for word in line.split()))
-    assert_refused(answer, 2, "a path is empty; name a file or folder")
-    assert answer.out == "" and content() == before
-
-
 @pytest.mark.parametrize("line", OUTPUTS)
 def test_a_pipe_in_the_way_is_refused(command: Command, line: str) -> None:
     """No command waits for a pipe or replaces it; status 2, one line, nothing written."""

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from tests.support.made_films import films_of, made_bank, motion
+from tests.support.made_films import motion
 from warpchain import InputError, films
 
 EXACT = motion(0.3).seen(films.Camera(), np.zeros(8), np.random.default_rng(0))
@@ -52,10 +52,3 @@ def test_a_film_that_is_not_what_it_says_is_refused(
     """Noise, frame rate, times, a mirrored picture, and speed in another unit."""
     with pytest.raises(InputError, match=wrong):
         films.friction_line(dataclasses.replace(EXACT, **changes), camera)
-
-
-def test_films_and_banks_are_shown_in_one_line() -> None:
-    """They say what they are, without their arrays."""
-    bank = made_bank(160, seed=1)
-    for shown in (repr(bank), repr(films_of(bank, 5, 1, films.Camera(), 0)[0])):
-        assert shown.startswith(("<Bank of ", "<Film of ")) and len(shown) < 150 and "\n" not in shown

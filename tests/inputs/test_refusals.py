@@ -76,21 +76,17 @@ def test_what_is_no_value_is_refused_by_name(name: str, value: object) -> None:
     [
         ("links", 61, "scene.links: 61 is odd; "),
         ("links", 60.5, "scene.links: Input should be a valid integer; given 60.5"),
-        ("frequency", "15 Hz", "scene.frequency: Input should be a valid number, in Hz; given '15 Hz'"),
         ("start", "elipse", "scene.start: Input should be 'rest', 'spinning' or 'ellipse'; given 'elipse'"),
         ("floor", "hilly", "scene.floor: Input should be 'flat'; given 'hilly'"),
         ("floor", [[0, 0], [1]], "scene.floor[1][1]: missing; give a value"),
         ("floor", [[0, 0, 0.1], [1, 0]], "scene.floor[0][3]: missing; give a value"),
         ("floor", [[0, 0, 1.1, 0.1], [1, 0]], "scene.floor[0][2]: Input should be less than or equal to 1"),
         ("floor", [[0, 0], [1, 0, 0.1, 0.1]], "scene.floor: point 1 begins no line that could have e and μ; give x "),
-        ("floor", [[0, 0], [1, True]], "scene.floor[1][1]: Input should be a valid number; given True"),
         ("floor", [[0, 0]], "scene.floor: a profile has 2 points at least; give more, such as [[0, 0], [1, 0], "),
         ("floor", [[0, 0], [1, 0], [0.9, 1]], "scene.floor: point 2 lies behind the one before it; let x rise"),
         ("floor", [[0, 0], [1, 0], [1, 1e-6], [2, 0]], "scene.floor: point 2 is less than 1e-05 m from the one before"),
         ("floor", [[0, 0], [0, 1], [1, 1]], "scene.floor: the first and the last face go on without end; let x rise"),
         ("floor", [[0, 0], [1, 0], [1, 1], [1, 0.5], [2, 0]], "scene.floor: point 3 is the third above one another; "),
-        ("slope", 81.0, "scene.slope: Input should be less than or equal to 80, in °; given 81.0"),
-        ("tilt", 0.1, "scene.tilt: 0.1 moves the plane of the chain, which is fixed; give plane: tilting"),
         ("circle_radius", 0.007, "parameters.circle_radius: 0.007 is not smaller than half the link length 0.00634; "),
         ("method", "hybird", "options.method: 'hybird' is unknown; did you mean hybrid?"),
         ("device", "gpu", "options.device: 'gpu' is no device; give cpu, cuda or cuda:N"),
@@ -109,6 +105,7 @@ STEP = [[-1, 0], [0.5, 0], [0.5, -0.1], [1, -0.1]]
     ("scene", "message"),
     [
         ({"slope": 5.0, "floor": STEP}, "scene.slope: 5.0 of a floor that is a profile; give slope: 0, or floor: flat"),
+        ({"method": "hybrid", "plane": "tilting"}, "options.method: 'hybrid' keeps the plane of a chain fixed; give "),
         ({"slope": 5.0, "plane": "tilting"}, "scene.plane: 'tilting' needs a flat floor; give plane: fixed, or "),
         ({"floor": STEP, "plane": "tilting"}, "scene.plane: 'tilting' needs a flat floor; give plane: fixed, or "),
     ],
@@ -171,18 +168,12 @@ HOSTILE: dict[str, Callable[[], Any]] = {
     "endless": lambda: nested(0),
     "deep": lambda: nested(100_000),
     "long number": lambda: 10**5000,
-    "escape": lambda: "\x1b[2J",
-    "surrogate": lambda: "\ud800",
     "long text": lambda: "x" * 10**6,
-    "time": lambda: np.timedelta64(60),
-    "array of times": lambda: np.array(["2020"], dtype="M8[ns]"),
     "array": lambda: np.zeros(10**7),
-    "array of objects": lambda: np.array([Mute()], dtype=object),
-    "range": lambda: range(10**30),
-    "long double": lambda: np.longdouble("1e4000"),
     "mapping": lambda: {Mute(): 1},
     "large": lambda: {"a": [{"b": ["\x1b"] * 1000}] * 1000},
 }
+"""What `tests/test_fuzz.py` does not make."""
 
 
 @pytest.mark.parametrize("kind", HOSTILE)

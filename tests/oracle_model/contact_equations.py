@@ -59,21 +59,8 @@ def collision_impulse(
     A is a driven surface this holds in the frame of the surface at P; the surface may do work on B.) The first
     case leaves v'_t = −e_t s − e v_n W_tn/W_nn: it ends all sliding only if e_t = 0 and e W_tn = 0.
 
-    Args:
-        v_rel: v_A − v_B at P, (2,), m/s.
-        normal: unit vector from A to B, (2,).
-        lever_a: P − centre of mass of A, (2,), m.
-        lever_b: P − centre of mass of B, (2,), m.
-        inv_mass_a: 1/m_A, 1/kg; 0 for an immovable body.
-        inv_inertia_a: 1/I_A, 1/(kg m²); 0 for an immovable body.
-        inv_mass_b: 1/m_B, 1/kg; not both bodies may be immovable.
-        inv_inertia_b: 1/I_B, 1/(kg m²).
-        restitution: e in [0, 1].
-        friction: μ, at least 0.
-        tangential_restitution: e_t in [−1, 1].
-
-    Returns:
-        J in world axes, (2,), N s; zero unless the bodies approach (v_n > 0).
+    Vectors are (2,) in world axes, levers go from the centre of mass to P. An immovable body has inverses of 0. The
+    impulse is zero unless the bodies approach (v_n > 0).
     """
     v_n = float(normal @ v_rel)
     if v_n <= 0:
@@ -116,16 +103,7 @@ def resolve_contacts(
     nearest the sprocket's centre, radially outwards; the surface moves with Ω ẑ × (P − centre). Two links: midway
     between the points of the circles that are deepest in the other, from A, the link at joint p, to B, that at q > p.
 
-    Args:
-        position: (n, 3).
-        velocity: (n, 3); not changed.
-        parameters: the chain and its coefficients of collision.
-        floor: whether there is a floor.
-        sprocket: the sprocket, or None.
-        self_contact: whether links collide with each other.
-
-    Returns:
-        The new velocity (n, 3), and the numbers of impulses by kind: "floor", "sprocket", "self".
+    Returns the new velocity (n, 3), and the numbers of impulses by kind: "floor", "sprocket", "self".
     """
     n = len(position)
     velocity = velocity.copy()

@@ -15,7 +15,6 @@ from PIL import Image, ImageSequence
 from tests.support.made_tilting_walks import make_tilting_walk
 from tests.support.made_walks import make_unreleased, make_walk
 from warpchain.pictures.animation import Film, animate
-from warpchain.status import Status
 
 
 def data_of(path: Path) -> dict[str, Any]:
@@ -62,16 +61,6 @@ def test_gif_draws_the_chain_where_it_is(make: Any, tmp_path: Path) -> None:
         assert np.mean(blue[1::2] - red[1::2] > 60) > 0.9
         brightness = pictures[frame][y, x].sum(axis=1)
         assert np.median(brightness[0::2]) > 1.4 * np.median(brightness[1::2])
-
-
-def test_broken_walks_and_long_films_are_refused(tmp_path: Path) -> None:
-    """A walk without frames, or with broken ones, or with too many for a GIF, is refused before anything is drawn."""
-    path = tmp_path / "walk.gif"
-    with pytest.raises(ValueError, match=r"no frames \(not_steady\)"):
-        animate(make_unreleased(), path)
-    with pytest.raises(ValueError, match="not all finite numbers"):
-        animate(make_walk(status=Status.NOT_FINITE, frame_joints=np.full((41, 30, 2), math.nan)), path)
-    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("make", [make_walk, make_tilting_walk])
@@ -122,10 +111,12 @@ def test_a_film_that_was_not_written_to_its_end_is_not_kept(
         ("walk.html", {"slow": math.inf}, "slow: inf is not a positive number"),
         ("walk.gif", {"fps": 51}, "fps: 51 is too fast for a GIF"),
         ("walk.gif", {"slow": 1e4}, "pictures are too many for a GIF"),
+        ("walk.gif", {"walk": make_unreleased()}, r"no frames \(not_steady\)"),
+        ("walk.gif", {"walk": make_walk(frame_joints=np.full((41, 30, 2), math.nan))}, "not all finite numbers"),
     ],
 )
-def test_refused_settings(name: str, settings: dict[str, float], message: str, tmp_path: Path) -> None:
-    """Unknown suffixes and impossible speeds are refused before anything is written."""
+def test_what_makes_no_film_is_refused(name: str, settings: dict[str, Any], message: str, tmp_path: Path) -> None:
+    """Unknown suffixes, impossible speeds, and walks without whole frames, before anything is written."""
     with pytest.raises(ValueError, match=message):
-        animate(make_walk(), tmp_path / name, **settings)
+        animate(**{"walk": make_walk(), "path": tmp_path / name} | settings)
     assert not list(tmp_path.iterdir())

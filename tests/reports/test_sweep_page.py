@@ -223,15 +223,6 @@ def test_a_walk_is_run_again_on_another_device(folder: Path, tmp_path: Path, mon
     assert not list(tmp_path.iterdir())
 
 
-def test_unknown_walk_is_refused(folder: Path, tmp_path: Path) -> None:
-    """A walk that does not exist is refused with the numbers that do, and nothing is written."""
-    with pytest.raises(
-        InputError, match=r"^index: the sweep has no walk 18; give one of its column index, at most 17$"
-    ):
-        write_report(folder, tmp_path / "report.html", animation_of=18)
-    assert not list(tmp_path.iterdir())
-
-
 # The file
 
 

@@ -57,14 +57,6 @@ def test_an_exception_ends_what_workers_are_doing(monkeypatch: pytest.MonkeyPatc
     assert time.monotonic() - began < 15
 
 
-def test_a_sweep_runs_on_gpu_workers(tmp_path: Path) -> None:
-    """What such workers write are the bytes of one thread; on the CPU here, whatever GPU they were given."""
-    sweep(TINY, tmp_path / "one", workers=1)
-    with gpu_workers(2) as executor:
-        sweep(TINY, tmp_path / "two", executor=executor, workers=2)
-    assert data_of(tmp_path / "two") == data_of(tmp_path / "one")
-
-
 @pytest.mark.skipif(wp.get_cuda_device_count() > 0, reason="there is a GPU")
 @pytest.mark.parametrize("given", (["--device", "cuda"], ["--gpus", "1"], ["--gpus", "99999"]))
 def test_a_missing_gpu_leaves_no_folder(

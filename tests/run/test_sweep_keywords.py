@@ -115,15 +115,6 @@ def test_parameter_sets(tmp_path):
     assert lines[0].startswith("sweep.points.sprocket_radius: 1 values, but floor_friction has 2;")
 
 
-def test_a_sweep_runs_from_keywords(tmp_path, capfd):
-    """It goes on where it was, the preset may be an axis, and nothing is printed without a terminal."""
-    keywords = {"grid": {"preset": ["soft"], "links": range(30, 34, 2)}, "samples": 1, "scene": SHORT}
-    result = warpchain.sweep(**keywords, out=tmp_path / "short")
-    assert (result.name, result.seed, result.shape, result.missing_count) == ("short", 0, (1, 2, 1), 0)
-    assert warpchain.sweep(**keywords, out=tmp_path / "short").provenance == result.provenance
-    assert capfd.readouterr() == ("", "")
-
-
 def test_all_errors_are_told_at_once(tmp_path):
     """One line for each value, with its place in a list, in the order of the keywords."""
     lines = refused(

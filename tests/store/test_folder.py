@@ -13,9 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-import yaml
 
 from tests.support import synthetic_sweep
 from tests.support.stopped_calls import is_stopped
@@ -71,36 +69,6 @@ needs_namespace = pytest.mark.skipif(
 
 
 # Begin, go on, end
-
-
-def test_a_sweep_is_written_and_read(tmp_path: Path) -> None:
-    """All rows come back to the bit; nothing is missing, and nothing else is in the folder."""
-    with open_folder(tmp_path / "new" / "folder") as opened:
-        folder = opened.directory
-        walks = np.concatenate([shard.walks for shard in opened.missing()])
-        assert walks.tolist() == SWEEP.indices.tolist() and {len(shard) for shard in opened.missing()} == {20}
-        assert load(folder).missing_count == 160
-        for shard in reversed(opened.missing()):
-            write(opened, shard, synthetic_rows(SWEEP, shard))
-        assert opened.missing() == []
-        opened.log("ended")
-        dx = np.concatenate([block.dx.ravel() for block in load(folder).blocks.values()])
-        assert dx.tobytes() == np.concatenate([synthetic_rows(SWEEP, shard)["dx"] for shard in SHARDS]).tobytes()
-    assert sorted(os.listdir(folder)) == ["lock", "log.txt", "shards", "sweep.h5", "sweep.yaml"]
-    assert len(os.listdir(folder / "shards")) == 8
-    assert yaml.safe_load((folder / "sweep.yaml").read_text()) == SWEEP.canonical()
-    assert (folder / "log.txt").read_text().endswith("  ended\n")
-
-
-def test_equal_sweeps_leave_equal_files(tmp_path: Path) -> None:
-    """The files have no time, place or chance in them, whatever NaNs and order the rows came with."""
-    run(tmp_path / "one")
-    with open_folder(tmp_path / "two") as opened:
-        for shard in sorted(opened.missing(), key=lambda shard: shard.walks[0] % 7):
-            rows = synthetic_rows(SWEEP, shard)
-            rows["greatest_opening"] = -rows["greatest_opening"]  # the same NaN to a reader, but other bits
-            write(opened, shard, rows)
-    assert content(tmp_path / "one") == content(tmp_path / "two")
 
 
 def test_a_sweep_survives_kills(tmp_path: Path) -> None:

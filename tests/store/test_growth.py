@@ -4,10 +4,10 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import yaml
 
+from tests.run.test_sweep_run import data_of
 from tests.support.made_sweeps import make_sweep
 from tests.support.stopped_calls import is_stopped
 from tests.support.sweep_content import UNIFORM, blocks, content
@@ -43,11 +43,6 @@ def columns(result: SweepResult) -> dict[tuple[str, str], bytes]:
     }
 
 
-def shards(folder: Path) -> dict[str, bytes]:
-    """Name → bytes of all shards."""
-    return {name: data for name, data in files(folder).items() if name.startswith("shards/")}
-
-
 @pytest.mark.parametrize("sampler", EXTENSIBLE)
 def test_a_grown_sweep_is_the_larger_one(tmp_path: Path, sampler: str) -> None:
     """Grown twice, in one block or both, a folder gives the larger sweep to the bit; no shard changes."""
@@ -56,7 +51,7 @@ def test_a_grown_sweep_is_the_larger_one(tmp_path: Path, sampler: str) -> None:
     for counts in ((2, 4), (8, 4), (16, 8)):
         given = two_blocks(*counts, sampler=sampler, **drawn)
         grown = make_sweep(tmp_path / "grown", given, drawn_distance)
-        after = shards(tmp_path / "grown")
+        after = data_of(tmp_path / "grown")
         assert before.items() < after.items()
         before = after
     fresh = make_sweep(tmp_path / "fresh", given, drawn_distance)
@@ -79,22 +74,6 @@ def test_parts_that_grow_stay_parts_of_the_whole(tmp_path: Path) -> None:
     run(tmp_path / "whole", large)
     whole = load(tmp_path / "whole")
     assert whole.missing_count == 0 and columns(load(tmp_path / "all.h5")) == columns(whole)
-
-
-def test_a_sweep_grows_before_it_is_complete(tmp_path: Path) -> None:
-    """Walks that were missing are then run in their old shards; what is there is read meanwhile."""
-    make_sweep(tmp_path / "grown", content(samples=2), lambda walk: drawn_distance(walk) if walk.sample else None)
-    kept = shards(tmp_path / "grown")
-    made = make_sweep(
-        tmp_path / "grown", content(samples=5), lambda walk: drawn_distance(walk) if walk.cell[0] else None
-    )
-    assert kept.items() < shards(tmp_path / "grown").items()
-    expected = np.zeros((2, 2, 5), bool)
-    expected[1] = expected[:, :, 1] = True
-    np.testing.assert_array_equal(made.status == 1, expected)
-    grown = make_sweep(tmp_path / "grown", content(samples=5), drawn_distance)
-    assert columns(grown) == columns(make_sweep(tmp_path / "fresh", content(samples=5), drawn_distance))
-    assert kept.items() < shards(tmp_path / "grown").items()
 
 
 def test_every_step_of_growing_may_be_the_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -155,8 +134,8 @@ def test_a_shard_of_the_larger_sweep_is_foreign_to_the_smaller(tmp_path: Path) -
     run(tmp_path / "small", load_sweep(content(samples=2)))
     for samples in (2, 5):
         run(tmp_path / "large", load_sweep(content(samples=samples)))
-    (name,) = set(shards(tmp_path / "large")) - set(shards(tmp_path / "small"))
-    shutil.copy(tmp_path / "large" / name, tmp_path / "small" / name)
+    (name,) = set(data_of(tmp_path / "large")) - set(data_of(tmp_path / "small"))
+    shutil.copy(tmp_path / "large/shards" / name, tmp_path / "small/shards" / name)
     with pytest.raises(InputError, match=f"{name}: a shard of another sweep; move it out of this folder"):
         load(tmp_path / "small")
 

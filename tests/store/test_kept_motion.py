@@ -3,19 +3,15 @@
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 import pytest
-import xarray
 
 import warpchain
 from tests.run.test_sweep_run import TINY, brief_setup, data_of
-from tests.support.made_walks import assert_same
 from warpchain.engine.batch import CAPACITY_SAMPLES
 from warpchain.inputs.validation import InputError, InputWarning
 from warpchain.reports.sweep_page import write_report
 from warpchain.run.sweep_run import sweep
-from warpchain.store.merged_file import merge
 from warpchain.store.sweep_result import load
 from warpchain.walks.motion import Keep
 from warpchain.walks.scheduler import run_setups
@@ -143,21 +139,6 @@ def test_damage_to_a_motion_is_seen(kept: Path, tmp_path: Path) -> None:
     with pytest.warns(InputWarning, match=f"{path}: .*; its walks are computed again"):
         sweep(KEPT, tmp_path)
     assert data_of(tmp_path) == data_of(kept)
-
-
-def test_a_merged_file_has_the_motions(kept: Path, tmp_path: Path) -> None:
-    """Walks of a merged file are those of the folder, and every array has its unit; merging again gives equal bytes."""
-    for name in ("one.h5", "two.h5"):
-        merge(kept, tmp_path / name)
-    assert (tmp_path / "one.h5").read_bytes() == (tmp_path / "two.h5").read_bytes()
-    folder, merged = load(kept), load(tmp_path / "one.h5")
-    for links, frequency, sample in ((30, 5, 0), (44, 15, 3)):
-        one, other = (result.series(links=links, frequency=frequency, sample=sample) for result in (folder, merged))
-        assert_same(one, other)
-    with h5py.File(tmp_path / "one.h5") as file:
-        assert file["motion/0/series/center_velocity"].attrs["unit"] == "m/s"
-    with xarray.open_dataset(tmp_path / "one.h5", engine="h5netcdf") as data:
-        assert data.dx.shape == (2, 2, 5)
 
 
 def test_report_and_pictures_use_kept_frames(kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

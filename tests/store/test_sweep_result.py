@@ -16,8 +16,7 @@ from warpchain.store.folder import SweepFolder
 from warpchain.store.manifest import Manifest
 from warpchain.store.merged_file import merge
 from warpchain.store.sweep_result import load
-from warpchain.sweeps.plan import load_sweep
-from warpchain.walks.rows import COLUMNS, STORED_COLUMNS, drawn_column, missing_rows
+from warpchain.walks.rows import COLUMNS, STORED_COLUMNS, drawn_column
 from warpchain.walks.walk_result import load_walk
 
 SINGLE = synthetic_sweep(
@@ -68,48 +67,6 @@ def test_arrays_have_named_axes(folder: Path) -> None:
     assert set(rest.columns) == {*COLUMNS, "phase_drawn", "floor_friction_drawn", "clearance_drawn"}
     assert set(ellipse.columns) == {*COLUMNS, "phase_drawn", "link_length_drawn"}
     assert result.walk_count == 160 and result.missing_count == 0
-
-
-def test_the_layout_is_that_of_the_sweep(tmp_path: Path) -> None:
-    """A real sweep's walks are found where they were planned, and its copy in the folder is the same sweep."""
-    grid = {"preset": ["soft", "paper"], "method": ["dp5", "bs32"], "self_contact": [True, False]}
-    blocks = [
-        {"name": "rest", "samples": 2, "grid": {"links": [60, 90], "frequency": [5, 10, 15]}},
-        {
-            "name": "methods",
-            "samples": 1,
-            "scene": {"start": "ellipse"},
-            "distributions": {"all": "fixed"},
-            "grid": grid,
-        },
-    ]
-    sweep = load_sweep({"version": 1, "name": "real", "seed": 3, "preset": "soft", "blocks": blocks})
-    with SweepFolder.open(tmp_path, sweep, shard_size=5) as store:
-        for shard in store.missing():
-            rows = missing_rows(shard.kind, shard.keys)
-            rows["status"] = Status.TIME_LIMIT
-            for row, index in zip(rows, shard.walks.tolist(), strict=True):
-                for name, value in sweep.planned(index).drawn.items():
-                    row[drawn_column(name)] = value
-            write(store, shard, rows)
-    result = load(tmp_path)
-    for index in sweep.indices.tolist():
-        walk = sweep.planned(index)
-        block = result.blocks[sweep.blocks[walk.block].name]
-        place = (*walk.cell, walk.sample)
-        assert block.index[place] == index
-        assert {name: block.columns[f"{name}_drawn"][place] for name in block.drawn} == walk.drawn
-        fields = {"preset": walk.setup.preset}
-        for part in (walk.setup.parameters, walk.setup.scene, walk.setup.options):
-            fields |= part.model_dump()
-        assert [fields[name] for name in block.axes] == [
-            values[at] for values, at in zip(block.axes.values(), walk.cell, strict=True)
-        ]
-        assert all(block.unit(name) and block.meaning(name) for name in (*block.columns, *block.dims))
-    assert load_sweep(tmp_path / "sweep.yaml").digest() == sweep.digest() == result.provenance["digest"]
-    merge(tmp_path, tmp_path / "merged.h5")
-    with xarray.open_dataset(tmp_path / "merged.h5", engine="h5netcdf", group="methods") as data:
-        assert data.preset.values.tolist() == ["soft", "paper"]
 
 
 def test_missing_walks_are_counted(single: Path) -> None:

@@ -84,12 +84,7 @@ def hold(
 
 
 def bottom_curvature(joints: Array, reach: int = 3) -> float:
-    """Mean curvature [1/m] at the lowest joint: the turn from the chord before it to that behind it, by their length.
-
-    Args:
-        joints: (f, n, 2) [m].
-        reach: Links of a chord.
-    """
+    """Mean curvature [1/m] at the lowest joint: the turn from the chord before to that behind, by their length."""
     turns = []
     for frame in joints:
         lowest = int(np.argmin(frame[:, 1]))

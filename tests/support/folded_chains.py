@@ -17,12 +17,9 @@ def chain_of_angles(angle: Array, link_length: float) -> Array:
 
 
 def folded_angles(n: int, generator: np.random.Generator, tilt: float = np.pi) -> Array:
-    """Angles (n,) of a closed chain that is folded at random: each angle occurs with its opposite.
+    """Angles (n,) of a closed chain of an even number of links, folded at random: each occurs with its opposite.
 
-    Args:
-        n: number of links, even.
-        generator: random numbers.
-        tilt: greatest angle of a link against the horizontal, in rad; a small one makes a flat pile.
+    No link stands steeper than `tilt` [rad]; a small one makes a flat pile.
     """
     half = generator.uniform(-tilt, tilt, n // 2)
     return generator.permutation(np.concatenate([half, half + np.pi]))
@@ -31,18 +28,10 @@ def folded_angles(n: int, generator: np.random.Generator, tilt: float = np.pi) -
 def folded_chain(
     n: int, seed: int, link_length: float, *, tilt: float = np.pi, opening: float = 2e-4
 ) -> tuple[Array, Array]:
-    """A chain that is folded at random and moves at random.
+    """A chain that is folded at random, see `folded_angles`, and moves at random: position and velocity (n, 3).
 
-    Args:
-        n: number of links, even.
-        seed: of the random numbers.
-        link_length: in m.
-        tilt: see `folded_angles`.
-        opening: standard deviation of the links' displacements in x and in y, in m.
-
-    Returns:
-        position (n, 3), centred on the origin, so that a floor at y = 0 and a sprocket about it cut the chain;
-        velocity (n, 3): speeds of about 1 m/s.
+    It is centred on the origin, so that a floor at y = 0 and a sprocket about it cut it, and moves at about 1 m/s.
+    Links are displaced by `opening` [m] in x and in y, standard deviations.
     """
     generator = np.random.default_rng(seed)
     position = chain_of_angles(folded_angles(n, generator, tilt), link_length)

@@ -88,8 +88,6 @@ HAND_CASES: dict[str, tuple[Collision, Vector]] = {
     # J^(a) = [12, 6] needs μ ≥ 1/2. μ = 1/4: κ = (1/4)·12/6 = 1/2, J = [12, 3].
     "ball slides": (BALL, (-3.0, 12.0)),
     "ball sticks": (replace(BALL, friction=1.0), (-6.0, 12.0)),
-    # J_t = (1 + e_t)·6 = 9 ≤ 12.
-    "ball returns half its slip": (replace(BALL, friction=1.0, tangential_restitution=0.5), (-9.0, 12.0)),
     # J^(a) = 3/2 n̂ + D = [2, 1].
     "corner sticks, plastic": (CORNER, (-1.0, 2.0)),
     # μ = 1/4: κ = (1/4)(3/2)/(1 − (1/4)(1/2)) = 3/7, J = [3/2 + 3/14, 3/7] = [12/7, 3/7].
@@ -98,12 +96,8 @@ HAND_CASES: dict[str, tuple[Collision, Vector]] = {
     "pair sticks": (PAIR, (4.0, 3.0)),
     # μ = 1/2 < 3/4: κ = (1/2)·3/(3 − 1/2) = 3/5, J = [3.6, 1.8].
     "pair slides": (replace(PAIR, friction=0.5), (3.6, 1.8)),
-    # e_t = −1/2: J^(a) = [3.5, 1.5], within μ = 1/2.
-    "pair keeps half its slip": (replace(PAIR, friction=0.5, tangential_restitution=-0.5), (3.5, 1.5)),
     # e_t = 1: J^(a) = [5, 6] is beyond μ = 1: κ = 3/(3 − 1) = 3/2, J = [4.5, 4.5].
     "pair returns its slip": (replace(PAIR, tangential_restitution=1.0), (4.5, 4.5)),
-    # 0.6·3.6 − 0.8·1.8 = 0.72, 0.8·3.6 + 0.6·1.8 = 3.96.
-    "turned pair slides": (replace(PAIR_TURNED, friction=0.5), (0.72, 3.96)),
     "turned pair sticks": (PAIR_TURNED, (0.0, 5.0)),
     # A of 1/2 kg hits an immovable B with 3 m/s: J₁ = 3·(1/2).
     "wall is B": (

@@ -15,7 +15,7 @@ from warpchain.kernels.contacts.fixed_body import moved_sprocket
 from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.types import Drive
 
-SPUN: dict[str, Any] = {"links": 36, "frequency": 20.0, "start": "spinning", "preset": "soft", "method": "dp5"}
+SPUN: dict[str, Any] = {"links": 36, "frequency": 20.0, "start": "spinning", "preset": "soft", "method": "os32"}
 MOTION = ((0.02, 0.0, -0.01, 20.0), (0.05, 0.1, -0.01, 5.0), (0.06, 0.1, 0.02, 0.0))
 
 

@@ -12,7 +12,6 @@ from warpchain import InputError, Status, preset
 from warpchain.inputs.link_values import alternating
 from warpchain.inputs.scene import link_values
 from warpchain.pictures.chain import circle_radii, link_outlines
-from warpchain.sweeps.plan import load_sweep
 
 SOFT = preset("soft")
 BRIEF = {"preset": "soft", "method": "explicit", "links": 36, "frequency": 15.0}
@@ -127,24 +126,3 @@ def test_what_makes_no_chain_is_refused(settings: dict[str, Any], message: str) 
     with pytest.raises(InputError) as caught:
         setup_walk("paper", settings, None)
     assert str(caught.value).startswith(message) and "\n" not in str(caught.value)
-
-
-def test_a_sweep_has_charms_as_an_axis_and_draws_them() -> None:
-    """The mass is an axis with a range, the rest is fixed or drawn, and the resolved sweep says so."""
-    content = {"version": 1, "name": "charm", "seed": 1, "samples": 2, "preset": "soft", "scene": {"charm_link": 7}}
-    grid = {"charm_mass": {"from": 0, "to": 0.1, "step": 0.05}}
-    sweep = load_sweep({**content, "grid": grid, "distributions": {"mass_gradient": {"uniform": [-0.1, 0.1]}}})
-    setups = [sweep.planned(index).setup for index in range(6)]
-    assert [setup.scene.charm_mass for setup in setups] == [0, 0.05, 0.1, 0, 0.05, 0.1]
-    assert len({setup.scene.mass_gradient for setup in setups}) == 6
-    assert sweep.canonical()["blocks"][0]["scene"]["charm_link"] == 7
-    with pytest.raises(InputError, match=r"^sweep\.grid\.link_masses: no names; give each value one"):
-        load_sweep({**content, "grid": {"link_masses": [[1.0] * 60]}})
-
-
-def test_sweeps_that_say_nothing_of_links_keep_their_digests() -> None:
-    """Fields that have their defaults are left out, so that results made before the fields go on."""
-    content = {"version": 1, "name": "old", "seed": 1, "samples": 2, "preset": "soft"}
-    plain, said = load_sweep(content), load_sweep({**content, "scene": {"charm_mass": 0.0, "link_masses": None}})
-    assert plain.digest() == said.digest() != load_sweep({**content, "scene": {"charm_mass": 0.01}}).digest()
-    assert load_sweep(plain.canonical()).digest() == plain.digest()

@@ -1,7 +1,5 @@
 """Results of walks: what they hold, and the file that keeps them."""
 
-import json
-import math
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -23,23 +21,6 @@ def test_status_says_what_to_try() -> None:
     for status in Status:
         assert re.fullmatch(r"[A-Z][^\n]*\.", status.sentence), status
         assert ("; " in status.sentence) == (not status.ok), status
-
-
-# The record itself
-
-
-def test_to_dict_is_json() -> None:
-    """The dictionary is strict JSON, with None for what is not finite, and comes back equal."""
-    walk = make_walk(dx=math.nan, greatest_opening=math.inf)
-    described = walk.to_dict()
-    assert json.loads(json.dumps(described, allow_nan=False)) == described
-    assert described["dx"] is None and described["greatest_opening"] is None
-    assert described["status"] == "at_rest" and described["status_sentence"] == Status.AT_REST.sentence
-    assert described["seed"] == 2**100 + 1 and described["preset"] == "soft"
-    assert described["parameters"]["floor_friction"] == 0.3 and described["options"]["method"] == "dp5"
-    assert described["scene"]["links"] == 30 and described["impulses"]["self"] == 11
-    assert {"walk_time", "simulated_time", "wall_time", "bounces", "steps_accepted", "steps_rejected"} < set(described)
-    assert not {"time", "center", "frame_joints"} & set(described)
 
 
 # The file

@@ -8,7 +8,7 @@ import warpchain
 from tests.hard_cases.starts import dropped
 from tests.oracle_model import motion_equations, terrain
 from tests.support.folded_chains import folded_chain
-from tests.support.kernels_under_test import FLOOR, TERRAIN, ContactPass, Placed
+from tests.support.kernels_under_test import TERRAIN, ContactPass, Placed
 from warpchain.inputs.floor import distances
 from warpchain.inputs.parameters import preset
 
@@ -94,21 +94,6 @@ def test_a_level_slope_is_the_flat_floor_to_the_bit():
     assert level.impulses == flat.impulses and level.steps_accepted == flat.steps_accepted
     assert_array_equal(level.position, flat.position)
     assert_array_equal(level.velocity, flat.velocity)
-
-
-def test_a_level_profile_is_the_flat_floor():
-    """On level faces a pass over chains leaves the velocities and counts of one on the flat floor, but for rounding."""
-    heaps = []
-    for seed in range(10):
-        position, velocity = folded_chain(20, seed, PAPER.link_length)
-        position[:, 1] -= np.concatenate(motion_equations.link_ends(position, PAPER))[:, 1].min() - 1e-4
-        heaps.append(Placed(position, velocity, PAPER))
-    ours, theirs, hits = ContactPass(heaps), ContactPass(heaps), 0
-    for world, (here, there) in enumerate(zip(ours.run(TERRAIN), theirs.run(FLOOR), strict=True)):
-        assert here["terrain"] == there["floor"]
-        assert_allclose(ours.velocity(world), theirs.velocity(world), rtol=1e-11)
-        hits += here["terrain"]
-    assert hits > 10
 
 
 def lying_chain(degrees, speed):

@@ -18,12 +18,10 @@ from warpchain.engine.batch import Batch
 from warpchain.inputs.link_values import LinkValues, alternating
 from warpchain.inputs.options import Options
 from warpchain.inputs.start_shapes import ellipse, lay_chain
-from warpchain.kernels import layout
 
 Array = NDArray[np.float64]
 
 PAPER, SOFT = preset("paper"), preset("soft")
-FRICTIONLESS = {"joint_damping": 0.0, "viscous_friction": 0.0, "coulomb_friction": 0.0}
 
 
 def fly(chain: UnlikeLinks, start: tuple[Array, Array], duration: float, fixed_body: str, **options: Any) -> Batch:
@@ -74,9 +72,10 @@ def test_collisions_keep_momentum_and_the_ledger_of_energy(method: str) -> None:
     """A chain folded into itself keeps its momentum but for gravity, to 1e-12, and books what it loses, to 1e-3."""
     chain = unlike_links(60, SOFT)
     position, velocity = folded_chain(60, 3, SOFT.link_length, tilt=0.3, opening=0.0)
+    position += [0.0, 1.0, 0.0]
     velocity += [1.0, 0.5, 0.0]
-    batch = fly(chain, (position, velocity), 2e-2, "none", method=method, tolerance=1e-5)
-    assert batch.counts(0)["self"] > 100
+    batch = fly(chain, (position, velocity), 2e-2, "floor", method=method, tolerance=1e-5)
+    assert batch.counts(0)["self"] > 100 and batch.counts(0)["floor"] == 0
     gained = motion_equations.linear_momentum(batch.velocity(0), chain) - motion_equations.linear_momentum(
         velocity, chain
     )
@@ -85,18 +84,6 @@ def test_collisions_keep_momentum_and_the_ledger_of_energy(method: str) -> None:
     before = motion_equations.total_energy(position, velocity, chain)
     after = motion_equations.total_energy(batch.position(0), batch.velocity(0), chain)
     assert before - after == pytest.approx(sum(batch.losses(0).values()), rel=1e-3)
-
-
-def test_free_flight_keeps_energy_and_angular_momentum() -> None:
-    """Without friction, damping and gravity both stay, to 1e-8 and 1e-10."""
-    chain = unlike_links(14, SOFT.with_values({**FRICTIONLESS, "gravity": 0.0}))
-    position, velocity = lay_chain(ellipse(1.5), 14, SOFT.link_length, 2.0, 0.1)
-    batch = fly(chain, (position, velocity), 5e-3, "none", method="rkf78", tolerance=1e-11)
-    end = batch.position(0), batch.velocity(0)
-    energies = [motion_equations.total_energy(*state, chain) for state in ((position, velocity), end)]
-    spins = [motion_equations.angular_momentum(*state, chain) for state in ((position, velocity), end)]
-    assert energies[1] == pytest.approx(energies[0], rel=1e-8)
-    assert spins[1] == pytest.approx(spins[0], rel=1e-10)
 
 
 # --- impulses ---
@@ -174,7 +161,7 @@ def test_unlike_circles_on_the_floor_and_against_one_another_part_by_the_formula
 
 
 def test_a_stationary_loop_of_unlike_inertias_stays_as_it_is_under_load() -> None:
-    """Every third link has 1.6 times the inertia, others 0.7: 15 times the loads leave height, width and place."""
+    """Every third link has 1.6 times the inertia, others 0.7: 15 times the loads leave its shape and its place."""
     loop_on_sprocket = released_loop(links=60, frequency=20.0, start="spinning")
     usual = alternating(SOFT, 60)
     own = LinkValues(
@@ -184,25 +171,6 @@ def test_a_stationary_loop_of_unlike_inertias_stays_as_it_is_under_load() -> Non
         hold(loop_on_sprocket, SOFT, duration, load_factor=factor, own=own)
         for duration, factor in ((0.5, 1.0), (1.0, 15.0))
     )
-    height, width = free[[0, 1]]
-    change = np.abs(loaded - free)[:4] / [height, width, width, height]
-    assert np.all(change < [0.002, 0.005, 0.003, 0.002]), change
-
-
-def test_loads_multiply_what_each_link_has() -> None:
-    """I − mℓ²/6 of each link and β, τ_c of each joint are multiplied, masses are not."""
-    factor, links = 7.0, 8
-    chain = unlike_links(links, SOFT)
-    batch = Batch(1, links, Options(method="dp5"))
-    batch.set_chain(0, SOFT, links, own=chain.own)
-    position, velocity = lay_chain(ellipse(1.2), links, SOFT.link_length)
-    batch.load(0, position, velocity, stop_time=1e-5, stop_status=Status.FINISHED)
-    batch.state.load_factor.numpy()[0] = factor
-    batch.launch([0], batch.features(fixed_body="none"), 1)
-    rows = batch.scratch.numpy()[0, :, :links]
-    shift = chain.masses * SOFT.link_length**2 / 6
-    assert_allclose(rows[layout.MASS], chain.masses, rtol=0)
-    assert_allclose(rows[layout.INERTIA], shift + factor * (chain.inertias - shift), rtol=1e-12)
-    assert_allclose(rows[layout.INVERSE_INERTIA] * rows[layout.INERTIA], 1.0, rtol=1e-15)
-    assert_allclose(rows[layout.VISCOUS], factor * chain.viscous_friction, rtol=1e-15)
-    assert_allclose(rows[layout.COULOMB], factor * chain.coulomb_friction, rtol=1e-15)
+    height, width, curvature = free[[0, 1, 4]]
+    change = np.abs(loaded - free) / [height, width, width, height, curvature]
+    assert np.all(change < [0.002, 0.005, 0.003, 0.002, 0.01]), change
