@@ -13,7 +13,7 @@ from studies.stationary_loop import run, starts
 from studies.stationary_loop.balances import imbalances
 from studies.stationary_loop.catenary import catenary_between
 from studies.stationary_loop.kinks import draw_kinks
-from studies.stationary_loop.theory import End, predict, solve
+from studies.stationary_loop.theory import End, LoopParameters, predict, solve
 
 
 @cache
@@ -31,7 +31,7 @@ def held_walk() -> warpchain.WalkResult:
 
 def test_theory_without_friction_and_inertia_is_the_catenary() -> None:
     """The boundary value problem's solution is the closed form's to 1e-6 of its length, from a poor guess."""
-    parameters = held_walk().mean_loop().parameters
+    parameters = LoopParameters.of(held_walk().mean_loop())
     bare = dataclasses.replace(parameters, inertia=0.0, viscous_friction=0.0, coulomb_friction=0.0)
     weight = bare.density * bare.gravity
     ends = End(0.06, 0.01, -1.3, 0.0), End(-0.055, 0.0, 1.3, 0.0)

@@ -31,7 +31,7 @@ BOUNCE: Final = ("start", "end", "impulse_x", "impulse_y", "sticks_at")
 """Columns of a table of bounces."""
 
 
-def at_release(sample: Array, _radius: float = 0.0) -> dict[str, Any]:
+def at_release(sample: Array) -> dict[str, Any]:
     """Fields of a `WalkResult` out of the first sample of a walk."""
     columns = [layout.CENTER_X, layout.CENTER_Y, layout.WIDTH, layout.HEIGHT, layout.LOWEST]
     release = dict(zip(RELEASE, sample[columns].tolist(), strict=True))

@@ -23,7 +23,6 @@ from warpchain.engine.tallies import COUNTS, DEPTHS, EXTREMES, IMPULSES, LOST
 from warpchain.files import write_whole
 from warpchain.hdf5_files import (
     Stored,
-    check_fields,
     hdf5_image,
     put,
     read_fields,
@@ -81,10 +80,6 @@ class WalkResult:
     impact a row of a velocity or an energy lies between the values before and after. Frames are at the ends of steps.
     `setup` is complete; `seed` is that of the random draw, None if nothing was drawn; `versions` names the software.
     `before_release` is the motion on the sprocket just before the release, None if it was not kept.
-
-    Raises:
-        ValueError: an array has another shape, or a dictionary other keys, than stands beside its field; or times do
-            not ascend.
     """
 
     status: Status
@@ -201,15 +196,6 @@ class WalkResult:
         if self.setup.scene.plane == "fixed":
             return None
         return in_room(self.frame_joints, self.frame_origin, self.frame_axes)
-
-    def __post_init__(self) -> None:
-        """Check that arrays and dictionaries fit together."""
-        check_fields(self, self.setup.scene.links)
-        moving = self.setup.scene.plane == "tilting"
-        if moving != bool(len(self.tilt)) and len(self.time):
-            raise ValueError(f"tilt: it has {len(self.tilt)} instants; give those of a plane that tilts, and no others")
-        if (loads := np.shape(self.frame_forces)[:2]) != (moments := np.shape(self.frame_moments)):
-            raise ValueError(f"frame_moments: its shape is {moments}; give an array of shape {loads}, as of the forces")
 
     def __repr__(self) -> str:
         """One line with the most important numbers."""
