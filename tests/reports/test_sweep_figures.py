@@ -148,11 +148,12 @@ def test_status_counts(flawed6: SweepResult) -> None:
 def test_figures_are_those_that_a_sweep_has_something_for(
     tmp_path: Path, sweep6: SweepResult, saltelli: SweepResult, flawed6: SweepResult
 ) -> None:
-    """Each kind of sweep gives its own figures, all of which can be drawn; counts only if walks ended differently."""
+    """Each kind of sweep gives its own figures, all of which can be drawn; counts only if a walk is not at rest."""
     for result, names in (
         (sweep6, ["distance"]),
         (saltelli, ["distance", "sensitivity"]),
         (flawed6, ["distance", "status_counts"]),
+        (make_sweep(tmp_path / "failed", SMALL, lambda walk: Status.TIME_LIMIT), ["status_counts"]),
     ):
         pictures = list(figures(result))
         assert [picture.name for picture in pictures] == names
