@@ -8,24 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.support import command_line
+from tests.run.test_sweep_run import TINY
 from tests.support.command_line import Answer, Command
 from tests.support.made_sweeps import TOLERANCE, make_sweep
 from tests.support.made_walks import make_walk
-
-command = command_line.command
-
-QUICK = "--links 32 --preset soft --method dp5 --start ellipse --frequency 5".split()
-SWEEP = """\
-version: 1
-name: some
-seed: 1
-preset: soft
-samples: 2
-scene: {links: 32, start: ellipse, walk_limit: 0.001}
-options: {method: dp5}
-grid: {frequency: [5, 6]}
-"""
 
 OUTPUTS = {
     "report swept -o {}": "page.html",
@@ -94,7 +80,7 @@ def test_a_full_disk_gives_one_line(command: Command, line: str) -> None:
 
 def test_a_sweep_goes_on_after_a_full_disk(command: Command) -> None:
     """A shard that has no room: status 1, one line, no part; then the same bytes as without."""
-    Path("some.yaml").write_text(SWEEP, encoding="utf-8")
+    Path("some.yaml").write_text(str(TINY | {"samples": 2}), encoding="utf-8")
     expected = command("sweep", "some.yaml", "-o", "whole")
     assert expected.status == 1, "the time limit of the walks"
     command("sweep", "some.yaml", "-o", "results")

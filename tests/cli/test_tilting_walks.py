@@ -7,11 +7,8 @@ import numpy as np
 import pytest
 
 import warpchain
-from tests.support import command_line
 from tests.support.command_line import Command
 from warpchain.status import Status
-
-command = command_line.command
 
 SHORT = ["--links", "20", "--preset", "soft", "--start", "ellipse", "--frequency", "8", "--method", "explicit"]
 TAPPED = ["--set", "plane=tilting", "--set", "tilt=0.3"]

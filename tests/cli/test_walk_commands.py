@@ -6,14 +6,11 @@ from pathlib import Path
 import pytest
 
 import warpchain
-from tests.support import command_line
 from tests.support.command_line import Command
 from tests.support.made_walks import assert_same
 from warpchain.inputs.options import Options
 from warpchain.inputs.validation import InputError
 from warpchain.walks.walk_result import WalkResult
-
-command = command_line.command
 
 TINY = {
     "links": 20,

@@ -5,7 +5,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tests.oracle_model import motion_equations
-from tests.oracle_model.circular_loop import circular_loop
 from warpchain import preset
 from warpchain.inputs.start_shapes import ellipse, lay_chain, stadium
 
@@ -94,25 +93,9 @@ def test_ellipse_has_its_aspect(aspect):
         assert_allclose(size, size[0], rtol=1e-12)
 
 
-def test_circle_is_the_regular_polygon():
-    """An ellipse of aspect 1 is the regular polygon of the closed form, turning at its rate."""
-    links, speed = 20, 2.0
-    position, velocity = lay_chain(ellipse(1.0), links, LENGTH, speed)
-    polygon, turning = circular_loop(links, PAPER, -speed)
-    assert_allclose(np.hypot(*position[:, :2].T), np.hypot(*polygon[:, :2].T), rtol=1e-12)
-    assert_allclose(velocity[:, 2], turning[:, 2], rtol=1e-10)
-
-
 def test_phase_is_a_fraction_of_the_turn():
     """At phase 0 the first joint is at the top, at 1/2 at the bottom, and at 1 the chain lies as at 0."""
     first, half, turn = (joints(lay_chain(stadium(RADIUS), 60, LENGTH, phase=phase)[0]) for phase in (0.0, 0.5, 1.0))
     assert_allclose(first[0], [0.0, RADIUS], atol=1e-12)
     assert_allclose(half[0], [0.0, first[:, 1].min()], atol=1e-12)
     assert_allclose(turn, first, atol=1e-12)
-
-
-@pytest.mark.parametrize("links", [4, 16, 28])
-def test_chain_too_short_for_its_sprocket_is_refused(links):
-    """A chain that does not reach round the half circles is an error that says so, never a chain that is not closed."""
-    with pytest.raises(ValueError, match=f"a closed chain of {links} links of {LENGTH} m does not fit this curve"):
-        lay_chain(stadium(RADIUS), links, LENGTH)

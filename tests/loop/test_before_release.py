@@ -49,15 +49,6 @@ def test_they_end_with_the_release() -> None:
     assert repr(before) == f"<BeforeRelease: {kept}>"
 
 
-def test_impossible_times_are_refused() -> None:
-    """Negative, endless and no times, and a time without frames, each with the remedy."""
-    for wrong in (-0.1, float("inf"), float("nan"), True, "long"):
-        with pytest.raises(InputError, match=r"record_before: Input should be .*; given"):
-            warpchain.walk(**BRIEF, record_before=wrong)  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="frame_interval is None; give a frame_interval"):
-        warpchain.walk(**BRIEF, record_before=0.1, frame_interval=None)
-
-
 def test_a_sweep_keeps_them(tmp_path: Path) -> None:
     """Of the samples that the file names, those of the walk itself in single precision; their kinks are drawn."""
     content = {

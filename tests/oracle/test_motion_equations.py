@@ -6,8 +6,7 @@ from numpy.testing import assert_allclose
 
 from tests.oracle_model import motion_equations
 from tests.oracle_model.circular_loop import circular_loop
-from tests.support.impulse_cases import UNIT
-from tests.support.mild_parameters import MILD
+from tests.support.mild_parameters import MILD, UNIT
 from warpchain.inputs.parameters import Parameters, preset
 
 PAPER = preset("paper")

@@ -1,8 +1,6 @@
 """Figures of walks."""
 
-import itertools
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,16 +16,6 @@ from warpchain.pictures.walk_shape import kinds_of
 from warpchain.status import Status
 
 RADIUS = 4.2e-3
-
-
-def assert_nothing_overlaps(figure: Figure, path: Path) -> None:
-    """Nothing is cut off at the edge of the paper, or runs into another panel or the legend."""
-    figure.savefig(path, dpi=50)
-    boxes = [box for axes in figure.axes if (box := axes.get_tightbbox()) is not None]
-    boxes += [legend.get_window_extent() for legend in figure.legends]
-    for box in boxes:
-        assert box.x0 >= 0 and box.y0 >= 0 and box.x1 <= figure.bbox.x1 and box.y1 <= figure.bbox.y1
-    assert not any(one.overlaps(other) for one, other in itertools.combinations(boxes, 2))
 
 
 def scales(axes: Any) -> list[float]:
@@ -104,7 +92,7 @@ def test_tilt_figure_draws_the_series_in_degrees() -> None:
 # Film strips
 
 
-def test_film_strip_shows_the_walk(tmp_path: Path) -> None:
+def test_film_strip_shows_the_walk() -> None:
     """The strip holds chains to scale, the path of their centre and the distance; close-ups are of what happens."""
     walk = make_walk(collapsed_at=0.55, self_contact_at=0.66)
     figure = film_strip(walk)
@@ -119,7 +107,6 @@ def test_film_strip_shows_the_walk(tmp_path: Path) -> None:
     np.testing.assert_allclose(outlines, [*expected[0::2], *expected[1::2]], atol=1e-12)
     titles = [axes.get_title("left").split(",")[0] for axes in close_ups]
     assert titles == ["first touch", "collapse", "first self-contact", "rest"]
-    assert_nothing_overlaps(figure, tmp_path / "strip.png")
     for axes in (strip, *close_ups):
         across, up = scales(axes)
         assert across == pytest.approx(up, rel=1e-6)
@@ -135,7 +122,7 @@ def test_film_strips_of_odd_walks() -> None:
         film_strip(make(**{name: getattr(walk, name)[:1] for name in names})).draw_without_rendering()
 
 
-def test_film_strip_shows_two_sides_of_a_plane_that_tilts(tmp_path: Path) -> None:
+def test_film_strip_shows_two_sides_of_a_plane_that_tilts() -> None:
     """Two views of the same instants, to one scale."""
     walk = make_tilting_walk()
     joints = walk.joints_in_room
@@ -151,15 +138,4 @@ def test_film_strip_shows_two_sides_of_a_plane_that_tilts(tmp_path: Path) -> Non
             np.testing.assert_allclose(corners.min(axis=0), drawn.min(axis=0) - RADIUS, atol=0.1 * RADIUS)
             np.testing.assert_allclose(corners.max(axis=0), drawn.max(axis=0) + RADIUS, atol=0.1 * RADIUS)
     assert above.yaxis_inverted() and not side.xaxis_inverted()
-    assert_nothing_overlaps(figure, tmp_path / "strip.png")
     np.testing.assert_allclose([scales(axes) for axes in (side, above)], scales(side)[0], rtol=1e-6)
-
-
-@pytest.mark.parametrize("stretch", [0.05, 8.0])
-def test_film_strips_of_short_and_long_walks_fit(stretch: float, tmp_path: Path) -> None:
-    """Labels do not run into another view, however far the chain walked."""
-    walk = make_tilting_walk()
-    far = stretch * 0.6 * np.sin(walk.frame_time)[:, None] * np.array([1.0, 0.0, 0.0])
-    center = walk.center + stretch * 0.6 * np.sin(walk.time)[:, None] * np.array([1.0, 0.0])
-    figure = film_strip(make_tilting_walk(frame_origin=walk.frame_origin + far, center=center))
-    assert_nothing_overlaps(figure, tmp_path / "strip.png")

@@ -8,8 +8,8 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from tests.support.command_line import Command
 from tests.support.made_sweeps import distance, make_sweep
-from warpchain.cli.main import main
 from warpchain.inputs.validation import InputError
 from warpchain.pictures.grid_figure import MOST_PANELS
 from warpchain.pictures.style import NothingToShow
@@ -159,7 +159,7 @@ def test_blocks_are_panels(tmp_path: Path) -> None:
     assert drawn["rest"].lines[1].get_color() == drawn["spinning"].lines[0].get_color()
 
 
-def test_any_column_of_numbers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_any_column_of_numbers(tmp_path: Path, command: Command) -> None:
     """Columns are drawn in their units; what is drawn has its symbol; the command names its figure by the column."""
     content = sweep({"gravity": GRAVITY}, distributions={"all": "fixed", "floor_friction": "table"})
     result = make_sweep(tmp_path, content)
@@ -175,9 +175,7 @@ def test_any_column_of_numbers(tmp_path: Path, capsys: pytest.CaptureFixture[str
     for name in ("status", "index", "gravity", "walk_tim"):
         with pytest.raises(InputError, match=rf"^quantity: '{name}' is no column of numbers; "):
             result.plot(quantity=name)
-    with pytest.raises(SystemExit):
-        main(["plot", str(tmp_path), "-o", str(tmp_path / "drawn"), "--quantity", "walk_time"])
-    assert [Path(path).name for path in capsys.readouterr().out.split()] == ["walk_time_against_gravity.png"]
+    assert command("plot", ".", "-o", "drawn", "--quantity", "walk_time").out == "drawn/walk_time_against_gravity.png\n"
 
 
 def test_a_figure_may_be_given(tmp_path: Path) -> None:
@@ -189,7 +187,7 @@ def test_a_figure_may_be_given(tmp_path: Path) -> None:
     assert len(lines(axes)) == 3 and legend_texts(right)[0] == "$g$ / m/s²"
 
 
-def test_what_a_walk_does_not_have_is_in_no_mean(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_a_walk_does_not_have_is_in_no_mean(tmp_path: Path, command: Command) -> None:
     """−1 and NaN of walks without a quantity are not averaged; figures say how many have none."""
 
     def columns(walk: PlannedWalk) -> dict[str, float]:
@@ -211,9 +209,8 @@ def test_what_a_walk_does_not_have_is_in_no_mean(tmp_path: Path, capsys: pytest.
     assert result.statistics().count.tolist() == [3, 2, 3, 3] and not result.statistics().absent.any()
     with pytest.raises(NothingToShow, match="no walk has this quantity; give another"):
         result.plot(quantity="hold_time")
-    with pytest.raises(SystemExit, match="2"):
-        main(["plot", str(tmp_path), "--quantity", "hold_time"])
-    assert capsys.readouterr().err.startswith("error: --quantity: hold_time: no walk at rest has a value")
+    answer = command("plot", ".", "--quantity", "hold_time")
+    assert answer.status == 2 and answer.err.startswith("error: --quantity: hold_time: no walk at rest has a value")
 
 
 # All figures of a sweep

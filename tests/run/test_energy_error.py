@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.support.command_line import Command
 from tests.support.made_walks import make_unreleased, make_walk
-from warpchain.cli.main import main
 from warpchain.cli.terminal import print_walk
 from warpchain.engine.tallies import CONTACTS
 from warpchain.inputs.scene import link_values
@@ -91,7 +91,7 @@ def test_the_smallest_circle_tells_what_sank_in(circles: dict[str, Any], drawn: 
         assert faults_of_columns(columns, lengths)["penetration"].item() == sank
 
 
-def test_a_sweep_counts_inaccurate_walks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_sweep_counts_inaccurate_walks(tmp_path: Path, command: Command) -> None:
     """Column, progress, log, `info` and report tell of the walk with a coarse tolerance, and of no other."""
     seen: list[SweepProgress] = []
     result = sweep(**COARSE, out=tmp_path / "sweep", workers=1, on_progress=seen.append)
@@ -100,12 +100,9 @@ def test_a_sweep_counts_inaccurate_walks(tmp_path: Path, capsys: pytest.CaptureF
     assert result.energy_error[0, 0] > 0.05 > 1e-3 > result.energy_error[1, 0]
     assert result.inaccurate.tolist() == [[True], [False]] and result.inaccurate_count == 1
     assert seen[-1].inaccurate == 1 and "1 inaccurate" in (tmp_path / "sweep/log.txt").read_text()
-    for arguments in (["info"], ["info", "--json"], ["report"]):
-        with pytest.raises(SystemExit):
-            main([arguments[0], str(tmp_path / "sweep"), *arguments[1:]])
-    told = capsys.readouterr().out
-    assert f"1 inaccurate: {ENERGY_REMEDY}" in " ".join(told.split())
-    assert json.loads(told[told.index("{") : told.rindex("}") + 1])["inaccurate"] == 1
+    assert f"1 inaccurate: {ENERGY_REMEDY}" in " ".join(command("info", "sweep").out.split())
+    assert json.loads(command("info", "sweep", "--json").out)["inaccurate"] == 1
+    command("report", "sweep")
     page = (tmp_path / "sweep/report.html").read_text()
     assert "Inaccurate walks" in page and f"energy: 1</h3><p>{ENERGY_REMEDY}" in page
     assert load(tmp_path / "sweep").unit("energy_error") == "1"

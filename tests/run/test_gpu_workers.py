@@ -12,7 +12,7 @@ import warp as wp
 import yaml
 
 from tests.run.test_sweep_run import TINY, data_of
-from warpchain.cli.main import main
+from tests.support.command_line import Command
 from warpchain.run.gpu_workers import gpu_workers
 from warpchain.run.progress_bar import SweepProgress
 from warpchain.run.sweep_run import sweep
@@ -34,16 +34,12 @@ def test_each_worker_has_a_gpu_of_its_own(monkeypatch: pytest.MonkeyPatch) -> No
         assert os.environ.get("CUDA_VISIBLE_DEVICES") == visible
 
 
-@pytest.mark.parametrize(("there", "remedy"), [(1, "give at most 1"), (0, "leave it out, to run on the processor")])
-def test_more_gpus_than_there_are_are_refused(
-    there: int, remedy: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_more_gpus_than_there_are_are_refused(monkeypatch: pytest.MonkeyPatch, command: Command) -> None:
     """One line says how many there are, before the folder is made."""
-    monkeypatch.setattr("warpchain.engine.devices.gpu_count", lambda: there)
-    with pytest.raises(SystemExit) as caught:
-        main(["sweep", "figure6", "-o", str(tmp_path / "sweep"), "--gpus", "2"])
-    assert caught.value.code == 2 and not (tmp_path / "sweep").exists()
-    assert capsys.readouterr().err == f"error: --gpus: 2 wanted, but this machine has {there}; {remedy}\n"
+    monkeypatch.setattr("warpchain.engine.devices.gpu_count", lambda: 1)
+    answer = command("sweep", "figure6", "-o", "sweep", "--gpus", "2")
+    assert answer.status == 2 and not Path("sweep").exists()
+    assert answer.err == "error: --gpus: 2 wanted, but this machine has 1; give at most 1\n"
 
 
 def test_an_exception_ends_what_workers_are_doing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -60,19 +56,12 @@ def test_an_exception_ends_what_workers_are_doing(monkeypatch: pytest.MonkeyPatc
 
 @pytest.mark.skipif(wp.get_cuda_device_count() > 0, reason="there is a GPU")
 @pytest.mark.parametrize("given", (["--device", "cuda"], ["--gpus", "1"], ["--gpus", "99999"]))
-def test_a_missing_gpu_leaves_no_folder(
-    tmp_path: Path, given: list[str], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_missing_gpu_leaves_no_folder(given: list[str], monkeypatch: pytest.MonkeyPatch, command: Command) -> None:
     """One line says that there is no GPU, before the folder is made."""
     monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
-    source = tmp_path / "tiny.yaml"
-    source.write_text(yaml.safe_dump(TINY, sort_keys=False))
-    with pytest.raises(SystemExit) as caught:
-        main(["sweep", str(source), "-o", str(tmp_path / "sweep"), *given])
-    said = capfd.readouterr().err
-    assert caught.value.code == 2
-    assert said == "error: options.device: there is no cuda on this machine; give one of cpu\n"
-    assert not (tmp_path / "sweep").exists()
+    answer = command("sweep", "figure6", "-o", "sweep", *given)
+    assert answer.err == "error: options.device: there is no cuda on this machine; give one of cpu\n"
+    assert answer.status == 2 and not Path("sweep").exists()
 
 
 def test_a_worker_that_is_killed_ends_the_sweep_in_one_line(tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-import warpchain
 from tests.support.setups import setup_walk
 from warpchain.inputs.scene import OF_LINKS
 from warpchain.inputs.sections import SECTION_OF
@@ -25,16 +24,3 @@ def test_every_setting_takes_a_numpy_value():
     for model in (again.parameters, again.scene, again.options):
         for name, value in model:
             assert type(value) is type(given[name]), name
-
-
-def test_a_walk_of_numpy_numbers():
-    """What is no setting is converted as well: frames, seeds, switches; `test_refused_inputs` has durations."""
-    scene = {"links": 30, "frequency": 5.0, "walk_limit": 0.05}
-    given = {**scene, "seed": 2, "frame_interval": 0.02, "record_before": 0.0, "record_loads": True}
-    walks = [
-        warpchain.walk(preset="soft", start="ellipse", **{name: to(value) for name, value in given.items()})
-        for to in (lambda value: value, of_numpy)
-    ]
-    assert type(walks[1].seed) is int
-    assert walks[0].setup == walks[1].setup
-    assert np.array_equal(walks[0].frame_joints, walks[1].frame_joints)

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
+from tests.support.command_line import Command
 from tests.support.made_walks import make_walk
 from tests.support.synthetic_sweep import SWEEP, run
-from warpchain.cli.main import main
 from warpchain.inputs.validation import InputError
 from warpchain.store.folder import SweepFolder
 from warpchain.store.merged_file import merge
@@ -80,7 +80,7 @@ def test_damage_is_refused_or_does_no_harm(tmp_path: Path, kind: str) -> None:
     assert refusals > FLIPS
 
 
-def test_info_tells_a_damaged_file_from_another(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_info_tells_a_damaged_file_from_another(tmp_path: Path, command: Command) -> None:
     """One wrong bit of a merged file is named, with exit status 1; another file is no merged one, 2."""
     run(tmp_path / "sweep")
     path = tmp_path / "all.h5"
@@ -88,11 +88,13 @@ def test_info_tells_a_damaged_file_from_another(tmp_path: Path, capsys: pytest.C
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 1
     path.write_bytes(content)
-    assert status_of("info", path) == 1
-    assert capsys.readouterr().err.startswith(f"error: {path}: damaged, cut short or of an earlier warpchain; ")
+    answer = command("info", str(path))
+    assert answer.status == 1
+    assert answer.err.startswith(f"error: {path}: damaged, cut short or of an earlier warpchain; ")
     shard = next((tmp_path / "sweep/shards").iterdir())
-    assert status_of("info", shard) == 2
-    assert capsys.readouterr().err.startswith(f"error: {shard}: a warpchain shard, not a warpchain sweep result; give")
+    answer = command("info", str(shard))
+    assert answer.status == 2
+    assert answer.err.startswith(f"error: {shard}: a warpchain shard, not a warpchain sweep result; give")
 
 
 @pytest.mark.parametrize("version", [FORMAT_VERSION - 1, FORMAT_VERSION + 1])
@@ -113,26 +115,19 @@ def test_files_of_other_versions_are_refused(tmp_path: Path, version: int, monke
 _OLDER = b"\nwarpchain checksums: SHA-256 of 0000000000000908 bytes in pieces, " + b"0" * 64 + b"\n"
 
 
-def status_of(*arguments: object) -> int | str | None:
-    """Exit status of the command line."""
-    with pytest.raises(SystemExit) as done:
-        main([str(word) for word in arguments])
-    return done.value.code
-
-
 # What is in a folder
 
 
 @pytest.mark.parametrize("name", ["sweep.h5", "lock", "shards/000000.h5", "log.txt"])
-def test_pipes_in_a_folder_are_refused(tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_pipes_in_a_folder_are_refused(tmp_path: Path, name: str, command: Command) -> None:
     """Nobody waits for a pipe that nobody writes to."""
     run(tmp_path)
     (tmp_path / name).unlink(missing_ok=True)
     os.mkfifo(tmp_path / name)
     if name != "log.txt":
-        assert status_of("info", tmp_path) == 2
-        error = capsys.readouterr().err
-        assert error.startswith(f"error: {tmp_path / name}: a pipe or a device") and error.count("\n") == 1
+        answer = command("info", str(tmp_path))
+        assert answer.status == 2 and answer.err.count("\n") == 1
+        assert answer.err.startswith(f"error: {tmp_path / name}: a pipe or a device")
     with pytest.raises((InputError, OSError), match=str(tmp_path / name)):
         with SweepFolder.open(tmp_path, SWEEP, shard_size=20) as store:
             store.log("begun")

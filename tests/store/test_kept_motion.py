@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import warpchain
-from tests.run.test_sweep_run import TINY, brief_setup, data_of
+from tests.run.test_sweep_run import TINY, brief_setup, data_of, outcome, outcomes
 from warpchain.engine.batch import CAPACITY_SAMPLES
 from warpchain.inputs.validation import InputError, InputWarning
 from warpchain.reports.sweep_page import write_report
@@ -72,23 +72,23 @@ def motion_bytes(motion: dict[str, Any]) -> bytes:
 
 
 def test_motions_do_not_depend_on_their_batch() -> None:
-    """Slots, order and company change no bit of a motion, and keeping one changes no bit of its walk."""
+    """Slots, order and company of other n, methods and starts change no bit; keeping one changes none of its walk."""
     setups = [brief_setup(seed, record_interval=1e-5) for seed in range(5)]  # fills the device's record
     setups += [brief_setup(9, links=44, start="spinning", hold_limit=0.05)]
-    keeps = [Keep(series_every=1, frame_every=20), Keep(), Keep(series_every=3)] * 2
+    setups += [brief_setup(9, method="rkf78"), brief_setup(9, links=240, method="os32"), brief_setup(9)]
+    keeps = [Keep(series_every=1, frame_every=20), Keep(), Keep(series_every=3)] * 3
 
-    def run(order: list[int], slots: int) -> list[tuple[bytes, float]]:
+    def run(order: list[int], slots: int) -> list[tuple[bytes, object]]:
         found = {}
         runs = run_setups([setups[i] for i in order], keeps=[keeps[i] for i in order], slots=slots)
         for place, run in runs:
-            found[order[place]] = (motion_bytes(run.recorder.motion()), run.energy()["joint_friction"])
+            found[order[place]] = (motion_bytes(run.recorder.motion()), outcome(run))
         return [found[i] for i in range(len(setups))]
 
-    alone = [run([*range(6)], 1), run([*range(6)], 4), run([5, 3, 1, 0, 2, 4], 3)]
+    alone = [run([*range(9)], 1), run([*range(9)], 4), run([5, 3, 8, 1, 0, 7, 2, 4, 6], 3)]
     assert alone[0] == alone[1] == alone[2]
-    assert len(set(alone[0])) == 6
-    bare = {place: run.energy()["joint_friction"] for place, run in run_setups(setups)}
-    np.testing.assert_array_equal([bare[place] for place in range(6)], [friction for _, friction in alone[0]])
+    assert len(set(alone[0])) == 9
+    assert outcomes(setups) == [end for _, end in alone[0]]
 
 
 def test_long_motions_are_drained_between_launches() -> None:

@@ -1,4 +1,4 @@
-"""Crumpled chains whose joints are all but closed, as contacts and the broad phase meet them in a pile."""
+"""Folded chains whose joints are all but closed, as contacts meet them in a pile, and heaps of torn ones."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,4 +37,14 @@ def folded_chain(
     position = chain_of_angles(folded_angles(n, generator, tilt), link_length)
     position[:, :2] -= position[:, :2].mean(axis=0)
     position[:, :2] += generator.normal(size=(n, 2)) * opening
+    return position, generator.normal(size=(n, 3)) * [1.0, 1.0, 2 / link_length]
+
+
+def crumpled_chain(n: int, seed: int, link_length: float, size: float) -> tuple[Array, Array]:
+    """A heap of n links thrown at random, joints torn open: position and velocity (n, 3) of the order of 1 m/s.
+
+    Their centres lie in a box about the origin, through which a floor at y = 0 cuts; its half width is `size` links.
+    """
+    generator = np.random.default_rng(seed)
+    position = generator.uniform(-1, 1, (n, 3)) * [size * link_length, size * link_length, np.pi]
     return position, generator.normal(size=(n, 3)) * [1.0, 1.0, 2 / link_length]

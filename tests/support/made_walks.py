@@ -72,16 +72,9 @@ def _unset(links: int) -> dict[str, Any]:
 
 def make_unreleased() -> WalkResult:
     """A walk that ended on the sprocket: no series, no frames, no distance."""
-    empty: dict[str, Any] = {name: np.empty(stored.sizes({"t": 0, "f": 0, "n": 30})) for name, stored in MOTION.items()}
-    energy = dict.fromkeys(ENERGIES, math.nan)
-    return make_walk(
-        status=Status.NOT_STEADY,
-        dx=math.nan,
-        energy=energy,
-        sprocket_height=math.nan,
-        seed=None,
-        **empty,
-    )
+    unset = _unset(30)
+    gone = {name: unset[name] for name in (*MOTION, "dx", "sprocket_height")}
+    return make_walk(status=Status.NOT_STEADY, energy=dict.fromkeys(ENERGIES, math.nan), seed=None, **gone)
 
 
 def assert_same(first: Any, second: Any, *but: str) -> None:

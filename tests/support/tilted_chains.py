@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from tests.oracle_model.circular_loop import circular_loop
 from tests.oracle_model.tilting_plane import Plane, tilted_plane
-from tests.support.impulse_cases import crumpled_chain
+from tests.support.folded_chains import crumpled_chain
 from warpchain.inputs.parameters import Parameters
 
 Array = NDArray[np.float64]

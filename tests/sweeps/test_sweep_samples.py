@@ -17,7 +17,7 @@ from warpchain.inputs.scene import check_scene, fewest_links
 from warpchain.inputs.setup import resolve
 from warpchain.inputs.validation import InputError
 from warpchain.sweeps.designs import design_points, sobol_indices
-from warpchain.sweeps.plan import Sweep, load_sweep
+from warpchain.sweeps.plan import load_sweep
 
 # Random numbers
 
@@ -210,53 +210,9 @@ def test_every_planned_walk_is_possible(sampler: str) -> None:
     longest = max(walk.setup.parameters.sprocket_radius for walk in walks[: len(walks) // 2])
     impossible = (values[1, :, :, 0] > longest).any(axis=1)
     assert (redrawn == impossible).all()
-    if sampler == "random":
-        for sample in range(64):
-            rng = random_generator(7, 0, sample)
-            pair = rng.normal(radius, 5e-4), rng.random()
-            while pair[0] > longest:
-                pair = rng.normal(radius, 5e-4), rng.random()
-            assert tuple(values[0, sample, 0]) == pair
 
 
 # Designed samples
-
-
-def unit_cube(names: list[str], sampler: str, samples: int, seed: int = 7) -> Sweep:
-    """A sweep of one cell that draws fractions, uniform from 0 to 1."""
-    return load_sweep(
-        content(
-            seed=seed,
-            sampler=sampler,
-            samples=samples,
-            grid=None,
-            distributions={"all": "fixed", **{name: {"uniform": [0, 1]} for name in names}},
-        )
-    )
-
-
-FRACTIONS = ["floor_restitution", "floor_friction", "chain_restitution", "chain_friction"]
-
-
-def ishigami(points: np.ndarray) -> np.ndarray:
-    """The function of Ishigami and Homma (1990), a = 7, b = 0.1, of points in the unit cube, shape (N, 3)."""
-    x, y, z = math.pi * (2 * points.T - 1)
-    return np.sin(x) + 7 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x)
-
-
-def test_saltelli_gives_known_sobol_indices() -> None:
-    """From the walks of a `saltelli` cell, SciPy and this package find the indices of the Ishigami function."""
-    sweep = unit_cube(FRACTIONS[:3], "saltelli", 1024)
-    assert sweep.blocks[0].shape == (1024 * 5,)
-    values = ishigami(drawn(sweep, sweep.walk_count))
-    samples = values.reshape(-1, 5)
-    func = {"f_A": samples.T[:1], "f_B": samples.T[1:2], "f_AB": samples.T[2:, None]}
-    scipy = stats.sobol_indices(func=func, n=1024)
-    first, total = sobol_indices(samples)
-    assert first == pytest.approx(scipy.first_order, rel=1e-10, abs=1e-12)
-    assert total == pytest.approx(scipy.total_order, rel=1e-10)
-    assert first == pytest.approx([0.3139, 0.4424, 0.0], abs=0.1)
-    assert total == pytest.approx([0.5576, 0.4424, 0.2437], abs=0.1)
 
 
 def test_no_variance_has_no_sobol_indices() -> None:

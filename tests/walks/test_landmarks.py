@@ -52,7 +52,8 @@ def test_a_sweep_has_the_release_of_each_walk(tmp_path: Path) -> None:
     rest = warpchain.walk(start=walk.state(0.06))
     assert (rest.release, rest.release_speed) == (walk.release, walk.release_speed)
     lost = warpchain.walk(links=40, frequency=15.0, preset="soft", start="rest", hold_limit=0.01)
-    assert np.isnan([*lost.release.values(), lost.release_speed]).all()
+    assert lost.status == warpchain.Status.NOT_STEADY and lost.simulated_time > lost.walk_time == len(lost.time) == 0
+    assert np.isnan([lost.dx, *lost.energy.values(), *lost.release.values(), lost.release_speed]).all()
 
 
 @pytest.mark.parametrize("slope", [0.0, 5.0])

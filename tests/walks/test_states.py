@@ -240,13 +240,3 @@ def test_a_state_keeps_its_floor_in_simulate() -> None:
     assert (y + x * math.tan(math.radians(10))).min() > 0 > y.min()
     with pytest.raises(InputError, match=r"position: link \d+ starts .* inside the floor"):
         warpchain.simulate(replace(state, position=state.position - [0, 0.3, 0]), duration=0.1, floor=True)
-
-
-def test_a_state_that_a_sprocket_pressed_into_the_floor_goes_on() -> None:
-    """Unchanged states go on to the bit, whatever came before."""
-    whole = warpchain.walk(links=30, frequency=8.0, start="spinning", preset="soft", release=[[0.2, 0, -0.02, 0]])
-    state = whole.state(0.2)
-    assert (state.joints[:, 1] < 0).any()
-    assert_rest_of(warpchain.walk(start=state), whole, state.time)
-    with pytest.raises(InputError, match=r"t: .* the sprocket is there until 0\.2 s, and a state has none; give"):
-        whole.state(0.1)

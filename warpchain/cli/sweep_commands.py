@@ -225,8 +225,7 @@ def _executor(gpus: int | None, scheduler: str | None) -> Iterator[Any]:
 
     if gpus is not None:
         if gpus > (there := gpu_count()):
-            remedy = f"give at most {there}" if there else "leave it out, to run on the processor"
-            raise InputError(f"--gpus: {gpus} wanted, but this machine has {there}; {remedy}")
+            raise InputError(f"--gpus: {gpus} wanted, but this machine has {there}; give at most {there}")
         with gpu_workers(gpus) as executor:
             yield executor
     elif scheduler is not None:
