@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.support.table_1 import UNCERTAIN
 from warpchain.inputs.distributions import DRAW_LIMIT, random_generator, sampled
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters, preset
@@ -44,7 +43,7 @@ def test_samples_are_physical(
     drawn = sample_parameters(base, random_generator(seed, cell))
     assert Parameters.model_validate(drawn.model_dump()) == drawn
     for name in Parameters.model_fields:
-        assert (getattr(drawn, name) != getattr(base, name)) == (name in UNCERTAIN)
+        assert (getattr(drawn, name) != getattr(base, name)) == bool(Parameters.quantities()[name].sigma)
     assert drawn.circle_radius < drawn.link_length / 2
 
 

@@ -15,7 +15,7 @@ from PIL import Image, ImageSequence
 
 from tests.support.made_tilting_walks import make_tilting_walk
 from tests.support.made_walks import make_unreleased, make_walk
-from warpchain.pictures.animation import animate
+from warpchain.pictures.animation import Film, animate
 
 
 def data_of(path: Path) -> dict[str, Any]:
