@@ -14,7 +14,7 @@ import typer
 import xarray
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from warpchain import InputError, Status
 
@@ -26,6 +26,8 @@ FAINT: Final = "#777777"
 GROUND: Final = "#E3E3E3"
 DASHES: Final[Any] = (0, (4, 3))
 
+DRAWN: Final = "_drawn"
+"""End of the names of columns with what a sample has drawn."""
 DISTANCE: Final = "distance walked $Δx$ / m"
 FREQUENCY: Final = "frequency of the sprocket $ν$ / Hz"
 
@@ -95,6 +97,14 @@ def over_cells(values: ArrayLike, errors: ArrayLike) -> OverCells:
 def minus(text: str) -> str:
     """The text with signs for hyphens, but for the line under the head of a table."""
     return re.sub("(?<!-)-(?!-)", "−", text)
+
+
+def drawn_terms(columns: Mapping[str, Any]) -> list[NDArray[np.float64]]:
+    """What each walk has drawn, as terms of a linear fit: sine and cosine of the phase, and all else, standardised."""
+    drawn = {name: np.asarray(values, float) for name, values in columns.items() if name.endswith(DRAWN)}
+    plain = [values for name, values in drawn.items() if name != f"phase{DRAWN}" and values.std() > 0]
+    turn = 2 * np.pi * drawn[f"phase{DRAWN}"]
+    return [np.sin(turn), np.cos(turn), *((values - values.mean()) / values.std() for values in plain)]
 
 
 def table(head: str | Iterable[str], rows: Iterable[Iterable[object]]) -> str:

@@ -11,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from studies.common import DRAWN, drawn_terms
 from studies.common import table as markdown
 from studies.phase_diagram import laws
 from studies.phase_diagram.cells import walks_by_cell
@@ -25,8 +26,6 @@ EVENTS: Final = {"crease": "self_contact", "strands": "strands_met", "collapse":
 """What happens to a loop: name → end of the name of its column."""
 BEGUN: Final = ("0", "1", "2", "3", "later", "never")
 """Bounces begun before an event."""
-DRAWN: Final = "_drawn"
-"""End of the names of columns with what a sample has drawn."""
 FEW: Final = 10
 """Walks that each of two groups has in a cell in which they are compared, at least."""
 EARLY: Final = 2
@@ -44,7 +43,7 @@ def reduced(parts: Sequence[SweepResult]) -> Iterator[dict[str, float | str]]:
     """Rows of the file, a cell each."""
     names = [f"bounces_before_{name}" for name in EVENTS.values()]
     (block, *_) = parts[0].blocks.values()
-    names += sorted((name for name in block.columns if name.endswith(DRAWN)), key=f"phase{DRAWN}".__eq__)
+    names += [name for name in block.columns if name.endswith(DRAWN)]
     names += ["status", "dx", "collapsed_at", "strands_met_at", "flight_before_collapse"]
     for (links, frequency), walks in walks_by_cell(parts, names).items():
         rest = walks["status"] == Status.AT_REST
@@ -53,7 +52,7 @@ def reduced(parts: Sequence[SweepResult]) -> Iterator[dict[str, float | str]]:
         before = at_rest["strands_met_at"] <= at_rest["collapsed_at"]
         when = np.where(before & (met < collapse), 0, np.where(before, 1, 2))
         ways, dx = endings(at_rest), at_rest["dx"]
-        drawn = [values for name, values in at_rest.items() if name.endswith(DRAWN)]
+        terms = drawn_terms(at_rest) if len(dx) else []
         row: dict[str, float | str] = {
             "links": links,
             "frequency": frequency,
@@ -61,9 +60,9 @@ def reduced(parts: Sequence[SweepResult]) -> Iterator[dict[str, float | str]]:
         }
         row |= {"at_rest": int(rest.sum()), "dx": float(dx.mean()) if len(dx) else np.nan}
         row["se"] = float(dx.std(ddof=1) / np.sqrt(len(dx))) if len(dx) > 1 else np.nan
-        row |= _early(dx, (met >= 0) & (met <= EARLY), drawn)
+        row |= _early(dx, (met >= 0) & (met <= EARLY), terms)
         for bounce in OTHERWISE:
-            found = _early(dx, (met >= 0) & (met <= bounce), drawn)
+            found = _early(dx, (met >= 0) & (met <= bounce), terms)
             row |= {f"{name}_{bounce}": found[name] for name in ("held", "held_se")}
         for event, name in EVENTS.items():
             begun = at_rest[f"bounces_before_{name}"]
@@ -73,7 +72,7 @@ def reduced(parts: Sequence[SweepResult]) -> Iterator[dict[str, float | str]]:
         yield row
 
 
-def _early(dx: Array, early: Array, drawn: Sequence[Array]) -> dict[str, float]:
+def _early(dx: Array, early: Array, terms: Sequence[Array]) -> dict[str, float]:
     """Δx of walks with an early meeting over that of the others, less 1: as it is, and with what is drawn held.
 
     The error takes no equal scatter of both for granted (HC3).
@@ -81,8 +80,7 @@ def _early(dx: Array, early: Array, drawn: Sequence[Array]) -> dict[str, float]:
     found = {"early": int(early.sum()), "raw": np.nan, "held": np.nan, "held_se": np.nan}
     if min(early.sum(), (~early).sum()) < FEW:
         return found
-    late, (*plain, phase) = dx[~early].mean(), [values for values in drawn if values.std() > 0]
-    terms = [f(2 * np.pi * phase) for f in (np.sin, np.cos)] + [(each - each.mean()) / each.std() for each in plain]
+    late = dx[~early].mean()
     design = np.stack([early, np.ones(len(dx)), *terms], axis=1)
     solve = np.linalg.pinv(design)
     weights, share = solve @ dx, np.einsum("wk,kw->w", design, solve)
@@ -165,11 +163,15 @@ def against_million(cells: Cells, million: Cells) -> str:
     ratio = cells["dx"] / million["dx_mean"][at] - 1
     walk = million["dx_sd"][at] / np.sqrt(np.maximum(cells["at_rest"], 1))  # better known from the million
     error = np.hypot(walk, million["dx_se"][at]) / million["dx_mean"][at]
+    slow = (cells["links"] >= 100) & (cells["frequency"] >= 5) & (cells["frequency"] <= 9)
+    choices = {
+        "all": used,
+        "the paper's range": used & laws.in_papers_range(cells["links"], cells["frequency"]),
+        "100 links and more at 5 to 9 Hz": used & slow,
+        "all others": used & ~slow,
+    }
     texts = []
-    for name, chosen in (
-        ("all", used),
-        ("the paper's range", used & laws.in_papers_range(cells["links"], cells["frequency"])),
-    ):
+    for name, chosen in choices.items():
         mean, chi2, _, ends = _over_cells(ratio[chosen], error[chosen], 2)
         texts.append(f"in {name} {mean} (χ² {chi2} cells; rise, fall: {ends})")
     return f"Mean Δx of these walks over that of the million, less 1, mean over cells: {'; '.join(texts)}.".replace(

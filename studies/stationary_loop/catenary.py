@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 def catenary_of(loop: MeanLoop) -> TheoreticalLoop:
     """The catenary between the ends of the free part of a mean loop and as long as it; errors as below."""
     first, last = (np.array([np.interp(s, loop.s, column) for column in loop.position.T]) for s in loop.free)
-    weight = loop.parameters.density * loop.parameters.gravity
+    weight = loop.density * loop.parameters.gravity
     return catenary_between(first, last, loop.free[1] - loop.free[0], weight)
 
 

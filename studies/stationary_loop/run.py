@@ -20,7 +20,7 @@ from studies.common import DASHES, GREEN, RED, publish, run_study
 from studies.stationary_loop.balances import imbalances
 from studies.stationary_loop.catenary import catenary_of
 from studies.stationary_loop.kinks import draw_kinks
-from studies.stationary_loop.theory import MeanLoop, NoSolutionError, TheoreticalLoop, predict
+from studies.stationary_loop.theory import LoopParameters, MeanLoop, NoSolutionError, TheoreticalLoop, predict
 
 FOLDER = Path(__file__).parent
 SHOWN = (120, 20.0)
@@ -92,7 +92,7 @@ def show(name: str, walk: warpchain.WalkResult) -> None:
         f"least {kink.dip:6.2f} at {100 * kink.dip_at:5.1f} cm; "
         f"joints within {1e3 * loop.spread.max():.3f} mm"
     )
-    parameters = loop.parameters
+    parameters = LoopParameters.of(loop)
     for which, given in (
         ("theory", parameters),
         ("without Coulomb", dataclasses.replace(parameters, coulomb_friction=0.0)),

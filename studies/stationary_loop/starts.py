@@ -4,6 +4,7 @@ python -m studies.stationary_loop.starts             # results/starts.csv → ta
 python -m studies.stationary_loop.starts FOLDER…     # sweeps steadiness, steadiness_long, swing → the file, first
 """
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -12,41 +13,90 @@ import typer
 from numpy.typing import NDArray
 
 import warpchain
-from studies.common import minus, of_cells, over_cells, publish, read_rows, run_study, table, write_rows
+from studies.common import (
+    DRAWN,
+    drawn_terms,
+    minus,
+    of_cells,
+    over_cells,
+    publish,
+    read_rows,
+    run_study,
+    table,
+    write_rows,
+)
 
 Array = NDArray[np.float64]
 Key = tuple[str, int, float, float]
 """Block, links, frequency [Hz], time for which the loop was held on [s], 0 where that is no axis."""
 
 CSV: Final = Path(__file__).parent / "results" / "starts.csv"
+PAGE: Final = Path(__file__).parent / "README.md"
 QUANTITIES: Final = ("dx", "release_center_x", "release_width", "release_height")
 """Distance of the walk; place of the centre of mass, width and height of the loop at the release [m]."""
 STARTS: Final = ("spinning", "rest", "undamped")
-OURS: Final = STARTS[:2]
+LOOPS: Final = {
+    "`rest`": (("rest", 0.0),),
+    "`spinning`": (("spinning", 0.0), ("held_on", 0.0)),
+    "held 30 s": (("undamped", 0.0), ("swing", 30.0)),
+    "at once": (("rest", 0.0), ("spinning", 0.0), ("held_on", 0.0)),
+    "held on": tuple(("held_on", time) for time in (5.0, 10.0, 20.0)),
+}
+"""Loops of one kind: name → blocks, and times for which they held their loops on, of the same scene."""
+OURS: Final = ("`spinning`", "`rest`")
+COMPARED: Final = (
+    ("`rest`", "`spinning`"),
+    ("`spinning`", "held 30 s"),
+    ("`rest`", "held 30 s"),
+    ("at once", "held on"),
+    ("held 30 s", "held on"),
+)
+SLOW: Final = 10.0
+"""Frequency [Hz] at which loops hardly swing."""
 LONG: Final = 150
 """Links from which loops are called long."""
 
 
 def reduced(paths: list[str]) -> list[dict[str, Any]]:
     """Mean and standard error of each quantity by cell; blocks of the same name are put together."""
-    found: dict[Key, list[Array]] = {}
+    found: dict[Key, list[dict[str, Array]]] = {}
     for path in paths:
         for name, block in warpchain.load(path).blocks.items():
-            values = np.stack([np.asarray(block.columns[quantity]) for quantity in QUANTITIES])
+            names = [name for name in block.columns if name in QUANTITIES or name.endswith(DRAWN)]
+            columns = {name: np.asarray(block.columns[name], float) for name in names}
             for place, numbers in of_cells(block):
                 at = dict(zip(block.axes, map(float, numbers), strict=True))
                 key = name, int(at["links"]), at["frequency"], at.get("further_hold", 0.0)
-                found.setdefault(key, []).append(values[(slice(None), *place)])
-    rows = []
+                found.setdefault(key, []).append({name: values[place] for name, values in columns.items()})
+    cells = {}
     for key, parts in sorted(found.items()):
-        walks = np.concatenate(parts, axis=1)
-        walks = walks[:, np.isfinite(walks[0])]
+        walks = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+        cells[key] = {name: values[np.isfinite(walks["dx"])] for name, values in walks.items()}
+    held, rows = with_draws_held(cells), []
+    for key, walks in cells.items():
         row: dict[str, Any] = dict(zip(("block", "links", "frequency", "held_on"), key, strict=True))
-        row["walks"] = walks.shape[1]
-        for quantity, each in zip(QUANTITIES, walks, strict=True):
+        row["walks"] = len(walks["dx"])
+        for quantity, each in ({name: walks[name] for name in QUANTITIES} | {"held": held[key]}).items():
             row |= {quantity: float(each.mean()), f"{quantity}_se": float(each.std(ddof=1) / len(each) ** 0.5)}
         rows.append(row)
     return rows
+
+
+def with_draws_held(cells: Mapping[Key, Mapping[str, Array]]) -> dict[Key, Array]:
+    """Δx of all walks less what is due to their draws: one linear function for all blocks of a preset and a cell.
+
+    Blocks draw their samples apart, so this takes scatter from their differences and no part of these.
+    """
+    held = {}
+    for group in {(key[0].startswith("paper"), *key[1:3]) for key in cells}:
+        keys = [key for key in cells if (key[0].startswith("paper"), *key[1:3]) == group]
+        walks = {name: np.concatenate([cells[key][name] for key in keys]) for name in cells[keys[0]]}
+        ends = np.cumsum([len(cells[key]["dx"]) for key in keys])
+        own = np.repeat(np.eye(len(keys)), np.diff(ends, prepend=0), axis=0)
+        terms = np.stack(drawn_terms(walks), axis=1)
+        weights = np.linalg.lstsq(np.hstack([terms, own]), walks["dx"], rcond=None)[0][: terms.shape[1]]
+        held |= dict(zip(keys, np.split(walks["dx"] - terms @ weights, ends[:-1]), strict=True))
+    return held
 
 
 def read() -> dict[Key, dict[str, float]]:
@@ -60,15 +110,27 @@ def read() -> dict[Key, dict[str, float]]:
 
 
 def _ratio(one: dict[str, float], other: dict[str, float]) -> tuple[float, float]:
-    """Δx of one cell over that of the other, less 1, with its standard error."""
-    size = one["dx"] / other["dx"]
-    return size - 1, size * float(np.hypot(one["dx_se"] / one["dx"], other["dx_se"] / other["dx"]))
+    """Δx of one cell over that of the other, less 1, with its standard error; what is drawn is held."""
+    size = one["held"] / other["held"]
+    return size - 1, size * float(np.hypot(one["held_se"] / one["held"], other["held_se"] / other["held"]))
+
+
+def _together(cells: dict[Key, dict[str, float]], loops: str, cell: tuple[int, float]) -> dict[str, float]:
+    """Δx with what is drawn held, of all `LOOPS` of this name in a cell, weighted by their walks; empty without any."""
+    parts = [cells[block, *cell, time] for block, time in LOOPS[loops] if (block, *cell, time) in cells]
+    if not parts:
+        return {}
+    size, value, error = np.array([[part[name] for name in ("walks", "held", "held_se")] for part in parts]).T
+    return {
+        "held": np.average(value, weights=size),
+        "held_se": float(np.sqrt(np.sum((size * error) ** 2)) / size.sum()),
+    }
 
 
 def _mean(ratios: list[tuple[float, float]]) -> str:
     """Mean over cells ± standard error, with χ² of none in any."""
-    over = over_cells(*np.array(ratios).T)
-    return f"{100 * over.mean:+.2f} ± {100 * over.error:.2f} % (χ² {over.chi2:.1f} of {len(over)})"
+    found = over_cells(*zip(*ratios, strict=True))
+    return f"{100 * found.mean:+.2f} ± {100 * found.error:.2f} % (χ² {found.chi2:.1f} of {len(found)})"
 
 
 def _with_error(cell: dict[str, float], quantity: str, scale: float = 1.0, digits: int = 4) -> str:
@@ -82,32 +144,37 @@ def starts(cells: dict[Key, dict[str, float]]) -> str:
         own = {start: cells[start, links, frequency, 0.0] for start in STARTS}
         held, texts = own["undamped"], [_with_error(own[start], "dx") for start in STARTS]
         for start in OURS:
-            size, error = _ratio(own[start], held)
-            texts.append(f"{100 * size:+.1f} ({size / error:+.1f})")
+            pair = (_together(cells, name, (links, frequency)) for name in (start, "held 30 s"))
+            size, error = _ratio(*pair)
+            texts.append(f"{100 * size:+.2f} ± {100 * error:.2f}")
         for quantity in ("release_center_x", "release_width"):
-            each = (f"{1e3 * (own[start][quantity] - held[quantity]):+.2f}" for start in OURS)
+            each = (f"{1e3 * (own[start][quantity] - held[quantity]):+.2f}" for start in STARTS[:2])
             error = np.hypot(own["rest"][f"{quantity}_se"], held[f"{quantity}_se"])
             texts.append(f"{', '.join(each)} ± {1e3 * error:.2f}")
         rows.append((links, f"{frequency:g}", *texts))
-    head = "links | Hz | `spinning` / m | `rest` / m | held 30 s / m | `spinning` − held | `rest` − held"
+    head = "links | Hz | `spinning` / m | `rest` / m | held 30 s / m | `spinning` − held / % | `rest` − held / %"
     return table(f"{head} | place / mm | width / mm", rows)
 
 
 def means(cells: dict[Key, dict[str, float]]) -> str:
-    """Means over the cells of the differences between starts."""
-    rows = []
+    """Means over the cells of the differences between starts, and of these from loops that were held on."""
     every = sorted(key[1:3] for key in cells if key[0] == "rest")
-    for one, other in (("rest", "spinning"), ("spinning", "undamped"), ("rest", "undamped")):
+    long = [cell for cell in every if cell[0] >= LONG]
+    columns = every, [cell for cell in every if cell[0] < LONG], long, [cell for cell in long if cell[1] > SLOW]
+    rows = []
+    for one, other in COMPARED:
         texts = []
-        for chosen in (every, [c for c in every if c[0] < LONG], [c for c in every if c[0] >= LONG]):
-            texts.append(_mean([_ratio(cells[one, *cell, 0.0], cells[other, *cell, 0.0]) for cell in chosen]))
-        rows.append((f"`{one}` over `{other}`", *texts))
-    return table(f"Δx | all cells | below {LONG} links | from {LONG} links on", rows).replace("`undamped`", "held 30 s")
+        for chosen in columns:
+            pairs = [(_together(cells, one, cell), _together(cells, other, cell)) for cell in chosen]
+            texts.append(_mean([_ratio(*pair) for pair in pairs if all(pair)]))
+        rows.append((f"{one} over {other}", *texts))
+    head = f"Δx | all cells | below {LONG} links | from {LONG} links on | those at 20 and 30 Hz"
+    return table(head, rows)
 
 
 def over_time(cells: dict[Key, dict[str, float]], block: str, quantity: str, scale: float = 1, digits: int = 4) -> str:
     """A quantity by the time for which loops were held on, of a block; of Δx χ² of one value for all times, too."""
-    times, tests = sorted({key[3] for key in cells if key[0] == block}), block == "held_on" and quantity == "dx"
+    times, tests = sorted({key[3] for key in cells if key[0] == block}), quantity == "held"
     rows = []
     for links, frequency in sorted({key[1:3] for key in cells if key[0] == block}):
         own = [cells[block, links, frequency, time] for time in times]
@@ -122,20 +189,24 @@ def over_time(cells: dict[Key, dict[str, float]], block: str, quantity: str, sca
     return table(("links", "Hz", *(f"{time:g} s" for time in times), "s.e.", *["χ²"] * tests), rows)
 
 
-def make(folders: Annotated[list[str] | None, typer.Argument()] = None) -> None:
-    """Reduce the sweeps that are given into the committed file; then write all tables that are in it."""
-    if folders:
-        write_rows(CSV, reduced(folders))
-    cells = read()
-    tables = {
+def tables(cells: dict[Key, dict[str, float]]) -> dict[str, str]:
+    """The tables of the page by their markers."""
+    texts = {
         "starts": starts(cells),
         "means of starts": means(cells),
-        "held on": over_time(cells, "held_on", "dx"),
+        "held on": over_time(cells, "held_on", "held"),
         "place held on": over_time(cells, "held_on", "release_center_x", 1e3, 2),
         "swing": over_time(cells, "swing", "release_center_x", 1e3, 2),
         "swing in distance": over_time(cells, "swing", "dx"),
     }
-    publish(Path(__file__).parent, {name: minus(text) for name, text in tables.items()}, {})
+    return {name: minus(text) for name, text in texts.items()}
+
+
+def make(folders: Annotated[list[str] | None, typer.Argument()] = None) -> None:
+    """Reduce the sweeps that are given into the committed file; then write all tables that are in it."""
+    if folders:
+        write_rows(CSV, reduced(folders))
+    publish(PAGE.parent, tables(read()), {})
 
 
 if __name__ == "__main__":

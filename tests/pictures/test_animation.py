@@ -4,6 +4,7 @@ import json
 import math
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -14,7 +15,7 @@ from PIL import Image, ImageSequence
 
 from tests.support.made_tilting_walks import make_tilting_walk
 from tests.support.made_walks import make_unreleased, make_walk
-from warpchain.pictures.animation import animate
+from warpchain.pictures.animation import Film, animate
 
 
 def data_of(path: Path) -> dict[str, Any]:
@@ -56,6 +57,18 @@ def test_gif_draws_the_chain_where_it_is(make: Any, tmp_path: Path) -> None:
     joints = walk.frame_joints if walk.joints_in_room is None else walk.joints_in_room[..., :2]
     for pixels, places in zip(np.transpose(blue)[::-1] * [[1], [-1]], joints.mean(axis=1).T, strict=True):
         assert np.corrcoef(pixels, places)[0, 1] > 0.9
+
+
+def test_a_chain_that_flies_high_has_room_for_title_and_marks(tmp_path: Path) -> None:
+    """The picture is as broad as it is high, and the marks of the floor reach over most of it."""
+    walk = make_walk()
+    joints = walk.frame_joints + np.linspace(0.0, 5.0, len(walk.frame_time))[:, None, None] * [0.0, 1.0]
+    high = replace(walk, frame_joints=joints)
+    width, height = Film(high).figure.get_size_inches()
+    assert width >= height
+    animate(high, tmp_path / "walk.html")
+    marks = data_of(tmp_path / "walk.html")["marks"]
+    assert len(marks) <= 10 and 3.0 < np.ptp(marks) < 6.0
 
 
 @pytest.mark.parametrize("make", [make_walk, make_tilting_walk])

@@ -148,11 +148,12 @@ def test_sensitivity_leaves_out_incomplete_samples(tmp_path: Path) -> None:
 def test_figures_are_those_that_a_sweep_has_something_for(
     tmp_path: Path, sweep6: SweepResult, saltelli: SweepResult, flawed6: SweepResult
 ) -> None:
-    """Each kind of sweep gives its own figures, which can be drawn; bars of ends only if walks ended differently."""
+    """Each kind of sweep gives its own figures, all of which can be drawn; counts only if a walk is not at rest."""
     for result, names in (
         (sweep6, ["distance"]),
         (saltelli, ["sensitivity"]),
         (flawed6, ["distance", "status_counts"]),
+        (make_sweep(tmp_path / "failed", SMALL, lambda walk: Status.TIME_LIMIT), ["status_counts"]),
     ):
         pictures = list(figures(result))
         assert [picture.name for picture in pictures] == names

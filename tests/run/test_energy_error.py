@@ -3,6 +3,7 @@
 import json
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,10 +11,14 @@ import pytest
 from tests.support.command_line import Command
 from tests.support.made_walks import make_unreleased, make_walk
 from warpchain.cli.terminal import print_walk
+from warpchain.engine.tallies import CONTACTS
+from warpchain.inputs.scene import link_values
 from warpchain.run.progress_bar import SweepProgress
 from warpchain.run.sweep_run import sweep
 from warpchain.store.sweep_result import load
-from warpchain.walks.faults import ENERGY_REMEDY, FAULTS
+from warpchain.sweeps.plan import load_sweep
+from warpchain.walks.faults import ENERGY_REMEDY, FAULTS, LENGTHS
+from warpchain.walks.rows import faults_of_columns
 
 COARSE = {
     "grid": {"tolerance": [1e-1, 1e-6]},
@@ -51,6 +56,39 @@ def test_a_walk_warns(fault: str, limit: str | None, part: float, capsys: pytest
     table = " ".join(capsys.readouterr().out.split())
     told = (remedy in table, remedy in walk.warnings(), any(w in repr(walk) for w in ("inaccurate", "error")))
     assert told == (part > 1,) * 3
+
+
+CIRCLES: dict[str, Any] = {
+    "a charm": {"charm_radius": 1e-3},
+    "a wide charm": {"charm_radius": 6e-3},
+    "all narrow": {"link_radii": [2e-3] * 29 + [3e-3]},
+    "narrow, and a charm": {"link_radii": [2e-3] * 30, "charm_radius": 1e-3},
+    "wide": {"link_radii": [6e-3] * 30},
+}
+
+
+@pytest.mark.parametrize("circles", CIRCLES.values(), ids=CIRCLES)
+@pytest.mark.parametrize("drawn", [False, True])
+@pytest.mark.parametrize("by", ["scene", "grid"])
+def test_the_smallest_circle_tells_what_sank_in(circles: dict[str, Any], drawn: bool, by: str) -> None:
+    """A walk and its row of a sweep warn above the radius of the narrowest link, given, on an axis or drawn."""
+    brief = {"links": 30, "start": "ellipse"}
+    axes = {name: {"own": value} if isinstance(value, list) else [value] for name, value in circles.items()}
+    given = {"scene": {**brief, **circles}} if by == "scene" else {"scene": brief, "grid": axes}
+    draws = {"all": "fixed"} | ({"circle_radius": {"uniform": [3e-3, 3.5e-3]}} if drawn else {})
+    sweep = load_sweep(
+        {"version": 1, "name": "s", "seed": 1, "preset": "paper", "samples": 1, "distributions": draws, **given}
+    )
+    setup = sweep.planned(0).setup
+    narrowest = link_values(setup.scene, setup.parameters).radius.min()
+    lengths = {name: sweep.blocks[0].parameter(name) for name in LENGTHS}
+    for depth, sank in ((0.999 * narrowest, False), (1.001 * narrowest, True)):
+        walk = make_walk(setup=setup, greatest_penetration=dict.fromkeys(CONTACTS, depth))
+        assert (FAULTS["penetration"] in walk.warnings()) == sank
+        columns = {f"penetration_{name}": np.array([depth]) for name in CONTACTS}
+        columns |= {"energy_error": np.zeros(1), "greatest_opening": np.zeros(1)}
+        columns |= {"circle_radius_drawn": np.array([setup.parameters.circle_radius])} if drawn else {}
+        assert faults_of_columns(columns, lengths)["penetration"].item() == sank
 
 
 def test_a_sweep_counts_inaccurate_walks(tmp_path: Path, command: Command) -> None:

@@ -84,6 +84,7 @@ def test_a_sweep_by_keywords_takes_one_floor_or_names_with_floors() -> None:
         ({"floor": {"back": [[0, 0], [-1, 0]]}}, r"floor\.back: point 1 lies behind the one before it; .*"),
         ({"floor": {"a step": STEP}}, r"floor\.'a step': String should match pattern .*"),
         ({"floor": NAMED, "slope": [0, 5]}, r"slope\[1\]: 5\.0 of a floor that is a profile; .*"),
+        ({"links": [4], "link_radii": {"wide": [4e-3, 7e-3] * 2}}, r"link_radii\.wide\[1\]: 0\.007 is not smaller .*"),
         (
             {"release": {"lift": [[0.1, 0, 0.02, 0]]}},
             r"release\.lift: a motion of the sprocket, which start: ellipse .*",

@@ -207,10 +207,9 @@ def test_a_sweep_that_is_refused_now_is_named(tmp_path: Path, monkeypatch: pytes
 
 
 def test_a_folder_of_an_earlier_version_is_refused(tmp_path: Path) -> None:
-    """Its sweep.json is named as what it is; nothing begins there."""
-    (tmp_path / "shards").mkdir()
+    """Its sweep.json is named as what it is; nothing begins there, with shards or without."""
     (tmp_path / "sweep.json").write_text("{}")
-    with refused(InputError, tmp_path, "a sweep of an earlier warpchain, which reads it"):
+    with refused(InputError, tmp_path, "a sweep of an earlier warpchain; read it with that version"):
         load(tmp_path)
     with refused(InputError, tmp_path, "give another folder"):
         open_folder(tmp_path)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from studies.common import write_rows
+from studies.common import drawn_terms, write_rows
 from studies.phase_diagram import candidates, cells, laws, run, strands
 from studies.phase_diagram.endings import Ending, endings
 from tests.support.made_sweeps import distance, make_sweep
@@ -94,7 +94,7 @@ def test_an_early_meeting_is_told_from_what_is_drawn() -> None:
     """Of walks that go a tenth less far, and met early where a drawn quantity shortens them, the tenth is found."""
     drawn, phase, noise = np.random.default_rng(1).normal(size=(3, 4000))
     early = drawn + noise > 0
-    found = strands._early(1 - 0.1 * early - 0.05 * drawn, early, [drawn, phase])
+    found = strands._early(1 - 0.1 * early - 0.05 * drawn, early, drawn_terms({"a_drawn": drawn, "phase_drawn": phase}))
     assert found["held"] == pytest.approx(-0.1, rel=0.03) and found["raw"] < -0.14
 
 
@@ -105,7 +105,8 @@ def test_the_error_of_an_early_meeting_knows_of_unequal_scatter() -> None:
     for _ in range(300):
         drawn, phase = random.normal(size=80), random.random(80)
         dx = 1 + 0.01 * np.where(early, 3.0, 1.0) * random.normal(size=80)
-        found.append([strands._early(dx, early, [drawn, phase])[name] for name in ("held", "held_se")])
+        result = strands._early(dx, early, drawn_terms({"a_drawn": drawn, "phase_drawn": phase}))
+        found.append([result["held"], result["held_se"]])
     values, errors = np.array(found).T
     assert errors.mean() == pytest.approx(values.std(), rel=0.15)
 

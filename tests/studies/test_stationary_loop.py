@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 import warpchain
-from studies.stationary_loop import run
+from studies.common import with_tables
+from studies.stationary_loop import run, starts
 from studies.stationary_loop.balances import imbalances
 from studies.stationary_loop.catenary import catenary_between
 from studies.stationary_loop.kinks import draw_kinks
-from studies.stationary_loop.theory import End, predict, solve
+from studies.stationary_loop.theory import End, LoopParameters, predict, solve
 
 
 @cache
@@ -30,7 +31,7 @@ def held_walk() -> warpchain.WalkResult:
 
 def test_theory_without_friction_and_inertia_is_the_catenary() -> None:
     """The boundary value problem's solution is the closed form's to 1e-6 of its length, from a poor guess."""
-    parameters = held_walk().mean_loop().parameters
+    parameters = LoopParameters.of(held_walk().mean_loop())
     bare = dataclasses.replace(parameters, inertia=0.0, viscous_friction=0.0, coulomb_friction=0.0)
     weight = bare.density * bare.gravity
     ends = End(0.06, 0.01, -1.3, 0.0), End(-0.055, 0.0, 1.3, 0.0)
@@ -104,3 +105,22 @@ def test_the_catenary_is_one() -> None:
         np.testing.assert_allclose(np.gradient(found.angle, found.s)[1:-1], found.curvature[1:-1], rtol=3e-2)
     with pytest.raises(ValueError, match="does not reach"):
         catenary_between(first, last, 0.1, 2.5)
+
+
+def test_the_page_has_the_tables_of_the_starts() -> None:
+    """They are rendered from the committed rows."""
+    page = starts.PAGE.read_text(encoding="utf-8")
+    assert with_tables(page, starts.tables(starts.read())) == page, (
+        "out of date; run python -m studies.stationary_loop.starts"
+    )
+
+
+def test_what_is_drawn_is_taken_from_distances_and_their_difference_is_left() -> None:
+    """Of two blocks whose Δx is linear in what they drew, 2 % apart, only these 2 % are left."""
+    random, cells = np.random.default_rng(1), {}
+    for block, dx in (("rest", 1.0), ("spinning", 1.02)):
+        radius, phase = random.normal(0.5 * (block == "rest"), 1, 50), random.random(50)
+        found = dx + 0.1 * radius + 0.2 * np.cos(2 * np.pi * phase)
+        cells[block, 60, 20.0, 0.0] = {"dx": found, "radius_drawn": radius, "phase_drawn": phase}
+    rest, spinning = starts.with_draws_held(cells).values()
+    np.testing.assert_allclose(spinning - rest, 0.02, atol=1e-12)

@@ -40,6 +40,22 @@ def test_two_kinds_given_link_by_link_walk_as_two_kinds() -> None:
     assert np.array_equal(kinds.frame_joints, each.frame_joints)
 
 
+@pytest.mark.parametrize("measures", ["contact", "pitch"])
+def test_the_sprocket_knows_the_circles_of_the_links(measures: str) -> None:
+    """Wide circles given link by link walk as a `circle_radius` as wide, loop on the sprocket included, to the bit."""
+    brief = {**BRIEF, "links": 50, "start": "spinning", "sprocket_radius_is": measures, "walk_limit": 0.05}
+    one, each = (warpchain.walk(**brief, **own) for own in ({"circle_radius": 6e-3}, {"link_radii": [6e-3] * 50}))
+    assert (one.hold_time, one.release, one.energy) == (each.hold_time, each.release, each.energy)
+    assert one.greatest_penetration == each.greatest_penetration
+    assert np.array_equal(one.center, each.center)
+
+
+def test_joints_ride_on_the_wider_of_their_circles() -> None:
+    """Every second link may be narrow, and a charm wide: the other joints ride as high as without."""
+    assert values_of(link_radii=[2e-3, 6e-3] * 30).riding_radius == 6e-3
+    assert values_of(charm_radius=6e-3).riding_radius == SOFT.circle_radius
+
+
 def test_a_charm_closes_the_ledger_and_is_read_back(tmp_path: Path) -> None:
     """Mass, centre and energy of a walk with a heavy link are those of the links, and its file says what they were."""
     charm = {"charm_link": 7, "charm_mass": 0.02, "charm_inertia": 2e-7}
@@ -67,7 +83,7 @@ def test_a_walk_on_unlike_circles_rests_on_the_widest(tmp_path: Path) -> None:
     assert abs(walk.energy["residual"]) < 1e-3 * lost
     heights = walk.frame_joints[..., 1]
     lowest = np.minimum(heights - radii, np.roll(heights, 1, axis=1) - radii).min(axis=1)
-    assert lowest[0] == walk.lowest[0] == pytest.approx(0.012, abs=1e-12)
+    assert lowest[0] == walk.lowest[0] == walk.release["lowest"] == pytest.approx(0.012, abs=1e-12)
     assert -1e-4 < lowest[-1] < 1e-4 and walk.lowest[-1] == pytest.approx(lowest[-1], abs=1e-5)
     outlines = link_outlines(walk.frame_joints[0], circle_radii(walk))
     assert 0.012 <= outlines[..., 1].min() < 0.0121  # they are polygons

@@ -3,16 +3,14 @@
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import h5py
-import numpy as np
 import pytest
 
 from tests.support.made_walks import assert_same, make_unreleased, make_walk
 from warpchain.hdf5_files import hdf5_image
 from warpchain.status import Status
-from warpchain.walks.walk_result import ENERGIES, WalkResult, load_walk
+from warpchain.walks.walk_result import WalkResult, load_walk
 
 # Status
 
@@ -23,23 +21,6 @@ def test_status_says_what_to_try() -> None:
     for status in Status:
         assert re.fullmatch(r"[A-Z][^\n]*\.", status.sentence), status
         assert ("; " in status.sentence) == (not status.ok), status
-
-
-# The record itself
-
-
-@pytest.mark.parametrize(
-    ("field", "value"),
-    [
-        ("lowest", np.zeros(800)),
-        ("frame_joints", np.zeros((41, 32, 2))),
-        ("energy", dict.fromkeys([*ENERGIES, "heat"], 0.0)),
-    ],
-)
-def test_misshapen_fields_are_refused(field: str, value: Any) -> None:
-    """A walk whose arrays or dictionaries don't fit together can't be made, and the error names the field."""
-    with pytest.raises(ValueError, match=rf"^{field}: [^\n]*give[^\n]*$"):
-        make_walk(**{field: value})
 
 
 # The file

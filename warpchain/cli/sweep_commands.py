@@ -160,7 +160,7 @@ def plot(
     if not count:
         name = path if quantity is None else f"--quantity: {quantity}"
         raise InputError(
-            f"{name}: no walk at rest has a value, or no axis has several values; give another --quantity, as walk_time"
+            f"{name}: no walk at rest has a value, or no axis has several values; give another --quantity, or see info"
         )
 
 

@@ -11,7 +11,7 @@ from warpchain.engine.tallies import LOST
 from warpchain.inputs.validation import json_value, printable
 from warpchain.pictures.labels import cell_table
 from warpchain.run.progress_bar import duration_text
-from warpchain.walks.rows import fault_remedies
+from warpchain.walks.faults import FAULTS
 from warpchain.walks.walk_result import WalkResult
 
 if TYPE_CHECKING:
@@ -60,8 +60,9 @@ def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None)
         return
     counts = ", ".join(f"{count:,} {label}" for label, count in summary.items() if count)
     print(f"{printable(result.name)}: {result.walk_count:,} walks, {counts}")
-    for remedy_of_fault, number in fault_remedies(block.faults for block in result.blocks.values()).items():
-        print(f"{number:,} inaccurate: {remedy_of_fault}")
+    for fault, remedy in FAULTS.items():
+        if number := sum(int(block.faults[fault].sum()) for block in result.blocks.values()):
+            print(f"{number:,} inaccurate: {remedy}")
     if rate is not None:
         left = "" if time_left is None else f", {duration_text(time_left)} left"
         print(f"running: {rate:.2f} walks a second{left}")

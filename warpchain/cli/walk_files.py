@@ -39,18 +39,10 @@ def saved(path: Path, wanted: str) -> "WalkResult | SweepResult":
 
 
 def try_walk_folder(folder: Path) -> None:
-    """Check before a walk that all its files can be written; errors as of `try_folder` and `checked_output`."""
-    try_folder(folder)
-    if folder.is_dir():
-        for name in (RECORD, *(f"{kind}.png" for kind in get_args(Kind))):
-            checked_output(folder / name)
-
-
-def try_folder(folder: Path) -> None:
-    """Check before a long run that a folder can be written to; nothing is left there.
+    """Check before a walk that all its files can be written to a folder; nothing is left there.
 
     Raises:
-        OSError: it cannot; one line that names it.
+        OSError: one cannot; one line that names it or the folder.
     """
     nearest = folder.absolute()
     with naming(folder):
@@ -62,6 +54,9 @@ def try_folder(folder: Path) -> None:
                 nearest = nearest.parent
         with tempfile.TemporaryDirectory(prefix=".warpchain-", dir=nearest):
             pass
+    if folder.is_dir():
+        for name in (RECORD, *(f"{kind}.png" for kind in get_args(Kind))):
+            checked_output(folder / name)
 
 
 def write_walk(result: "WalkResult", folder: Path) -> Iterator[Path]:

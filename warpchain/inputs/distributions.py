@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import Field
 
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.scene import Scene
+from warpchain.inputs.scene import Scene, link_values
 from warpchain.inputs.sections import SECTION_OF
 from warpchain.inputs.state import Setup
 from warpchain.inputs.validation import FIELDS, InputError, Whole, checked, field_bounds
@@ -159,7 +159,7 @@ release."""
 def placed(distributions: Mapping[str, Distribution], setup: Setup) -> dict[str, Distribution]:
     """The distributions with means and bounds for one chain.
 
-    A Gaussian without a mean gets the chain's value. A link length must leave room for its two circles.
+    A Gaussian without a mean gets the chain's value. A link length must leave room for two circles of the widest link.
     """
     complete: dict[str, Distribution] = {}
     for name, distribution in distributions.items():
@@ -168,7 +168,8 @@ def placed(distributions: Mapping[str, Distribution], setup: Setup) -> dict[str,
             distribution = Gaussian(float(value), distribution.sigma, distribution.bounds)
         complete[name] = distribution
     if "link_length" in distributions and "circle_radius" not in distributions:
-        room = math.nextafter(2 * setup.parameters.circle_radius, math.inf), math.inf
+        widest = float(link_values(setup.scene, setup.parameters).radius.max())
+        room = math.nextafter(2 * widest, math.inf), math.inf
         complete["link_length"] = replace(complete["link_length"], bounds=room)
     return complete
 

@@ -44,6 +44,11 @@ class LinkValues:
         return all(np.array_equal(row[2:], row[:-2]) for row in vars(self).values())
 
     @property
+    def riding_radius(self) -> float:
+        """Height [m] of the joints above a surface that the chain rides on: half of them are at least so high."""
+        return float(np.median(np.maximum(self.radius, np.roll(self.radius, -1))))
+
+    @property
     def total_mass(self) -> float:
         """Mass of the chain [kg]; of two kinds of links as many times the rounded sum of a pair as there are pairs."""
         return math.fsum(np.add.reduceat(self.mass, range(0, len(self.mass), 2)))

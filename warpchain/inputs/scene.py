@@ -257,7 +257,7 @@ def joint_radius(scene: Scene, parameters: Parameters) -> float:
     """Distance from the sprocket's centre at which the joints ride, in m."""
     if scene.sprocket_radius_is == "pitch":
         return parameters.sprocket_radius
-    return parameters.sprocket_radius + parameters.circle_radius
+    return parameters.sprocket_radius + link_values(scene, parameters).riding_radius
 
 
 def loop_speed(scene: Scene, parameters: Parameters) -> float:
@@ -273,12 +273,13 @@ def contact_radius(scene: Scene, parameters: Parameters) -> float:
     """Radius of the sprocket that the circles of the links touch, in m; an `InputError` if nothing is left to touch."""
     if scene.sprocket_radius_is == "contact":
         return parameters.sprocket_radius
-    if parameters.sprocket_radius <= parameters.circle_radius:
+    radius = link_values(scene, parameters).riding_radius
+    if parameters.sprocket_radius <= radius:
         raise InputError(
             f"parameters.sprocket_radius: {parameters.sprocket_radius} is not greater than the circle radius "
-            f"{parameters.circle_radius}, as sprocket_radius_is: pitch needs; give a larger radius"
+            f"{radius}, as sprocket_radius_is: pitch needs; give a larger radius"
         )
-    return parameters.sprocket_radius - parameters.circle_radius
+    return parameters.sprocket_radius - radius
 
 
 def fewest_links(scene: Scene, parameters: Parameters) -> int:

@@ -196,8 +196,13 @@ def floor_marks(low: float, high: float, most: int = 9) -> list[float]:
 
 
 def side_box(walk: "WalkResult", joints: Array) -> Array:
-    """Left and right, bottom and top of what is shown from the side [m], shape (2, 2), with some of the floor."""
+    """Left and right, bottom and top of what is shown from the side [m], shape (2, 2), with some of the floor.
+
+    It is at least as broad as high, so that titles and marks have room.
+    """
     low, high = walk_box(walk, joints)
+    broad = max(0.0, (high[1] - low[1]) - (high[0] - low[0])) / 2
+    low[0], high[0] = low[0] - broad, high[0] + broad
     return np.array([[low[0], low[1] - 0.045 * max(high[:2] - low[:2])], high[:2]]).T
 
 

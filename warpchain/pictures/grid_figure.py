@@ -7,7 +7,7 @@ the lines, or the rows of a map if both have many values; all other axes give pa
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 import numpy as np
 from matplotlib import colormaps
@@ -53,17 +53,12 @@ _PANEL_SIZES: Final = {1: (5.2, 3.6), 2: (3.6, 2.9), 3: (3.0, 2.6), 4: (2.6, 2.4
 """Number of columns → width and height of a panel [inches]."""
 
 
-@dataclass(frozen=True, eq=False)
-class Axis:
+class Axis(NamedTuple):
     """An axis of a grid: numbers in rising order, or names in the order given."""
 
     name: str
-    values: Array
-
-    @property
-    def is_numeric(self) -> bool:
-        """Whether the values are numbers."""
-        return self.values.dtype.kind in "if"
+    values: tuple[Any, ...]
+    is_numeric: bool
 
 
 @dataclass(frozen=True)
@@ -105,7 +100,7 @@ def draw_grid(
     panels, left_out = _all_panels(blocks, x)
     label = with_unit(quantity_text(quantity), next(iter(blocks.values())).unit)
     are_lines = all(panel.kind == "lines" for panel in panels)
-    alike = len({(panel.kind, *map(_signature, (panel.across, panel.along))) for panel in panels}) == 1
+    alike = len({(panel.kind, panel.across, panel.along) for panel in panels}) == 1
     columns = len(panels) if len(panels) <= 3 else min(4, math.ceil(len(panels) ** 0.5))
     owner = InlineFigure(figsize=_size(panels, columns), layout="constrained") if figure is None else figure
     areas, _ = panel_grid(owner, len(panels), columns, sharex=alike, sharey=alike or are_lines)
@@ -163,9 +158,10 @@ def _all_panels(blocks: "Mapping[str, CellStatistics]", x: str | None) -> tuple[
 
 def _panels(cells: "CellStatistics", x: str | None, block: str) -> Iterator[Panel]:
     """The panels of a block; titles begin with `block`, if it is not empty."""
-    given = [Axis(name, np.asarray(values)) for name, values in cells.axes.items()]
-    rising = [np.argsort(axis.values) if axis.is_numeric else np.arange(len(axis.values)) for axis in given]
-    axes = [Axis(axis.name, axis.values[order]) for axis, order in zip(given, rising, strict=True)]
+    numeric = {name: values.dtype.kind in "if" for name, values in cells.axes.items()}
+    rising = [np.argsort(cells.axes[name]) if numeric[name] else np.arange(len(cells.axes[name])) for name in numeric]
+    given = zip(cells.axes.items(), rising, strict=True)
+    axes = [Axis(name, tuple(values[order].tolist()), numeric[name]) for (name, values), order in given]
     several = [axis for axis in axes if len(axis.values) > 1]
     kind, across, along, others = _roles(several, x)
     order = [several.index(axis) for axis in (*others, along, across) if axis is not None]
@@ -205,11 +201,6 @@ def _roles(axes: Sequence[Axis], x: str | None) -> tuple[Kind, Axis, Axis | None
     return kind, across, along, [axis for axis in axes if axis in others]
 
 
-def _signature(axis: Axis | None) -> tuple[object, ...] | None:
-    """Equal for axes that are the same."""
-    return None if axis is None else (axis.name, *axis.values.tolist())
-
-
 def _size(panels: Sequence[Panel], columns: int) -> tuple[float, float]:
     """Width and height of a figure [inches]."""
     width, height = _PANEL_SIZES[columns]
@@ -219,13 +210,11 @@ def _size(panels: Sequence[Panel], columns: int) -> tuple[float, float]:
 
 def _palettes(panels: Sequence[Panel]) -> dict[str, dict[Any, str]]:
     """Each axis that gives lines → its values in all panels → their colours, from dark to light if they are many."""
-    found: dict[str, list[Axis]] = {}
-    for panel in panels:
-        if panel.along is not None and panel.kind == "lines":
-            found.setdefault(panel.along.name, []).append(panel.along)
+    found = dict.fromkeys(panel.along for panel in panels if panel.along and panel.kind == "lines")
     palettes = {}
-    for name, axes in found.items():
-        values = list(dict.fromkeys(value for axis in axes for value in axis.values.tolist()))
+    for name in dict.fromkeys(axis.name for axis in found):
+        axes = [axis for axis in found if axis.name == name]
+        values = list(dict.fromkeys(value for axis in axes for value in axis.values))
         values = sorted(values) if all(axis.is_numeric for axis in axes) else values
         colors = list(LINE_COLORS)
         if len(values) > MOST_LINES:
@@ -236,9 +225,9 @@ def _palettes(panels: Sequence[Panel]) -> dict[str, dict[Any, str]]:
 
 def _draw_lines(axes: Axes, panel: Panel, palette: Mapping[Any, str]) -> None:
     """The lines of a panel with their bars; names along x have the points of several lines side by side."""
-    cells, values, is_numeric = panel.cells, panel.across.values, panel.across.is_numeric
+    cells, values, is_numeric = panel.cells, np.array(panel.across.values), panel.across.is_numeric
     count = len(cells.mean)
-    colors = [palette[value] for value in panel.along.values.tolist()] if panel.along else [BLUE]
+    colors = [palette[value] for value in panel.along.values] if panel.along else [BLUE]
     shifts = np.zeros(count) if is_numeric else (np.arange(count) - (count - 1) / 2) * 0.7 / count
     places = values if is_numeric else np.arange(len(values))
     for number, (shift, color) in enumerate(zip(shifts, colors, strict=True)):

@@ -163,7 +163,7 @@ def _walk(result: SweepResult, index: int, device: str | None) -> str:
     else:
         walk = run_walk(planned.setup, frame_interval=FRAME_INTERVAL)
         again, source = ", run again for this page", _compared(walk, block, place)
-    distance = f"Δx = {walk.dx:.4f} m in {walk.walk_time:.2f} s with {walk.bounces} bounces"
+    distance = f"Δx = {walk.dx:.4f} m in {walk.walk_time:.2f} s with {walk.bounces} bounce{'s' * (walk.bounces != 1)}"
     end = distance if math.isfinite(walk.dx) else walk.status.label
     text = f"Walk {index} ({', '.join(names)}){again}: {end}. {source}"
     parts = [f"<p>{escape(text)}</p>", _player(walk)]

@@ -33,7 +33,8 @@ from warpchain.store.shards import read_shard, write_shard
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import PlannedWalk, Sweep, load_sweep
 from warpchain.sweeps.sweep_file import VERSION, BlockKeys
-from warpchain.walks.rows import LENGTHS, MISSING, derived_columns, faults_of_columns, fill_row, missing_rows
+from warpchain.walks.faults import LENGTHS
+from warpchain.walks.rows import MISSING, derived_columns, faults_of_columns, fill_row, missing_rows
 from warpchain.walks.scheduler import compile_kernels, run_setups
 
 T = TypeVar("T")

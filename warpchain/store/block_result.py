@@ -17,9 +17,9 @@ from warpchain.status import Status
 from warpchain.store.cell_statistics import CellStatistics
 from warpchain.sweeps.block import POINT
 from warpchain.sweeps.plan import Sweep
+from warpchain.walks.faults import LENGTHS
 from warpchain.walks.rows import (
     COLUMNS,
-    LENGTHS,
     MISSING,
     Column,
     drawn_column,

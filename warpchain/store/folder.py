@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 from warpchain.files import given_path, make_folder, naming, remove_output, write_whole
 from warpchain.hdf5_files import open_regular
 from warpchain.inputs.validation import DamagedFileError, InputError, InputWarning
-from warpchain.store.manifest import OWN, Folder, Manifest, Shard, read_manifest
+from warpchain.store.manifest import EARLIER, OWN, Folder, Manifest, Shard, read_manifest
 from warpchain.store.shards import FOREIGN, opened_shard, rows_of, shard_files, stamp
 from warpchain.sweeps.designs import EXTENSIBLE
 from warpchain.sweeps.plan import Sweep
@@ -235,7 +235,7 @@ def _prepared(folder: Path, sweep: Sweep, manifest: Manifest, fresh: bool) -> Ma
     _clear_leftovers(folder)
     named = folder / "sweep.h5"
     if not named.exists():
-        for name in OWN:
+        for name in (*OWN, EARLIER):
             if (folder / name).exists():
                 raise InputError(f"{folder / name}: in the way of a sweep; give another folder")
         write_whole(named, manifest.image())

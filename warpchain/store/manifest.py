@@ -27,6 +27,8 @@ Folder = str | os.PathLike[str]
 
 OWN: Final = ("sweep.h5", "sweep.yaml", "shards", "log.txt")
 """What a sweep has in its folder, beside the lock."""
+EARLIER: Final = "sweep.json"
+"""What earlier versions have there instead of sweep.h5."""
 KIND: Final = "warpchain sweep"
 
 FIRST_SHARDS: Final = 32
@@ -156,8 +158,9 @@ def read_manifest(directory: Folder) -> Manifest:
     if not os.path.lexists(path):
         if not os.path.exists(directory):
             raise InputError(f"{directory}: is not there; give the folder of a sweep, or a merged file")
-        known = {"walk.h5": "a saved walk, no sweep", "sweep.json": "a sweep of an earlier warpchain, which reads it,"}
-        there = next((text for name, text in known.items() if (Path(directory) / name).exists()), "no sweep")
+        if (Path(directory) / EARLIER).exists():
+            raise InputError(f"{directory}: holds a sweep of an earlier warpchain; read it with that version")
+        there = "a saved walk, no sweep" if (Path(directory) / "walk.h5").exists() else "no sweep"
         raise InputError(f"{directory}: {there} in this folder; give the folder of one, or a merged file")
     with reading_hdf5(path, KIND, "give the folder of a sweep, or put a copy of the file there") as file:
         return Manifest(

@@ -18,6 +18,7 @@ from warpchain.inputs.sections import SECTION_OF, SECTIONS
 from warpchain.inputs.setup import Setup, combined, options_beside
 from warpchain.inputs.validation import InputError, path_of, validated
 from warpchain.sweeps.designs import walks_per_sample
+from warpchain.walks.faults import least
 
 Value = float | int | str | tuple[Any, ...] | None
 """A value of a field; truth values are integers to Python, and None is null."""
@@ -141,26 +142,35 @@ class Block:
     def _located(self, error: InputError, cell: tuple[int, ...]) -> str:
         """The text of an error about a cell, with the path of the value that it names."""
         where, _, problem = str(error).partition(": ")
-        name = where.rpartition(".")[2]
+        name, bracket, number = where.rpartition(".")[2].partition("[")
+        within = bracket + number  # of a value that is a list
         at = dict(zip(self.axes, cell, strict=True))
         if name in self.points:
-            return f"{self.path}.points.{name}[{at[POINT]}]: {problem}"
+            return f"{self.path}.points.{name}[{at[POINT]}]{within}: {problem}"
         if name in at:
             key = self.axes[name][at[name]] if name in self.named else at[name]
-            return f"{path_of(f'{self.path}.grid.{name}', key)}: {problem}"
+            return f"{path_of(f'{self.path}.grid.{name}', key)}{within}: {problem}"
         place = ", ".join(f"{name} {self.axes[name][number]}" for name, number in at.items())
         return f"{self.path}.{where}: {problem}" + (f" (in the cell {place})" if place else "")
 
     def parameter(self, name: str) -> NDArray[Any]:
-        """Values of a parameter before anything is drawn, along the axes and one for all samples, shape (…, 1)."""
-        along, values = (POINT, self.points[name]) if name in self.points else (name, self.axes.get(name))
-        if values is None and name in self.sections["parameters"]:
-            values = (self.sections["parameters"][name],)
-        if values is None:
-            presets = self.axes.get("preset", (self.preset,))
-            along, values = "preset", tuple(getattr(parameter_preset(str(preset)), name) for preset in presets)
+        """Values of a parameter or length of the scene before anything is drawn: of several the least, ∞ for null.
+
+        They lie along the axes, one for all samples, shape (…, 1).
+        """
+        section, along = self.sections[SECTION_OF[name]], POINT if name in self.points else name
+        if name in self.varied:
+            values = tuple(self.named[name].values()) if name in self.named else self.varied[name]
+        elif name in section:
+            values = (section[name],)
+        elif name in Scene.model_fields:
+            values = (Scene.model_fields[name].default,)
+        else:
+            presets, along = self.axes.get("preset", (self.preset,)), "preset"
+            values = tuple(getattr(parameter_preset(str(preset)), name) for preset in presets)
         sizes = [len(values) if axis == along else 1 for axis in self.axes]
-        return np.broadcast_to(np.reshape(np.array(values), (*sizes, 1)), (*self.shape[:-1], 1))
+        numbers = np.reshape([least(value) for value in values], (*sizes, 1))
+        return np.broadcast_to(numbers, (*self.shape[:-1], 1))
 
     def canonical(self) -> dict[str, Any]:
         """The block as JSON-able content of a file, with every default and range written out.

@@ -317,7 +317,7 @@ class WalkRun:
             **self._ending("strands_met_at", "strands_met", layout.STRANDS_MET_AT),
             **self._ending("collapsed_at", "collapse", layout.COLLAPSED_AT),
             "sprocket_height": self.raised if self._has_sprocket else math.nan,
-            **at_release(first if self._released else np.full_like(first, np.nan), self.setup.parameters.circle_radius),
+            **at_release(first if self._released else np.full_like(first, np.nan)),
         }
 
     def drain(self) -> None:
