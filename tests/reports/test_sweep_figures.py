@@ -152,8 +152,8 @@ def test_figures_are_those_that_a_sweep_has_something_for(
     for result, names in (
         (sweep6, ["distance"]),
         (saltelli, ["sensitivity"]),
-        (flawed6, ["distance", "status_counts"]),
         (make_sweep(tmp_path / "failed", SMALL, lambda walk: Status.TIME_LIMIT), ["status_counts"]),
+        (flawed6, ["distance", "status_counts"]),
     ):
         pictures = list(figures(result))
         assert [picture.name for picture in pictures] == names

@@ -212,9 +212,10 @@ def test_every_planned_walk_is_possible(sampler: str) -> None:
     assert (redrawn == impossible).all()
 
 
-def test_a_seed_draws_what_is_physical() -> None:
-    """Circles almost as wide as the mean link cut its Gaussian off in the middle: every seed draws a longer one."""
-    setups = [setup_walk("soft", {"circle_radius": 6.3399e-3}, seed) for seed in range(16)]
+@pytest.mark.parametrize("name", ["circle_radius", "charm_radius"])
+def test_a_seed_draws_what_is_physical(name: str) -> None:
+    """Circles, of all links or of one, almost as wide as the mean link cut its Gaussian off: no seed is refused."""
+    setups = [setup_walk("soft", {name: 6.3399e-3, "start": "ellipse"}, seed) for seed in range(16)]
     assert min(setup.parameters.link_length for setup in setups) > 2 * 6.3399e-3
 
 
