@@ -115,7 +115,7 @@ REFUSED: dict[Callable[..., object], list[tuple[dict[str, Any], str]]] = {
 @pytest.mark.parametrize(
     ("call", "given", "line"),
     [(call, given, line) for call, rows in REFUSED.items() for given, line in rows],
-    ids=lambda value: repr(value)[:40],
+    ids=lambda value: getattr(value, "__name__", repr(value)[:40]),
 )
 def test_what_cannot_be_used_is_refused(call: Callable[..., object], given: dict[str, Any], line: str) -> None:
     """By its name, with a remedy."""
