@@ -37,6 +37,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[Any]
 
+_Variables = dict[str, tuple[tuple[str, ...], Array, dict[str, Any]]]
+"""Name → axes, values and attributes, as xarray takes them."""
+
 
 @dataclass(frozen=True, eq=False)
 class Origin:
@@ -302,18 +305,10 @@ class BlockResult:
         return array.transpose(*self.dims, "quantity")
 
     def to_xarray(self) -> "xarray.Dataset":
-        """The block as a data set with named coordinates, units and meanings; null among numbers is NaN."""
+        """The block as a data set with named coordinates, units and meanings."""
         import xarray
 
-        points = self.origin.sweeps[0].blocks[self.number].points
-        along = {name: (name, values) for name, values in self.axes.items()}
-        along |= {"sample": ("sample", np.arange(self.shape[-1]))}
-        along |= {name: (POINT, np.array(values)) for name, values in points.items()}
-        coordinates = {
-            name: (dim, values.astype(float) if values.dtype.kind == "O" else values, self.notes(name))
-            for name, (dim, values) in along.items()
-        }
-        variables = {name: (self.dims, values, self.notes(name)) for name, values in self.columns.items()}
+        coordinates, variables = self.variables()
         return xarray.Dataset(variables, coordinates, {"block": self.name})
 
     def to_pandas(self) -> "pandas.DataFrame":
@@ -321,6 +316,18 @@ class BlockResult:
         table = self.to_xarray().to_dataframe().reset_index()
         labels = {MISSING: "missing"} | {int(status): status.label for status in Status}
         return table.assign(status=table["status"].map(labels))
+
+    def variables(self) -> tuple[_Variables, _Variables]:
+        """Coordinates and variables; null among numbers is NaN."""
+        points = self.origin.sweeps[0].blocks[self.number].points
+        along = {name: (name, values) for name, values in self.axes.items()}
+        along |= {"sample": ("sample", np.arange(self.shape[-1]))}
+        along |= {name: (POINT, np.array(values)) for name, values in points.items()}
+        coordinates: _Variables = {
+            name: ((dim,), values.astype(float) if values.dtype.kind == "O" else values, self.notes(name))
+            for name, (dim, values) in along.items()
+        }
+        return coordinates, {name: (self.dims, values, self.notes(name)) for name, values in self.columns.items()}
 
     def notes(self, name: str) -> dict[str, Any]:
         """Attributes of a variable."""

@@ -17,9 +17,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpchain.files import Kind, checked_output, given_path, write_whole
 from warpchain.hdf5_files import hdf5_image, kind_of_hdf5
@@ -134,19 +135,32 @@ _MERGED: Final = Kind("merged sweep", _is_merged)
 
 def _fill(file: "h5py.File", whole: SweepResult) -> None:
     """Fill the empty file."""
-    import h5netcdf  # type: ignore[import-untyped]
-    from xarray.backends import H5NetCDFStore
-
     file.attrs.update(whole.notes())
     for name, block in whole.blocks.items():
-        path, data = "/" if len(whole.blocks) == 1 else name, block.to_xarray()
+        group = file if len(whole.blocks) == 1 else file.create_group(name, track_order=True)
+        group.attrs["block"] = name
+        coordinates, variables = block.variables()
+        if further := [name for name, (dims, _, _) in coordinates.items() if dims != (name,)]:
+            group.attrs["coordinates"] = " ".join(further)  # as xarray has it
         if len(whole.origin.sweeps) > 1:
             seeds = [str(whole.origin.sweeps[number].seed) for number, _ in whole.origin.samples(block.number)]
             notes = {"units": "1", "description": "seed of the sweep that the sample belongs to"}
-            data["seed"] = ("sample", np.array(seeds, object), notes)
-        with h5netcdf.File(file, "a") as netcdf:
-            group = netcdf if path == "/" else netcdf.create_group(path)
-            encoding = {variable: {"zlib": True, "shuffle": True} for variable in data.data_vars}
-            data.dump_to_store(H5NetCDFStore(group), encoding=encoding)
-        for place, motion in block.kept_motions(np.flatnonzero(block.kept).tolist()):
-            file.copy(motion, file[path].require_group("motion"), str(place))
+            variables["seed"] = (("sample",), np.array(seeds, object), notes)
+        for name, (dims, values, notes) in {**coordinates, **variables}.items():
+            _put(group, name, values, notes, () if dims == (name,) else dims)
+        for place, motion in block.kept_motions(np.flatnonzero(block.kept)):
+            group.copy(motion, group.require_group("motion"), str(place))
+
+
+def _put(group: "h5py.Group", name: str, values: NDArray[Any], notes: Mapping[str, Any], dims: Sequence[str]) -> None:
+    """Write a variable along some axes, or one of the axes."""
+    if values.dtype.kind == "b":  # NetCDF has no truth values; xarray's way to write them
+        values, notes = values.astype(np.int8), {**notes, "dtype": "bool"}
+    if values.dtype.kind == "U":
+        values = values.astype(object)
+    dataset = group.create_dataset(name, data=values, **({"compression": "gzip", "shuffle": True} if dims else {}))
+    dataset.attrs.update(notes)
+    if not dims:
+        dataset.make_scale(name)
+    for place, dim in enumerate(dims):
+        dataset.dims[place].attach_scale(group[dim])
