@@ -65,8 +65,10 @@ def _watch(
 class Watched:
     """A loop that is sampled every STEP, and the world that watches it.
 
-    `drive` has fields of the world's drive that are not the usual ones, `loads` the factor of the loads after each
-    sample.
+    Attributes:
+        duration: Of all samples [s].
+        drive: Fields of the world's drive that are not the usual ones.
+        loads: Factor of the loads after each sample.
     """
 
     duration: float = 4.0
@@ -120,9 +122,13 @@ def first_sample(moment: float) -> float:
 
 
 def end_of_watch(start: float, window: float, wanted: float, since: float | None = None) -> float:
-    """When the first window ends that is not before a time wanted, for which the shape must be kept.
+    """When the first window ends that is not before a time wanted.
 
-    The time is counted from `since`, or from the end of the first window.
+    Args:
+        start: Of the first window.
+        window: Length of each.
+        wanted: The time for which the shape must be kept.
+        since: From when on it is counted; None: from the end of the first window.
     """
     length = first_sample(window)
     if since is None:
