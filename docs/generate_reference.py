@@ -18,7 +18,7 @@ from warpchain.inputs.methods import METHODS, METHODS_BY_NEED
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS, Parameters
 from warpchain.inputs.scene import LISTS, Scene
-from warpchain.inputs.validation import field_unit, spelled
+from warpchain.inputs.validation import FIELDS, field_limits, field_unit, spelled
 from warpchain.status import Status
 from warpchain.sweeps.designs import SAMPLERS
 from warpchain.sweeps.recording import FRAME_INTERVAL, SERIES_INTERVAL, Frames
@@ -110,7 +110,9 @@ def parameters_page() -> str:
             ascii_symbol = spelled(row.symbol)
             symbol = row.symbol if ascii_symbol == row.symbol else f"{row.symbol}, `{ascii_symbol}`"
             value = f"{row.value:g}" + (f" ± {row.sigma:g}" if row.sigma else "")
-            bounds = f"{'[' if row.bounds.lower_included else '('}{row.bounds.lower:g}, {row.bounds.upper:g}]"
+            limits = field_limits(FIELDS[name])
+            bounds = f"[{limits['ge']:g}" if "ge" in limits else f"({limits['gt']:g}"
+            bounds += f", {limits['le']:g}]"
             rows.append((f"`{name}`", symbol, in_unit(value, row.unit), bounds, row.meaning))
         tables.append(f"## {source.capitalize()}\n\n" + table(("name", "symbol", "value", "bounds", "meaning"), rows))
     differing = {
@@ -190,8 +192,8 @@ def sweep_file_page() -> str:
         "`[10, 15, 20]`, or a range with both ends: `{from: 5, to: 30, step: 5}` or `{from: 5, to: 30, count: 6}`. The "
         "last axis varies fastest. `null` stands for itself where a field may be null, such as `load_factor: [null, "
         "1]`; in merged files, xarray and pandas it is NaN. "
-        f"{', '.join(f'`{name}`' for name in LISTS)} take lists of their own: for several of them, give blocks, each "
-        "with `scene: {floor: …}`.\n"
+        "Where a value may be a list itself, each has a name, as in `floor: {flat: flat, ramp: [[0, 0], [1, 0.1]]}`: "
+        f"{', '.join(f'`{name}`' for name in LISTS)}.\n"
         "\n## Distributions\n\nThe key `all` says what is drawn of the other quantities: `table` (the default) or "
         "`fixed`, nothing. Each quantity takes one of `table`, `fixed`, `{uniform: [lower, upper]}` and "
         "`{gaussian: {mean: …, sigma: …}}`; without `mean` the Gaussian lies about the chain's value. Given values, "

@@ -10,30 +10,24 @@ COMPILER_FLAGS = (
 
 @dataclass(frozen=True)
 class Features:
-    """What a step kernel is compiled for; code for anything else is left out.
+    """What a step kernel is compiled for; code for anything else is left out."""
 
-    Attributes:
-        method: Name of a method, see :mod:`methods.method`.
-        columns: Width of a chain's scratch, see :func:`layout.padded_width`.
-        fixed_body: A key of :data:`contacts.fixed_body.BODIES`.
-        self_contact: Contacts between a chain's own links.
-        tilts: Whether the plane of the chain may move, see :mod:`physics.plane`; with an explicit method only.
-        moving_sprocket: Whether the sprocket is there as well, above a floor, and moves.
-    """
-
-    method: str
-    columns: int
-    fixed_body: str
-    self_contact: bool
+    method: str  # name of a method, see :mod:`methods.method`
+    columns: int  # width of a chain's scratch, see :func:`layout.padded_width`
+    fixed_body: str  # A key of :data:`contacts.fixed_body.BODIES`
+    self_contact: bool  # contacts between a chain's own links
+    # whether the plane of the chain may move, see :mod:`physics.plane`; with an explicit method only
     tilts: bool = False
-    moving_sprocket: bool = False
+    moving_sprocket: bool = False  # whether the sprocket is there as well, above a floor, and moves
 
     @property
     def is_driven(self) -> bool:
         """Whether there is a driven sprocket: loads and links may change at a sample."""
-        return self.fixed_body == "sprocket"
+        from warpchain.kernels.contacts.fixed_body import BODIES  # only a kernel that is compiled needs its source
+
+        return BODIES[self.fixed_body].is_driven
 
     @property
     def has_floor(self) -> bool:
         """Whether there is a floor of any kind."""
-        return self.fixed_body not in ("none", "sprocket")
+        return self.fixed_body != "none" and not self.is_driven

@@ -1,18 +1,22 @@
 """What all studies share: their commands, how their figures look, and how their tables get into their pages."""
 
 import csv
+import math
+import re
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
 
 import numpy as np
 import typer
+import xarray
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from warpchain import InputError
+from warpchain import InputError, Status
 
 LINE_COLORS: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Colours that people with any kind of colour vision can tell apart (Okabe and Ito, 2008)."""
@@ -34,6 +38,65 @@ def run_study(main: Callable[..., None]) -> None:
         typer.run(main)
     except (InputError, OSError) as error:
         sys.exit(str(error))
+
+
+def at_rest(block: Any, quantity: str = "dx") -> xarray.DataArray:
+    """A column of a block with named axes, links and frequency in front, samples last; NaN of walks not at rest."""
+    values = np.where(block.columns["status"] == Status.AT_REST, block.columns[quantity], np.nan)
+    axes = {name: points for name, points in block.axes.items() if name != "point"}
+    return xarray.DataArray(values, axes, block.dims).transpose("links", "frequency", ..., missing_dims="ignore")
+
+
+@dataclass(frozen=True)
+class OverCells:
+    """Values of several cells, each with a standard error, taken together.
+
+    Attributes:
+        values, errors: of the cells that have both.
+        mean: of the values.
+        error: its standard error.
+        typical: root mean square of the values without what their errors contribute.
+        chi2: of no value in any cell.
+        rises, falls: numbers of cells that are significant at 95 %.
+    """
+
+    values: np.ndarray
+    errors: np.ndarray
+    mean: float
+    error: float
+    typical: float
+    chi2: float
+    rises: int
+    falls: int
+
+    def __len__(self) -> int:
+        """Number of the cells."""
+        return len(self.values)
+
+
+def over_cells(values: ArrayLike, errors: ArrayLike) -> OverCells:
+    """Cells taken together; those without a value or an error are left out."""
+    values, errors = np.asarray(values, float).ravel(), np.asarray(errors, float).ravel()
+    known = np.isfinite(values) & np.isfinite(errors)
+    values, errors = values[known], errors[known]
+    if not len(values):
+        return OverCells(values, errors, math.nan, math.nan, math.nan, 0.0, 0, 0)
+    sizes = np.divide(values, errors, out=np.zeros(len(values)), where=errors > 0)
+    return OverCells(
+        values,
+        errors,
+        mean=float(values.mean()),
+        error=float(np.sqrt(np.sum(errors**2)) / len(values)),
+        typical=float(np.sqrt(max(0.0, float(np.mean(values**2 - errors**2))))),
+        chi2=float(np.sum(sizes**2)),
+        rises=int(np.sum(sizes > 1.96)),
+        falls=int(np.sum(sizes < -1.96)),
+    )
+
+
+def minus(text: str) -> str:
+    """The text with signs for hyphens, but for the line under the head of a table."""
+    return re.sub("(?<!-)-(?!-)", "−", text)
 
 
 def drawn_terms(columns: Mapping[str, Any]) -> list[NDArray[np.float64]]:
@@ -71,6 +134,17 @@ def error_line(axes: Axes, x: Any, cells: Any, place: tuple[Any, ...], **style: 
     axes.errorbar(x, cells.mean[place], cells.standard_error[place], **style)
 
 
+def of_cells(block: Any) -> Iterator[tuple[tuple[int, ...], list[float]]]:
+    """Place of each cell of a block, and the values of its axes there."""
+    for place in np.ndindex(*map(len, block.axes.values())):
+        yield place, [values[number] for values, number in zip(block.axes.values(), place, strict=True)]
+
+
+def mean_where(chosen: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Means over the samples of each cell of chosen walks; NaN without one."""
+    return np.ma.masked_array(values, ~chosen).mean(axis=-1).filled(np.nan)
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a file; its folder is made."""
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -106,8 +180,12 @@ def with_tables(text: str, tables: Mapping[str, str]) -> str:
     return text
 
 
-def write_tables(page: Path, tables: Mapping[str, str]) -> None:
-    """Put tables between the markers of a page, and print them."""
+def publish(folder: Path, tables: Mapping[str, str], figures: Mapping[str, Figure], dpi: int = 200) -> None:
+    """Put tables between the markers of a study's page, and print them; write its figures, figures/NAME.png."""
     for name, table in tables.items():
         print(f"\n{name}\n{table}")
-    write_text(page, with_tables(page.read_text(encoding="utf-8"), tables))
+    page = folder / "README.md"
+    if tables:
+        write_text(page, with_tables(page.read_text(encoding="utf-8"), tables))
+    for name, figure in figures.items():
+        save_figure(figure, folder / "figures" / f"{name}.png", dpi)

@@ -12,14 +12,13 @@ import warp as wp
 from warpchain.kernels import layout
 from warpchain.kernels.layout import STAGE_ROWS, STAGES, U, V, X, Y
 from warpchain.kernels.methods.controller import error_bits
-from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
+from warpchain.kernels.methods.explicit_tableaus import Tableau
 from warpchain.kernels.physics.elementary import LARGEST_TURN, TWO, ZERO, cos_sin, order_bits
-from warpchain.kernels.physics.geometry import end_positions, end_velocities, turned, whole_lanes
+from warpchain.kernels.physics.geometry import Link, end_positions, end_velocities, turned, whole_lanes
 from warpchain.kernels.physics.joint import friction_torque, joint_force, link_acceleration
+from warpchain.kernels.physics.load import link_load
 from warpchain.kernels.physics.plane import plane_load
 from warpchain.kernels.types import Chain, Rows
-
-wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
@@ -68,6 +67,20 @@ def begin_stages(K: Rows, chain: Chain):
     K[layout.STAGE_SPIN, n] = K[layout.STAGE_SPIN, 0]
 
 
+@wp.func
+def link_in_stage(K: Rows, i: int) -> Link:
+    """A link in a stage, whose ends are placed."""
+    link = Link()
+    link.arm_x = K[layout.STAGE_ARM_X, i]
+    link.arm_y = K[layout.STAGE_ARM_Y, i]
+    link.omega = K[layout.STAGE_SPIN, i]
+    link.x = K[layout.RIGHT_X, i] - link.arm_x
+    link.y = K[layout.RIGHT_Y, i] - link.arm_y
+    link.u = K[layout.RIGHT_U, i] + link.omega * link.arm_y
+    link.v = K[layout.RIGHT_V, i] - link.omega * link.arm_x
+    return link
+
+
 def sums_over_stages(velocity: tuple[float, ...], position: tuple[float, ...]):
     """Warp function ``sums(K, i)``: Σ w_j (ẍ, ÿ, θ̈)_j of link i over the stages, for either row of weights w.
 
@@ -97,24 +110,24 @@ def sums_over_stages(velocity: tuple[float, ...], position: tuple[float, ...]):
 
 
 @functools.cache
-def explicit_method(name: str, tilts: bool = False):
+def explicit_method(tableau: Tableau, tilts: bool = False):
     """Warp functions of one tableau: (evaluate the first stage, attempt a step, commit it).
 
     Args:
-        name: Key of :data:`TABLEAUS`.
+        tableau: Its coefficients.
         tilts: Whether the plane of the chain may move; ``chain`` is then on the plane of the middle of the step.
 
     Returns:
         ``first_stage(K, chain)``, ``attempt(K, chain, h, tolerance)`` → bits of the greatest error ratio (see
         :func:`order_bits`), ``commit(K, chain, h)``.
     """
-    tableau = TABLEAUS[name]
     stages = tableau.stages
     reuses_last = tableau.first_same_as_last
     nodes, velocity_weights = tableau.nodes, tableau.velocity_weights
     stage_sums = [sums_over_stages(*rows) for rows in zip(tableau.velocity, tableau.position, strict=True)]
     new_state = sums_over_stages(velocity_weights, tableau.position_weights)
     errors = sums_over_stages(tableau.velocity_errors, tableau.position_errors)
+    load = plane_load if tilts else link_load
     last_row = STAGES + STAGE_ROWS * (stages - 1)
     power_needed = tuple(
         weight != 0.0 or (reuses_last and velocity_weights[0] != 0.0 and stage == stages - 1)
@@ -125,9 +138,6 @@ def explicit_method(name: str, tilts: bool = False):
     def derivatives(K: Rows, chain: Chain, row: int, needs_power: bool):
         n = chain.link_count
         lanes = whole_lanes(n)
-        weightless = chain
-        if wp.static(tilts):
-            weightless.gravity = ZERO
         i = int(0)
         while i < lanes:
             cx = K[layout.LEFT_X, i + 1] - K[layout.RIGHT_X, i]
@@ -149,7 +159,6 @@ def explicit_method(name: str, tilts: bool = False):
         i = int(0)
         while i < lanes:
             ax, ay, spin_rate = link_acceleration(
-                weightless,
                 K[layout.INVERSE_MASS, i],
                 K[layout.INVERSE_INERTIA, i],
                 K[layout.STAGE_ARM_X, i],
@@ -161,20 +170,12 @@ def explicit_method(name: str, tilts: bool = False):
                 K[layout.TORQUE, i],
                 K[layout.TORQUE, i + 1],
             )
-            if wp.static(tilts):
-                load_x, load_y, load_turn = plane_load(
-                    chain,
-                    K[layout.RIGHT_X, i] - K[layout.STAGE_ARM_X, i],
-                    K[layout.RIGHT_Y, i] - K[layout.STAGE_ARM_Y, i],
-                    K[layout.STAGE_ARM_X, i],
-                    K[layout.STAGE_ARM_Y, i],
-                )
-                ax += load_x
-                ay += load_y
-                spin_rate += load_turn
-            K[row, i] = ax
-            K[row + 1, i] = ay
-            K[row + 2, i] = spin_rate
+            load_x, load_y, load_turn = load(
+                chain, i, link_in_stage(K, i), K[layout.INVERSE_MASS, i], K[layout.INVERSE_INERTIA, i]
+            )
+            K[row, i] = ax + load_x
+            K[row + 1, i] = ay + load_y
+            K[row + 2, i] = spin_rate + load_turn
             i += 1
 
     @wp.func
@@ -285,12 +286,8 @@ def explicit_method(name: str, tilts: bool = False):
                     damping += wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 4), i]
             K[layout.LOST_FRICTION, i] = K[layout.LOST_FRICTION, i] + h * friction
             K[layout.LOST_DAMPING, i] = K[layout.LOST_DAMPING, i] + h * damping
-            K[X, i] = K[layout.NEW_X, i]
-            K[Y, i] = K[layout.NEW_Y, i]
-            K[layout.THETA, i] = K[layout.NEW_THETA, i]
-            K[U, i] = K[layout.NEW_U, i]
-            K[V, i] = K[layout.NEW_V, i]
-            K[layout.OMEGA, i] = K[layout.NEW_OMEGA, i]
+            for row in range(6):
+                K[wp.static(X + row), i] = K[wp.static(layout.NEW_X + row), i]
             if wp.static(reuses_last):
                 for row in range(wp.static(STAGE_ROWS)):
                     K[wp.static(STAGES + row), i] = K[wp.static(last_row + row), i]

@@ -10,8 +10,6 @@ from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.physics.joint import friction_torque, joint_force
 from warpchain.kernels.types import Chain, Record, Rows, State
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.func
 def write_row(rows: Rows, row: int, time: wp.float64, summary: Summary):

@@ -36,8 +36,6 @@ from warpchain.kernels.physics.elementary import HALF, ONE, ZERO
 from warpchain.kernels.physics.scaled_loads import DRAG_PER_CROSSING, DRAG_PER_TURN, crossing_time
 from warpchain.kernels.types import LOADING_TIME, Chain, Drive, Row, State
 
-wp.set_module_options({"enable_backward": False})
-
 LITTLE_SLIP = wp.constant(wp.float64(0.006))
 """Slip above which a free loop is watched for as long as slow waves need.
 

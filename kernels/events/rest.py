@@ -12,8 +12,6 @@ from warpchain.kernels.layout import REST_SINCE
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.types import Control, Drive, State
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.func
 def watch_rest(

@@ -11,12 +11,11 @@ from warpchain.kernels.events.release import drag_rate, load_at, watch_steadines
 from warpchain.kernels.events.rest import watch_rest
 from warpchain.kernels.events.softening import watch_collapse, watch_drive, watch_stiffening
 from warpchain.kernels.events.tilting import no_fall, observe_in_room, watch_fall, write_frame_in_room
+from warpchain.kernels.features import Features
 from warpchain.kernels.layout import TIME
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.physics.scaled_loads import drag_shape
 from warpchain.kernels.types import Chain, Control, Drive, Record, Rows, State
-
-wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
@@ -33,7 +32,7 @@ VIEWS = {False: (observe, write_frame, no_fall), True: (observe_in_room, write_f
 
 
 @functools.cache
-def sampling(fixed_body: str, tilts: bool = False):
+def sampling(features: Features):
     """Warp function ``sample`` of a chain whose ends are placed: time series, frame, watches; returns the status.
 
     It is called at or after :func:`next_mark`. If only a frame is due, nothing but the record changes. It may also
@@ -41,13 +40,11 @@ def sampling(fixed_body: str, tilts: bool = False):
     between links so far (``touches``), those between strands (``meetings``) and the time of the last one on the floor
     [s] are arguments: on a GPU they are not in the state.
 
-    Args:
-        fixed_body: On a ``"sprocket"`` it watches until the loop is stationary, on a floor until it rests or is far.
-        tilts: Whether the plane of the chain may move; its sums must be those of the present state.
+    On a sprocket it watches until the loop is stationary, on a floor until the chain rests or is far. The sums of a
+    plane that tilts must be those of the present state.
     """
-    has_floor = fixed_body not in ("none", "sprocket")
-    is_driven = fixed_body == "sprocket"
-    write, append_frame, watch_plane = VIEWS[tilts]
+    has_floor, is_driven = features.has_floor, features.is_driven
+    write, append_frame, watch_plane = VIEWS[features.tilts]
 
     @wp.func
     def sample(

@@ -2,11 +2,12 @@
 
 import warp as wp
 
-from warpchain.kernels.layout import COSINE, INERTIA, LEFT_X, LEFT_Y, MASS, OMEGA, RIGHT_X, RIGHT_Y, SINE, U, V, X, Y
+from warpchain.kernels import layout
+from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, MASS, OMEGA, RADIUS, RIGHT_X, RIGHT_Y, SINE, U, V, X, Y
 from warpchain.kernels.physics.elementary import HALF, ZERO, from_order_key, order_key
+from warpchain.kernels.physics.geometry import read_link
+from warpchain.kernels.physics.load import NOTHING, link_energy, weight_energy
 from warpchain.kernels.types import Chain, Rows
-
-wp.set_module_options({"enable_backward": False})
 
 
 @wp.struct
@@ -46,10 +47,12 @@ def summarise(K: Rows, chain: Chain) -> Summary:
     along = ZERO
     square = ZERO
     area = ZERO
+    further = NOTHING
     left = order_key(K[RIGHT_X, 0])
     right = left
     bottom = order_key(K[RIGHT_Y, 0])
     top = bottom
+    lowest = order_key(wp.float64(wp.inf))
     i = int(0)
     while i < n:
         m = K[MASS, i]
@@ -59,7 +62,8 @@ def summarise(K: Rows, chain: Chain) -> Summary:
         my += m * K[Y, i]
         mu += m * K[U, i]
         mv += m * K[V, i]
-        kinetic += HALF * (m * speed + K[INERTIA, i] * K[OMEGA, i] * K[OMEGA, i])
+        further += link_energy(chain, i, read_link(K, chain, i))
+        kinetic += HALF * (m * speed + K[layout.INERTIA, i] * K[OMEGA, i] * K[OMEGA, i])
         square += speed
         along += K[U, i] * K[COSINE, i] + K[V, i] * K[SINE, i]
         cx = K[LEFT_X, i + 1] - K[RIGHT_X, i]
@@ -68,7 +72,9 @@ def summarise(K: Rows, chain: Chain) -> Summary:
         area += K[LEFT_X, i] * K[RIGHT_Y, i] - K[RIGHT_X, i] * K[LEFT_Y, i]
         left = wp.min(left, order_key(K[RIGHT_X, i]))
         right = wp.max(right, order_key(K[RIGHT_X, i]))
-        bottom = wp.min(bottom, wp.min(order_key(K[LEFT_Y, i]), order_key(K[RIGHT_Y, i])))
+        low = wp.min(K[LEFT_Y, i], K[RIGHT_Y, i])
+        bottom = wp.min(bottom, order_key(low))
+        lowest = wp.min(lowest, order_key(low - K[RADIUS, i]))
         top = wp.max(top, order_key(K[RIGHT_Y, i]))
         i += 1
     summary = Summary()
@@ -77,9 +83,9 @@ def summarise(K: Rows, chain: Chain) -> Summary:
     summary.center_u = mu / mass
     summary.center_v = mv / mass
     summary.kinetic = kinetic
-    summary.gravitational = chain.gravity * my
+    summary.gravitational = weight_energy(chain, my) + further
     summary.spring = spring
-    summary.lowest = from_order_key(bottom) - chain.circle_radius
+    summary.lowest = from_order_key(lowest)
     summary.rms_speed = wp.sqrt(square / wp.float64(n))
     summary.height = from_order_key(top) - from_order_key(bottom)
     summary.width = from_order_key(right) - from_order_key(left)

@@ -2,35 +2,13 @@
 
 import warp as wp
 
+from warpchain.kernels import layout
 from warpchain.kernels.events.record import write_frame, write_sample
 from warpchain.kernels.events.summary import Summary, summarise
-from warpchain.kernels.layout import (
-    AHEAD,
-    CENTER_W,
-    CENTER_Z,
-    FELL_AT,
-    GREATEST_LEAN,
-    LEFT_X,
-    LEFT_Y,
-    ORIGIN,
-    PLANE_COLUMN,
-    PLANE_SPEED,
-    PLANE_TURN_X,
-    PLANE_TURN_Y,
-    PLANE_VALUES,
-    RIGHT_X,
-    RIGHT_Y,
-    SUM_MASS,
-    TIME,
-    UP,
-    X,
-    Y,
-)
-from warpchain.kernels.physics.elementary import ZERO, from_order_key, order_key
+from warpchain.kernels.layout import AHEAD, FELL_AT, GREATEST_LEAN, LEFT_X, LEFT_Y, ORIGIN, PLANE_VALUES, TIME, UP, X, Y
+from warpchain.kernels.physics.elementary import ONE, ZERO, from_order_key, order_key
 from warpchain.kernels.physics.plane import plane_energy
 from warpchain.kernels.types import Chain, Record, Row, Rows, State
-
-wp.set_module_options({"enable_backward": False})
 
 FALLEN = wp.constant(wp.float64(0.7071067811865476))
 """Sine of the tilt beyond which a chain has fallen over: 45°."""
@@ -54,7 +32,7 @@ def sideways(P: Row, x: wp.float64, y: wp.float64, z: wp.float64):
 @wp.func
 def across_speed(P: Row, x: wp.float64, y: wp.float64):
     """Speed w [m/s] across the plane of the point at (x, y)."""
-    return P[PLANE_SPEED] + P[PLANE_TURN_X] * y - P[PLANE_TURN_Y] * x
+    return P[layout.PLANE_SPEED] + P[layout.PLANE_TURN_X] * y - P[layout.PLANE_TURN_Y] * x
 
 
 @wp.func
@@ -68,8 +46,12 @@ def in_room(K: Rows, P: Row, chain: Chain, flat: Summary) -> Summary:
         w = across_speed(P, K[X, i], K[Y, i])
         square += w * w
         left = order_key(component(P, UP, K[LEFT_X, i], K[LEFT_Y, i], ZERO))
-        right = order_key(component(P, UP, K[RIGHT_X, i], K[RIGHT_Y, i], ZERO))
-        bottom = wp.min(bottom, wp.min(left, right))
+        right = order_key(component(P, UP, K[layout.RIGHT_X, i], K[layout.RIGHT_Y, i], ZERO))
+        low = wp.min(left, right)
+        if K[layout.RADIUS, i] < chain.circle_radius:
+            smaller = chain.circle_radius - K[layout.RADIUS, i]
+            low = order_key(from_order_key(low) + smaller * wp.sqrt(ONE - P[UP + 2] * P[UP + 2]))
+        bottom = wp.min(bottom, low)
         i += 1
     slope = wp.sqrt(P[UP] * P[UP] + P[UP + 1] * P[UP + 1])
     extent = chain.circle_radius * slope + chain.half_width * wp.abs(P[UP + 2])
@@ -80,7 +62,7 @@ def in_room(K: Rows, P: Row, chain: Chain, flat: Summary) -> Summary:
     summary.center_u = component(P, AHEAD, flat.center_u, flat.center_v, w)
     summary.center_v = component(P, UP, flat.center_u, flat.center_v, w)
     summary.kinetic = flat.kinetic + plane_energy(P)
-    summary.gravitational = chain.gravity * P[SUM_MASS] * summary.center_y
+    summary.gravitational = chain.gravity * P[layout.SUM_MASS] * summary.center_y
     summary.lowest = P[ORIGIN + 1] + from_order_key(bottom) - extent
     summary.rms_speed = wp.sqrt(square / wp.float64(n))
     return summary
@@ -91,11 +73,11 @@ def write_plane_columns(row: Row, P: Row, flat: Summary):
     """Writes the further columns of a sample."""
     k = int(0)
     while k < PLANE_VALUES:
-        row[PLANE_COLUMN + k] = P[k]
+        row[layout.PLANE_COLUMN + k] = P[k]
         k += 1
     w = across_speed(P, flat.center_x, flat.center_y)
-    row[CENTER_Z] = P[ORIGIN + 2] + sideways(P, flat.center_x, flat.center_y, ZERO)
-    row[CENTER_W] = sideways(P, flat.center_u, flat.center_v, w)
+    row[layout.CENTER_Z] = P[ORIGIN + 2] + sideways(P, flat.center_x, flat.center_y, ZERO)
+    row[layout.CENTER_W] = sideways(P, flat.center_u, flat.center_v, w)
 
 
 @wp.func

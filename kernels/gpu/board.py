@@ -3,13 +3,11 @@
 import warp as wp
 
 from warpchain.kernels import layout
-from warpchain.kernels.gpu.stage import Attempt, Link, Place, constants, read_link
-from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, MASS, OMEGA, RIGHT_X, RIGHT_Y, SINE, THETA, U, V, X, Y
+from warpchain.kernels.gpu.stage import Attempt, Place, constants, read_link
+from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, OMEGA, RIGHT_X, RIGHT_Y, SINE, THETA, U, V, X, Y
 from warpchain.kernels.physics.elementary import ZERO, cos_sin
-from warpchain.kernels.physics.geometry import end_positions
+from warpchain.kernels.physics.geometry import Link, end_positions
 from warpchain.kernels.types import Chain, Rows, State
-
-wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
@@ -89,26 +87,6 @@ def store_extremes(K: Rows, state: State, world: int, fixed_depth: int):
 
 
 @wp.func
-def store_losses(K: Rows, state: State, world: int, n: int, fixed_loss: int):
-    """Stores the losses since loading, summed over the links in their order; for one thread."""
-    friction = ZERO
-    damping = ZERO
-    fixed = ZERO
-    between = ZERO
-    i = int(0)
-    while i < n:
-        friction += K[layout.BOARD_LOST_FRICTION, i]
-        damping += K[layout.BOARD_LOST_DAMPING, i]
-        fixed += K[layout.BOARD_LOST_FIXED, i]
-        between += K[layout.BOARD_LOST_SELF, i]
-        i += 1
-    state.losses[world, layout.LOSS_FRICTION] = friction
-    state.losses[world, layout.LOSS_DAMPING] = damping
-    state.losses[world, fixed_loss] = fixed
-    state.losses[world, layout.LOSS_SELF] = between
-
-
-@wp.func
 def point(K: Rows, lane: int):
     """Writes a link's direction, exactly, from its angle on the board."""
     cosine, sine = cos_sin(K[THETA, lane])
@@ -136,18 +114,3 @@ def publish(K: Rows, place: Place):
         if lane == 0:
             K[LEFT_X, n] = left_x
             K[LEFT_Y, n] = left_y
-
-
-@wp.func
-def link_is_finite(K: Rows, lane: int):
-    """False if the state or its first derivative holds an infinity or a NaN."""
-    finite = bool(True)
-    row = int(0)
-    while row < MASS:
-        finite = finite and wp.isfinite(K[row, lane])
-        row += 1
-    row = int(layout.BOARD_FIRST)
-    while row < layout.BOARD_FIRST + 3:
-        finite = finite and wp.isfinite(K[row, lane])
-        row += 1
-    return finite

@@ -12,7 +12,6 @@ import warp as wp
 
 from warpchain.kernels.gpu.stage import (
     Attempt,
-    Link,
     Place,
     block_stage,
     greater,
@@ -24,12 +23,10 @@ from warpchain.kernels.gpu.stage import (
     vec5d,
 )
 from warpchain.kernels.layout import INVERSE_INERTIA, INVERSE_MASS, THETA
-from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
+from warpchain.kernels.methods.explicit_tableaus import Tableau
 from warpchain.kernels.physics.elementary import LARGEST_TURN, ONE, ZERO, cos_sin
-from warpchain.kernels.physics.geometry import turned
+from warpchain.kernels.physics.geometry import Link, turned
 from warpchain.kernels.types import Ground, Rows
-
-wp.set_module_options({"enable_backward": False})
 
 
 @wp.struct
@@ -45,11 +42,11 @@ class Ahead:
 
 
 @functools.cache
-def explicit_attempt(name: str, block_dim: int, write_proximity: Any, read_proximity: Any, tilts: bool = False):
+def explicit_attempt(tableau: Tableau, block_dim: int, write_proximity: Any, read_proximity: Any, tilts: bool = False):
     """Warp function that attempts a step with a tableau in blocks of this size.
 
     Args:
-        name: Key of :data:`TABLEAUS`.
+        tableau: Its coefficients.
         block_dim: Threads in a block.
         write_proximity: See :func:`gpu.contacts.proximity.block_proximity`.
         read_proximity: See :func:`gpu.contacts.proximity.block_proximity`.
@@ -59,7 +56,6 @@ def explicit_attempt(name: str, block_dim: int, write_proximity: Any, read_proxi
         ``attempt(ends, forces, maxima, K, place, ground, h)`` → Attempt, from the state and first stage on the board;
         ``maxima``: memory of ``write_proximity``.
     """
-    tableau = TABLEAUS[name]
     stages, last = tableau.stages, tableau.stages - 1
     reuses_last = tableau.first_same_as_last
     velocity_weights = tableau.velocity_weights

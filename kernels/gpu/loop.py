@@ -18,7 +18,7 @@ from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.events.record import record_is_full
 from warpchain.kernels.events.tallies import attempts_made
 from warpchain.kernels.features import COMPILER_FLAGS, Features
-from warpchain.kernels.gpu.board import link_is_finite, place_of, raise_value, write_attempt
+from warpchain.kernels.gpu.board import place_of, raise_value, write_attempt
 from warpchain.kernels.gpu.contacts.contact_pass import block_contact_pass
 from warpchain.kernels.gpu.contacts.proximity import block_proximity
 from warpchain.kernels.gpu.contacts.self_contacts import touch_layout
@@ -39,11 +39,9 @@ from warpchain.kernels.gpu.threads import barrier, block_maxima, tile_address, v
 from warpchain.kernels.gpu.tilting import block_tilting
 from warpchain.kernels.gpu.upright import block_upright
 from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step, step_controller
-from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
 from warpchain.kernels.methods.method import find_method
+from warpchain.kernels.physics.geometry import link_is_finite
 from warpchain.kernels.types import Control, Drive, Ground, Integers, Model, Record, Rows, State, read_ground
-
-wp.set_module_options({"enable_backward": False})
 
 REGISTERS_OF_MULTIPROCESSOR = 65536
 
@@ -63,13 +61,13 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     available = REGISTERS_OF_MULTIPROCESSOR // block_dim // 8 * 8
     if available < 255:
         registers = min(registers or available, available)
-    method = find_method(features.method)
+    tableau = find_method(features.method).tableau
     columns = features.columns
     tilts = features.tilts
     lists_size = list_layout(columns).size
     has_contacts = features.fixed_body != "none" or features.self_contact
-    reuses_last = method.reuses_last
-    needs_first_power = TABLEAUS[method.tableau].velocity_weights[0] != 0.0
+    reuses_last = tableau.first_same_as_last
+    needs_first_power = tableau.velocity_weights[0] != 0.0
     is_shared = shares_board(block_dim)
     width = block_dim + 1
     kept_width = columns if is_shared else width
@@ -85,10 +83,9 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     greatest, _write, _read = block_maxima(block_dim)
     maxima_address = tile_address(vec4i, block_dim)
     write_proximity, read_proximity, _ = block_proximity(features, block_dim)
-    attempt = explicit_attempt(method.tableau, block_dim, write_proximity, read_proximity, tilts)
+    attempt = explicit_attempt(tableau, block_dim, write_proximity, read_proximity, tilts)
     plane = block_tilting(block_dim) if tilts else block_upright(features.fixed_body)
-    begin_step, end_step, after_first_stage = plane.begin_step, plane.end_step, plane.after_first_stage
-    growth, shrinkage = step_controller(method.order, method.error_order, wp.float32)
+    growth, shrinkage = step_controller(tableau.order, tableau.error_order, wp.float32)
     begin_contacts, meet = block_contact_pass(features, block_dim, touch, plane)
     load_run, store_run = block_run(features, touch, kept_width, plane)
     take_sample = block_sample(features, touch, plane)
@@ -107,7 +104,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             K[layout.INVERSE_INERTIA, column],
         )
         write_first_stage(K, place.lane, first, wp.static(needs_first_power))
-        after_first_stage()
+        plane.after_first_stage()
 
     @wp.func
     def measure_proximity(ends: wp.tile[vec5d, block_dim], K: Rows, maxima: wp.uint64, place: Place, ground: Ground):
@@ -136,7 +133,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         if wp.isfinite(error):
             step = h * wp.float64(shrinkage(error))
         else:
-            broken = wp.where(place.lane >= place.links or link_is_finite(K, place.lane), 0, 1)
+            broken = wp.where(place.lane >= place.links or link_is_finite(K, place.lane, layout.BOARD_FIRST), 0, 1)
             barrier()  # all have read the errors
             if greatest(errors, place.lane, broken) > 0:
                 status = int(NOT_FINITE)
@@ -227,7 +224,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             reaches_stop = time + h >= stop_time
             if reaches_stop:
                 h = stop_time - time
-            begin_step(K, P, place, h)
+            plane.begin_step(K, P, place, h)
             result = attempt(ends, forces, maxima_start, K, place, ground, h)
             error = greatest_error(errors, K, place, result)
             attempts += 1
@@ -245,7 +242,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     next_end, proximity = measure_proximity(ends, K, maxima_start, place, ground)
                 if lane == 0:
                     raise_value(K, layout.VALUE_OPENING, proximity.opening)
-                end_step(K, P, M, place, h)
+                plane.end_step(K, P, M, place, h)
                 is_hit, pairs, reach, status = meet(
                     K, L, T, E, F, P, M, drive, state, control, place, ground, world, time, proximity, pairs
                 )

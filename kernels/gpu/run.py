@@ -9,44 +9,31 @@ from warpchain.kernels.events.present_chain import has_changed, present_chain
 from warpchain.kernels.events.record import lacks_last_sample, record_is_full
 from warpchain.kernels.events.sample import VIEWS, next_mark, sampling
 from warpchain.kernels.events.softening import book_softening, contact_step, spring_tolerance
-from warpchain.kernels.events.tallies import add_count, of_fixed_body, raise_extreme
+from warpchain.kernels.events.tallies import add_count, of_fixed_body, raise_extreme, row_total, store_losses
 from warpchain.kernels.features import Features
-from warpchain.kernels.gpu.board import load_extremes, load_link, publish, store_extremes, store_link, store_losses
+from warpchain.kernels.gpu.board import load_extremes, load_link, publish, store_extremes, store_link
 from warpchain.kernels.gpu.contacts.self_contacts import TouchLayout
 from warpchain.kernels.gpu.stage import Place, write_constants
 from warpchain.kernels.gpu.threads import barrier, clock
 from warpchain.kernels.gpu.upright import BlockPlane
-from warpchain.kernels.layout import (
-    BOARD_LOST_SELF,
-    BOARD_VALUES,
-    SELF_IMPULSES,
-    STRAND_IMPULSES,
-    VALUE_CONTACT_STEP,
-    VALUE_DEADLINE,
-    VALUE_LAST_IMPULSE,
-    VALUE_NEXT_SAMPLE,
-    VALUE_STOP_TIME,
-    VALUE_TOLERANCE,
-)
+from warpchain.kernels.layout import BOARD_LOST_SELF, BOARD_VALUES, SELF_IMPULSES, STRAND_IMPULSES, VALUE_DEADLINE
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.physics.scaled_loads import write_link
 from warpchain.kernels.types import Control, Drive, Integers, Model, Record, Row, Rows, State
-
-wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
 def write_step_bounds(K: Rows, drive: Drive, state: State, control: Control, world: int, is_driven: bool):
     """Writes the bounds of steps on springs after the last sample on the board."""
-    K[BOARD_VALUES, VALUE_CONTACT_STEP] = contact_step(state, control, world, is_driven)
-    K[BOARD_VALUES, VALUE_TOLERANCE] = spring_tolerance(drive, state, control, world, is_driven)
+    K[BOARD_VALUES, layout.VALUE_CONTACT_STEP] = contact_step(state, control, world, is_driven)
+    K[BOARD_VALUES, layout.VALUE_TOLERANCE] = spring_tolerance(drive, state, control, world, is_driven)
 
 
 @wp.func
 def write_marks(K: Rows, state: State, control: Control, world: int):
     """Writes when the run stops and when the next sample or frame is due on the board."""
-    K[BOARD_VALUES, VALUE_STOP_TIME] = state.stop_time[world]
-    K[BOARD_VALUES, VALUE_NEXT_SAMPLE] = next_mark(state, control, world)
+    K[BOARD_VALUES, layout.VALUE_STOP_TIME] = state.stop_time[world]
+    K[BOARD_VALUES, layout.VALUE_NEXT_SAMPLE] = next_mark(state, control, world)
 
 
 @functools.cache
@@ -64,9 +51,7 @@ def block_run(features: Features, touch: TouchLayout, kept_width: int, plane: Bl
         ``store(K, T, P, model, state, record, scratch, control, place, world, time, status, accepted, attempts)``.
     """
     is_driven = features.is_driven
-    fixed_loss, fixed_depth, fixed_count = of_fixed_body(features.fixed_body)
-    present = present_chain(is_driven)
-    load_plane, store_plane = plane.load, plane.store
+    fixed_loss, fixed_depth, fixed_count = of_fixed_body(features.is_driven)
     write_sample, _, _ = VIEWS[features.tilts]
 
     @wp.func
@@ -99,8 +84,8 @@ def block_run(features: Features, touch: TouchLayout, kept_width: int, plane: Bl
                 K[row, lane] = wp.where(is_fresh, ZERO, kept[row, lane])
                 row += 1
         if lane == 0:
-            write_constants(K, present(model, state, control, world))
-            load_plane(K, P, state, world)
+            write_constants(K, present_chain(model, state, control, world))
+            plane.load(K, P, state, world)
             write_step_bounds(K, drive, state, control, world, wp.static(is_driven))
             load_extremes(K, state, world, fixed_depth)
             write_marks(K, state, control, world)
@@ -144,10 +129,11 @@ def block_run(features: Features, touch: TouchLayout, kept_width: int, plane: Bl
                 kept[row, lane] = K[row, lane]
                 row += 1
         if lane == 0:
-            store_plane(P, state, world)
+            plane.store(P, state, world)
             if is_last:
-                write_sample(K, present(model, state, control, world), state, record, world, time)
-            store_losses(K, state, world, place.links, wp.static(fixed_loss))
+                write_sample(K, present_chain(model, state, control, world), state, record, world, time)
+            store_losses(K, layout.BOARD_LOST_FRICTION, state, world, place.links, wp.static(fixed_loss))
+            state.losses[world, layout.LOSS_SELF] = row_total(K, BOARD_LOST_SELF, place.links)
             add_count(state, world, layout.ACCEPTED, wp.int64(accepted))
             add_count(state, world, layout.REJECTED, wp.int64(attempts - accepted))
             add_count(state, world, fixed_count, wp.int64(T[wp.static(touch.fixed_hits)]))
@@ -170,9 +156,7 @@ def block_sample(features: Features, touch: TouchLayout, plane: BlockPlane):
     so that its first stage must be evaluated again; whether the launch pauses; status.
     """
     is_driven = features.is_driven
-    sample = sampling(features.fixed_body, features.tilts)
-    present = present_chain(is_driven)
-    store_plane = plane.store
+    sample = sampling(features)
 
     @wp.func
     def take_sample(
@@ -193,16 +177,16 @@ def block_sample(features: Features, touch: TouchLayout, plane: BlockPlane):
         publish(K, place)
         barrier()
         if place.lane == 0:
-            store_plane(P, state, world)
-            chain = present(model, state, control, world)
+            plane.store(P, state, world)
+            chain = present_chain(model, state, control, world)
             touches = state.counts[world, SELF_IMPULSES] + wp.int64(T[wp.static(touch.self_hits)])
             meetings = state.counts[world, STRAND_IMPULSES] + wp.int64(T[wp.static(touch.strand_hits)])
-            last_impulse = K[BOARD_VALUES, VALUE_LAST_IMPULSE]
+            last_impulse = K[BOARD_VALUES, layout.VALUE_LAST_IMPULSE]
             T[wp.static(touch.mailbox)] = sample(
                 K, chain, drive, state, record, control, world, time, touches, meetings, last_impulse
             )
             if has_changed(state, world, softness, load_factor):
-                after = present(model, state, control, world)
+                after = present_chain(model, state, control, world)
                 book_softening(chain, after, state, world)
                 write_constants(K, after)
             write_step_bounds(K, drive, state, control, world, wp.static(is_driven))

@@ -12,34 +12,20 @@ import functools
 import warp as wp
 
 from warpchain.kernels import layout
-from warpchain.kernels.layout import COSINE, OMEGA, SINE, U, V, X, Y
 from warpchain.kernels.methods.controller import error_scale, quick_quotient
-from warpchain.kernels.physics.elementary import ZERO, order_bits_single
-from warpchain.kernels.physics.geometry import end_positions, end_velocities
+from warpchain.kernels.physics import geometry
+from warpchain.kernels.physics.elementary import order_bits_single
+from warpchain.kernels.physics.geometry import Link, end_positions, end_velocities
 from warpchain.kernels.physics.joint import friction_torque, joint_force, link_acceleration
+from warpchain.kernels.physics.load import link_load
 from warpchain.kernels.physics.plane import plane_load
 from warpchain.kernels.types import Chain, Rows
-
-wp.set_module_options({"enable_backward": False})
 
 LARGEST_SCALE = wp.constant(wp.float32(1e30))
 """Divisors are reduced to this, because :func:`quick_quotient` is 0 beyond 2¹²⁶; the ratio only grows."""
 
 vec3d = wp.types.vector(length=3, dtype=wp.float64)
 vec5d = wp.types.vector(length=5, dtype=wp.float64)
-
-
-@wp.struct
-class Link:
-    """State of a link, with its arm (see :mod:`physics.geometry`) instead of its angle, which no stage needs."""
-
-    x: wp.float64  # [m]
-    y: wp.float64  # [m]
-    u: wp.float64  # ẋ [m/s]
-    v: wp.float64  # ẏ [m/s]
-    omega: wp.float64  # θ̇ [rad/s]
-    arm_x: wp.float64  # [m]
-    arm_y: wp.float64
 
 
 @wp.struct
@@ -124,16 +110,7 @@ def write_constants(K: Rows, chain: Chain):
 @wp.func
 def read_link(K: Rows, column: int) -> Link:
     """A link, from the board."""
-    link = Link()
-    link.x = K[X, column]
-    link.y = K[Y, column]
-    link.u = K[U, column]
-    link.v = K[V, column]
-    link.omega = K[OMEGA, column]
-    half_length = constants(K).half_length
-    link.arm_x = half_length * K[COSINE, column]
-    link.arm_y = half_length * K[SINE, column]
-    return link
+    return geometry.read_link(K, constants(K), column)
 
 
 @wp.func
@@ -247,6 +224,7 @@ def block_stage(block_dim: int, tilts: bool = False):
         ``exchange_ends(ends, place, link)`` → left end of the next link;
         ``stage(forces, K, place, next_end, link, 1/m, 1/I)`` → Rates.
     """
+    load = plane_load if tilts else link_load
 
     @wp.func
     def exchange_ends(ends: wp.tile[vec5d, block_dim], place: Place, link: Link):
@@ -281,12 +259,8 @@ def block_stage(block_dim: int, tilts: bool = False):
         damping = cu * cu + cv * cv
         forces[place.lane] = vec3d(force_x, force_y, torque)
         left = forces[place.before]
-        chain.gravity = ZERO
-        if wp.static(not tilts):
-            chain.gravity = constants(K).gravity
         rates = Rates()
         ax, ay, at = link_acceleration(
-            chain,
             inverse_mass,
             inverse_inertia,
             link.arm_x,
@@ -298,15 +272,13 @@ def block_stage(block_dim: int, tilts: bool = False):
             left[2],
             torque,
         )
+        felt = constants(K)
         if wp.static(tilts):
-            felt = felt_plane(K, constants(K), wp.static(layout.VALUE_PLANE))
-            load_x, load_y, load_turn = plane_load(felt, link.x, link.y, link.arm_x, link.arm_y)
-            ax += load_x
-            ay += load_y
-            at += load_turn
-        rates.x = ax
-        rates.y = ay
-        rates.theta = at
+            felt = felt_plane(K, felt, wp.static(layout.VALUE_PLANE))
+        load_x, load_y, load_turn = load(felt, place.lane, link, inverse_mass, inverse_inertia)
+        rates.x = ax + load_x
+        rates.y = ay + load_y
+        rates.theta = at + load_turn
         rates.friction = friction
         rates.damping = damping
         return rates

@@ -13,8 +13,6 @@ import warp as wp
 
 from warpchain.kernels.types import Integers
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.func_native("WP_TILE_SYNC();")
 def barrier():

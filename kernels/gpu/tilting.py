@@ -17,35 +17,11 @@ from warpchain.kernels.contacts.tilting_floor import (
     push_plane_by,
     steepness,
 )
-from warpchain.kernels.gpu.board import ends_of
+from warpchain.kernels.gpu.contacts.proximity import touching_link
 from warpchain.kernels.gpu.stage import Place, constants, felt_plane, read_link
 from warpchain.kernels.gpu.threads import barrier, warp_width
 from warpchain.kernels.gpu.upright import BlockPlane
-from warpchain.kernels.layout import (
-    BOARD_FIRST,
-    BOARD_VALUES,
-    COSINE,
-    INERTIA,
-    INVERSE_INERTIA,
-    INVERSE_MASS,
-    MASS,
-    OMEGA,
-    ORIGIN,
-    PLANE_MID,
-    PLANE_SPEED,
-    PLANE_TURN_X,
-    PLANE_TURN_Y,
-    SINE,
-    SUMS_OF_MOTION,
-    SUMS_OF_PLACES,
-    UP,
-    VALUE_PLANE,
-    VALUE_PLANE_BEFORE,
-    U,
-    V,
-    X,
-    Y,
-)
+from warpchain.kernels.layout import BOARD_VALUES, INERTIA, MASS, OMEGA, PLANE_MID, SINE, UP, VALUE_PLANE, U, V, X, Y
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.physics.plane import (
     begin_plane_step,
@@ -56,9 +32,7 @@ from warpchain.kernels.physics.plane import (
     place_terms,
     plane_load,
 )
-from warpchain.kernels.types import Drive, Ground, Row, Rows, State
-
-wp.set_module_options({"enable_backward": False})
+from warpchain.kernels.types import Drive, Ground, Row, Rows, State, with_circles
 
 FELT = 7
 """Values of a plane that lie on the board: u, ω1, ω2, the three of up, and the height of the origin."""
@@ -149,13 +123,13 @@ def added_up(memory: Row, slot: int, block_dim: int):
 def write_felt_plane(K: Rows, P: Row):
     """Writes the plane of the middle of the step on the board; what lay there becomes that of the attempt before."""
     for k in range(wp.static(FELT)):
-        K[BOARD_VALUES, VALUE_PLANE_BEFORE + k] = K[BOARD_VALUES, VALUE_PLANE + k]
-    K[BOARD_VALUES, VALUE_PLANE] = P[PLANE_MID + PLANE_SPEED]
-    K[BOARD_VALUES, VALUE_PLANE + 1] = P[PLANE_MID + PLANE_TURN_X]
-    K[BOARD_VALUES, VALUE_PLANE + 2] = P[PLANE_MID + PLANE_TURN_Y]
+        K[BOARD_VALUES, layout.VALUE_PLANE_BEFORE + k] = K[BOARD_VALUES, VALUE_PLANE + k]
+    K[BOARD_VALUES, VALUE_PLANE] = P[PLANE_MID + layout.PLANE_SPEED]
+    K[BOARD_VALUES, VALUE_PLANE + 1] = P[PLANE_MID + layout.PLANE_TURN_X]
+    K[BOARD_VALUES, VALUE_PLANE + 2] = P[PLANE_MID + layout.PLANE_TURN_Y]
     for k in range(3):
         K[BOARD_VALUES, VALUE_PLANE + 3 + k] = P[PLANE_MID + UP + k]
-    K[BOARD_VALUES, VALUE_PLANE + 6] = P[PLANE_MID + ORIGIN + 1]
+    K[BOARD_VALUES, VALUE_PLANE + 6] = P[PLANE_MID + layout.ORIGIN + 1]
 
 
 @wp.func
@@ -173,18 +147,18 @@ def shift_first_stage(K: Rows, lane: int):
     own = constants(K)
     link = read_link(K, lane)
     now = felt_plane(K, own, VALUE_PLANE)
-    before = felt_plane(K, own, VALUE_PLANE_BEFORE)
-    ax, ay, turn = plane_load(now, link.x, link.y, link.arm_x, link.arm_y)
-    old_ax, old_ay, old_turn = plane_load(before, link.x, link.y, link.arm_x, link.arm_y)
-    K[BOARD_FIRST, lane] = K[BOARD_FIRST, lane] + (ax - old_ax)
-    K[BOARD_FIRST + 1, lane] = K[BOARD_FIRST + 1, lane] + (ay - old_ay)
-    K[BOARD_FIRST + 2, lane] = K[BOARD_FIRST + 2, lane] + (turn - old_turn)
+    before = felt_plane(K, own, layout.VALUE_PLANE_BEFORE)
+    ax, ay, turn = plane_load(now, lane, link, ZERO, ZERO)
+    old_ax, old_ay, old_turn = plane_load(before, lane, link, ZERO, ZERO)
+    K[layout.BOARD_FIRST, lane] = K[layout.BOARD_FIRST, lane] + (ax - old_ax)
+    K[layout.BOARD_FIRST + 1, lane] = K[layout.BOARD_FIRST + 1, lane] + (ay - old_ay)
+    K[layout.BOARD_FIRST + 2, lane] = K[layout.BOARD_FIRST + 2, lane] + (turn - old_turn)
 
 
 @wp.func
 def places_of(K: Rows, i: int):
     """The part of link i in the sums for its plane that depend on places."""
-    return place_terms(constants(K), K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[COSINE, i], K[SINE, i])
+    return place_terms(constants(K), K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[layout.COSINE, i], K[SINE, i])
 
 
 @wp.func
@@ -194,27 +168,17 @@ def motion_of(K: Rows, i: int):
 
 
 @wp.func
-def add_places_one_by_one(K: Rows, P: Row, n: int):
-    """Writes the sums over all links that depend on places, by one fiber."""
-    for k in range(wp.static(SUMS_OF_PLACES)):
+def add_one_by_one(K: Rows, P: Row, n: int):
+    """Writes the sums over all links, by one fiber."""
+    for k in range(wp.static(layout.SUMS_OF_PLACES + layout.SUMS_OF_MOTION)):
         P[wp.static(layout.PLANE_SUMS + k)] = ZERO
     i = int(0)
     while i < n:
         places = places_of(K, i)
-        for k in range(wp.static(SUMS_OF_PLACES)):
+        for k in range(wp.static(layout.SUMS_OF_PLACES)):
             P[wp.static(layout.PLANE_SUMS + k)] = P[wp.static(layout.PLANE_SUMS + k)] + places[k]
-        i += 1
-
-
-@wp.func
-def add_motion_one_by_one(K: Rows, P: Row, n: int):
-    """Writes those that depend on velocities, by one fiber."""
-    for k in range(wp.static(SUMS_OF_MOTION)):
-        P[wp.static(layout.MOTION_SUMS + k)] = ZERO
-    i = int(0)
-    while i < n:
         motion = motion_of(K, i)
-        for k in range(wp.static(SUMS_OF_MOTION)):
+        for k in range(wp.static(layout.SUMS_OF_MOTION)):
             P[wp.static(layout.MOTION_SUMS + k)] = P[wp.static(layout.MOTION_SUMS + k)] + motion[k]
         i += 1
 
@@ -253,19 +217,18 @@ def block_tilting(block_dim: int) -> BlockPlane:
             motion = motion_of(K, place.column)
             terms = vec8d()
             if place.lane < place.links:
-                for k in range(wp.static(SUMS_OF_PLACES)):
+                for k in range(wp.static(layout.SUMS_OF_PLACES)):
                     terms[k] = places[k]
-                for k in range(wp.static(SUMS_OF_MOTION)):
-                    terms[wp.static(SUMS_OF_PLACES + k)] = motion[k]
+                for k in range(wp.static(layout.SUMS_OF_MOTION)):
+                    terms[wp.static(layout.SUMS_OF_PLACES + k)] = motion[k]
             add_up_eight(M, wp.static(sum_slot), place.lane, wp.static(block_dim), terms)
         barrier()
         if place.lane == 0:
             if warp_width() > 1:
-                for k in range(wp.static(SUMS_OF_PLACES + SUMS_OF_MOTION)):
+                for k in range(wp.static(layout.SUMS_OF_PLACES + layout.SUMS_OF_MOTION)):
                     P[wp.static(layout.PLANE_SUMS + k)] = added_up(M, wp.static(sum_slot + k), wp.static(block_dim))
             else:
-                add_places_one_by_one(K, P, place.links)
-                add_motion_one_by_one(K, P, place.links)
+                add_one_by_one(K, P, place.links)
             invert_plane_mass(P)
 
     @wp.func
@@ -285,15 +248,12 @@ def block_tilting(block_dim: int) -> BlockPlane:
     def meet(K: Rows, P: Row, M: Row, place: Place, _ground: Ground, _drive: Drive, _world: int, _time: wp.float64):
         lane = place.lane
         barrier()  # the plane and its mass are those of the new state
-        chain = on_plane(constants(K), P, 0)
+        chain = with_circles(on_plane(constants(K), P, 0), K[layout.RADIUS, place.column])
         slope = steepness(chain)
-        link = read_link(K, lane)
-        left_x, left_y, right_x, right_y = ends_of(link)
+        link = touching_link(K, chain, place)
         touches = wp.int64(0)
         if lane < place.links:
-            touches = link_touches(
-                chain, slope, left_x, left_y, right_x, right_y, link.x, link.y, link.u, link.v, link.omega
-            )
+            touches = link_touches(chain, slope, link)
         touching = barrier_count(M, wp.static(count_slot), lane, wp.static(block_dim), touches > wp.int64(0))
         hits = int(0)
         if touching > 0:
@@ -301,24 +261,7 @@ def block_tilting(block_dim: int) -> BlockPlane:
             moment_x = ZERO
             moment_y = ZERO
             if touches > wp.int64(0):
-                met = meet_tilting_floor(
-                    chain,
-                    slope,
-                    copy_inverse(P, wp.float64(touching)),
-                    left_x,
-                    left_y,
-                    right_x,
-                    right_y,
-                    link.x,
-                    link.y,
-                    K[MASS, lane],
-                    K[INERTIA, lane],
-                    K[INVERSE_MASS, lane],
-                    K[INVERSE_INERTIA, lane],
-                    link.u,
-                    link.v,
-                    link.omega,
-                )
+                met = meet_tilting_floor(chain, slope, copy_inverse(P, wp.float64(touching)), link)
                 K[U, lane] = met.u
                 K[V, lane] = met.v
                 K[OMEGA, lane] = met.omega
@@ -334,7 +277,7 @@ def block_tilting(block_dim: int) -> BlockPlane:
                 summed[2] = moment_y
                 motion = motion_of(K, place.column)
                 if lane < place.links:
-                    for k in range(wp.static(SUMS_OF_MOTION)):
+                    for k in range(wp.static(layout.SUMS_OF_MOTION)):
                         summed[3 + k] = motion[k]
                 add_up_eight(M, wp.static(sum_slot), lane, wp.static(block_dim), summed)
             else:
@@ -342,12 +285,12 @@ def block_tilting(block_dim: int) -> BlockPlane:
             barrier()
             if lane == 0:
                 if warp_width() > 1:
-                    for k in range(wp.static(SUMS_OF_MOTION)):
+                    for k in range(wp.static(layout.SUMS_OF_MOTION)):
                         P[wp.static(layout.MOTION_SUMS + k)] = added_up(
                             M, wp.static(sum_slot + 3 + k), wp.static(block_dim)
                         )
                 else:
-                    add_motion_one_by_one(K, P, place.links)
+                    add_one_by_one(K, P, place.links)
                 lost = push_plane_by(
                     P,
                     added_up(M, wp.static(sum_slot), wp.static(block_dim)),

@@ -10,8 +10,6 @@ from warpchain.kernels.gpu.contacts.proximity import block_contact
 from warpchain.kernels.gpu.stage import Place
 from warpchain.kernels.types import Drive, Ground, Row, Rows, State
 
-wp.set_module_options({"enable_backward": False})
-
 
 @dataclass(frozen=True)
 class BlockPlane:
@@ -19,24 +17,16 @@ class BlockPlane:
 
     P: the plane, in memory that all threads share, which the first one changes. M: the same for sums, which nobody else
     uses meanwhile. Between a function that uses M and any other use of that memory there must be a barrier.
-
-    Attributes:
-        load: ``(K, P, state, world)`` loads the plane; for one thread.
-        store: ``(P, state, world)`` stores it; for one thread.
-        begin_run: ``(K, P, M, place)`` when the host has set the links.
-        after_first_stage: ``()`` after a first stage has been evaluated.
-        begin_step: ``(K, P, place, h)`` moves the plane to the middle of a step, and the first stage with it.
-        end_step: ``(K, P, M, place, h)`` carries the plane to the end of an accepted step.
-        meet: ``(K, P, M, place, ground, drive, world, time)`` applies the impulses of the floor or sprocket →
-            number of those of this thread.
     """
 
-    load: Any
-    store: Any
-    begin_run: Any
-    after_first_stage: Any
-    begin_step: Any
-    end_step: Any
+    load: Any  # ``(K, P, state, world)`` loads the plane; for one thread
+    store: Any  # ``(P, state, world)`` stores it; for one thread
+    begin_run: Any  # ``(K, P, M, place)`` when the host has set the links
+    after_first_stage: Any  # ``()`` after a first stage has been evaluated
+    begin_step: Any  # ``(K, P, place, h)`` moves the plane to the middle of a step, and the first stage with it
+    end_step: Any  # ``(K, P, M, place, h)`` carries the plane to the end of an accepted step
+    # ``(K, P, M, place, ground, drive, world, time)`` applies the impulses of the floor or sprocket → number of those
+    # of this thread
     meet: Any
 
 

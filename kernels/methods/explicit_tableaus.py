@@ -20,26 +20,16 @@ class Tableau:
     The chain's equations are of second order, q'' = a(q, q'), and the positions' rows are integrated with the
     products A·A and b·A (the Nyström form). Every row sum of A is the stage's time, and the weights add up to one, so
     this is the same method on (q, q'), with half of the derivatives to store.
-
-    Attributes:
-        name: What a user writes for ``method``.
-        title: One line for help texts.
-        order: Order of the solution that is propagated.
-        error_order: Order of the embedded solution; sets the exponent of the step controller after a rejection.
-        matrix: Lower-triangular stage coefficients A; row s has s entries.
-        weights: Weights b of the propagated solution.
-        embedded: Weights of the embedded solution.
-        source: Where the coefficients were published.
     """
 
-    name: str
-    title: str
-    order: int
-    error_order: int
-    matrix: tuple[tuple[F, ...], ...]
-    weights: tuple[F, ...]
-    embedded: tuple[F, ...]
-    source: str
+    name: str  # what a user writes for ``method``
+    title: str  # one line for help texts
+    order: int  # order of the solution that is propagated
+    error_order: int  # order of the embedded solution; sets the exponent of the step controller after a rejection
+    matrix: tuple[tuple[F, ...], ...]  # lower-triangular stage coefficients A; row s has s entries
+    weights: tuple[F, ...]  # weights b of the propagated solution
+    embedded: tuple[F, ...]  # weights of the embedded solution
+    source: str  # where the coefficients were published
 
     @property
     def stages(self) -> int:

@@ -5,29 +5,17 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class WTable:
-    """One embedded W-method for y' = f(y): (1 − hγ A) k_i = h f(y + Σ_j<i α_ij k_j) + h A Σ_j<i γ_ij k_j.
+    """One embedded W-method for y' = f(y): (1 − hγ A) k_i = h f(y + Σ_j<i α_ij k_j) + h A Σ_j<i γ_ij k_j."""
 
-    Attributes:
-        name: Its name in the literature.
-        order: Order of the solution y + Σ b k, whatever the matrix A.
-        error_order: Order of the embedded solution y + Σ b̂ k.
-        gamma: γ.
-        nodes: α; row i has i entries.
-        couplings: γ_ij, likewise.
-        weights: b.
-        embedded: b̂.
-        source: Where the coefficients were published.
-    """
-
-    name: str
-    order: int
-    error_order: int
-    gamma: float
-    nodes: tuple[tuple[float, ...], ...]
-    couplings: tuple[tuple[float, ...], ...]
-    weights: tuple[float, ...]
-    embedded: tuple[float, ...]
-    source: str
+    name: str  # its name in the literature
+    order: int  # order of the solution y + Σ b k, whatever the matrix A
+    error_order: int  # order of the embedded solution y + Σ b̂ k
+    gamma: float  # γ
+    nodes: tuple[tuple[float, ...], ...]  # α; row i has i entries
+    couplings: tuple[tuple[float, ...], ...]  # γ_ij, likewise
+    weights: tuple[float, ...]  # b
+    embedded: tuple[float, ...]  # b̂
+    source: str  # where the coefficients were published
 
     @property
     def stages(self) -> int:

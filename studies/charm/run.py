@@ -14,13 +14,23 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import warpchain
-from studies.common import DISTANCE, LINE_COLORS, RED, error_line, run_study, save_figure, table, tidy, write_tables
+from studies.common import (
+    DISTANCE,
+    LINE_COLORS,
+    RED,
+    error_line,
+    mean_where,
+    of_cells,
+    publish,
+    run_study,
+    table,
+    tidy,
+)
 
 Block = Any
 """A block of `warpchain.SweepResult.blocks` with the axes links, perhaps frequency, and charm_mass."""
 
 FOLDER: Final = Path(__file__).parent
-FIGURE: Final = FOLDER / "figures" / "charm.png"
 TIMES: Final = (0.0, 0.04, 0.08, 0.16, 0.32)
 """Moments of the loops [s] since the release."""
 DRAWN: Final = (0.0, 0.02, 0.1)
@@ -29,22 +39,12 @@ DRAWN: Final = (0.0, 0.02, 0.1)
 
 def distances(block: Block) -> str:
     """Δx with its errors, duration, bounces and share at rest of each cell, in Markdown."""
-    cells = block.statistics()
-    rest = block.columns["status"] == warpchain.Status.AT_REST
-    means = {
-        name: np.ma.masked_array(block.columns[name], ~rest).mean(axis=-1).filled(np.nan)
-        for name in ("walk_time", "bounces")
-    }
+    cells, rest = block.statistics(), block.columns["status"] == warpchain.Status.AT_REST
+    time, bounces = (mean_where(rest, block.columns[name]) for name in ("walk_time", "bounces"))
     rows = []
-    for place in np.ndindex(cells.mean.shape):
-        values = [axis[index] for axis, index in zip(block.axes.values(), place, strict=True)]
-        numbers = (
-            f"{cells.mean[place]:.3f} ± {cells.standard_error[place]:.3f}",
-            f"{cells.sd[place]:.3f}",
-            f"{means['walk_time'][place]:.2f}",
-            f"{means['bounces'][place]:.1f}",
-        )
-        shown = numbers if rest[place].any() else ("–",) * len(numbers)
+    for place, values in of_cells(block):
+        numbers = f"{cells.mean[place]:.3f} ± {cells.standard_error[place]:.3f}", f"{cells.sd[place]:.3f}"
+        shown = (*numbers, f"{time[place]:.2f}", f"{bounces[place]:.1f}") if rest[place].any() else ("–",) * 4
         cell = *(f"{value:g}" for value in values[:-1]), f"{1e3 * values[-1]:g}"
         rows.append((*cell, *shown, f"{rest[place].mean():.0%}"))
     names = [name.replace("frequency", "ν / Hz") for name in block.axes][:-1]
@@ -68,16 +68,9 @@ def draw_distances(panel: Axes, block: Block) -> None:
 def draw_loops(panels: np.ndarray, links: int = 60, frequency: float = 15.0) -> None:
     """The loop with three charms at the same moments, a panel for each charm, which is a dot."""
     for panel, mass in zip(panels, DRAWN, strict=True):
-        walk = warpchain.walk(
-            preset="soft",
-            method="explicit",
-            start="ellipse",
-            links=links,
-            frequency=frequency,
-            charm_mass=mass,
-            frame_interval=0.01,
-            walk_limit=TIMES[-1] + 0.02,
-        )
+        scene = {"start": "ellipse", "links": links, "frequency": frequency, "charm_mass": mass}
+        times = {"frame_interval": 0.01, "walk_limit": TIMES[-1] + 0.02}
+        walk = warpchain.walk(preset="soft", method="explicit", **scene, **times)
         for number, moment in enumerate(TIMES):
             joints = walk.frame_joints[int(np.argmin(np.abs(walk.frame_time - moment)))]
             closed = np.vstack([joints[-1], joints]) + np.array([0.3 * number - joints[:, 0].mean(), 0.0])
@@ -104,8 +97,7 @@ def draw(blocks: dict[str, Block]) -> Figure:
 def main(folder: str) -> None:
     """Write the tables into the page and draw the figure."""
     blocks = warpchain.load(folder).blocks
-    write_tables(FOLDER / "README.md", {name: distances(block) for name, block in blocks.items()})
-    save_figure(draw(blocks), FIGURE)
+    publish(FOLDER, {name: distances(block) for name, block in blocks.items()}, {"charm": draw(blocks)})
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.common import run_study, save_figure, table, write_tables
+from studies.common import publish, run_study, table
 from studies.films.calibration import CAMERA, Calibration, Wanted, calibrate, set_of_films
 from studies.films.drawing import SYMBOLS, corner, coverage_figure, line_figure
 from studies.films.reduce import load
@@ -152,29 +152,19 @@ def main(banks: Path) -> None:
             {"film_bank": bank, "film_bank_90": long} | {kind: each for kind, each in truths.items() if kind != "same"}
         ),
     }
-    write_tables(FOLDER / "README.md", tables)
-    save_figure(
-        coverage_figure({name: found["same", name] for name in SETS}), FOLDER / "figures" / "coverage.png", dpi=130
-    )
+    publish(FOLDER, tables, {"coverage": coverage_figure({name: found["same", name] for name in SETS})}, dpi=130)
+    outlines = {(5, 1.906): (-59.9, 62.1, 13.4, 335.8), (20, 7.648): (-68.7, 62.1, 13.4, 330.0)}
     hidden = [
         films.read(
-            FOLDER / "hidden" / f"60_links_{frequency}_Hz.txt",
-            links=60,
-            frequency=frequency,
-            unit="mm",
-            outline=outline,
-            speed=speed,
+            FOLDER / f"hidden/60_links_{hz}_Hz.txt", links=60, frequency=hz, unit="mm", outline=outline, speed=speed
         )
-        for frequency, outline, speed in (
-            (5, (-59.9, 62.1, 13.4, 335.8), 1.906),
-            (20, (-68.7, 62.1, 13.4, 330.0), 7.648),
-        )
+        for (hz, speed), outline in outlines.items()
     ]
     answer = bank.posterior(hidden)
     print(f"\nthe hidden chain\n{answer}\n{films.friction_line(hidden[1])}")
     print(f"with r by calipers\n{answer.given(circle_radius=(4.05e-3, 5e-5))}")
-    save_figure(corner(answer), FOLDER / "figures" / "corner.png", dpi=110)
-    save_figure(line_figure(films.friction_line(hidden[1])), FOLDER / "figures" / "line.png")
+    publish(FOLDER, {}, {"corner": corner(answer)}, dpi=110)
+    publish(FOLDER, {}, {"line": line_figure(films.friction_line(hidden[1]))})
 
 
 if __name__ == "__main__":

@@ -14,13 +14,13 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 import warpchain
-from studies.common import DISTANCE, LINE_COLORS, error_line, run_study, save_figure, table, tidy
+from studies.common import DISTANCE, LINE_COLORS, error_line, mean_where, publish, run_study, table, tidy
 
 Array = NDArray[np.float64]
 Block = Any
 """A block of `warpchain.SweepResult.blocks` with the axes links, frequency and floor_friction."""
 
-FIGURE: Final = Path(__file__).parent / "figures" / "distances.png"
+FOLDER: Final = Path(__file__).parent
 
 
 def furthest(block: Block) -> Array:
@@ -33,8 +33,7 @@ def ledger(block: Block, links: int, frequency: float) -> str:
     cell = [list(block.axes[name]).index(value) for name, value in (("links", links), ("frequency", frequency))]
     rest = block.columns["status"][tuple(cell)] == warpchain.Status.AT_REST
     dx, time, lost = (
-        np.ma.masked_array(block.columns[name][tuple(cell)], ~rest).mean(axis=-1)
-        for name in ("dx", "walk_time", "loss_self_contact")
+        mean_where(rest, block.columns[name][tuple(cell)]) for name in ("dx", "walk_time", "loss_self_contact")
     )
     values = zip(block.axes["floor_friction"], dx, dx / time, time, lost, strict=True)
     rows = ((f"{friction:g}", f"{a:.3f}", f"{b:.2f}", f"{c:.2f}", f"{d:.2f}") for friction, a, b, c, d in values)
@@ -71,7 +70,7 @@ def main(folder: str) -> None:
         print(f"\n{name}: friction with the greatest mean Δx, rows links {block.axes['links'].tolist()}")
         print(furthest(block))
         print(ledger(block, int(block.axes["links"].max() * 2 // 3), float(block.axes["frequency"].max())))
-    save_figure(draw(blocks), FIGURE)
+    publish(FOLDER, {}, {"distances": draw(blocks)})
 
 
 if __name__ == "__main__":

@@ -7,48 +7,55 @@ from typing import Any, Final
 
 import yaml
 
-from studies.paper import findings, last_findings
-from studies.paper.findings import Check, Finding, Numbers
+from studies.paper import findings
 from studies.paper.verdicts import Verdict
 
 
 @dataclass(frozen=True)
+class Finding:
+    """What came out, and what it says of the claim; whether a person wrote it, from another page."""
+
+    text: str
+    verdict: Verdict
+    is_typed: bool = False
+
+
+@dataclass(frozen=True)
 class Claim:
-    """A sentence of the paper, in short; where its numbers are from, in Markdown; what came out; verdict → why."""
+    """A sentence of the paper.
+
+    Attributes:
+        sentence: in short.
+        source: where its numbers are from, in Markdown.
+        says: what came out, with the names of numbers in braces.
+        check: name of the function of `findings`, and its argument; none of what another page shows.
+        verdict: set by hand, where it is not clear what the paper says.
+        reasons: verdict → why.
+    """
 
     sentence: str
     source: str
-    check: Check
-    reasons: Mapping[Verdict, str]
+    says: str
+    check: str = ""
+    verdict: str = ""
+    reasons: Mapping[str, str] | None = None
+
+    def finding(self, numbers: findings.Numbers) -> Finding:
+        """What came out."""
+        name, _, argument = self.check.partition(" ")
+        found: Any = getattr(findings, name) if name else lambda _: (Verdict.OPEN, {})
+        verdict, words = (found(argument) if argument else found)(numbers)
+        given = Verdict(self.verdict) if self.verdict else verdict
+        return Finding(self.says.format(**words), given, name in ("", "waves"))
 
     def reason(self, verdict: Verdict) -> str:
         """Why the verdict is what it is; the page admits it if no reason is known."""
-        if verdict is Verdict.OPEN and verdict not in self.reasons:
-            return "The numbers are missing."
-        return self.reasons.get(verdict, "" if verdict is Verdict.AGREES else "No reason is known.")
+        for verdicts, text in (self.reasons or {}).items():
+            if verdict in verdicts.split(" | "):
+                return text
+        return {Verdict.OPEN: "The numbers are missing.", Verdict.AGREES: ""}.get(verdict, "No reason is known.")
 
 
-def _check(given: Mapping[str, Any]) -> Check:
-    """The function that tests a claim; `verdict` is set by hand where it is not clear what the paper says."""
-    if "stated" in given:
-        return findings.stated(given["stated"], Verdict(given["verdict"]))
-    name, _, argument = given["check"].partition(" ")
-    found = getattr(findings, name, None) or getattr(last_findings, name)
-    check: Check = found(argument) if argument else found
-    return (lambda numbers: _set(check, numbers, Verdict(given["verdict"]))) if "verdict" in given else check
-
-
-def _set(check: Check, numbers: Numbers, verdict: Verdict) -> Finding:
-    return Finding(check(numbers).text, verdict)
-
-
-def _claim(given: Mapping[str, Any]) -> Claim:
-    reasons = {
-        Verdict(verdict): text
-        for verdicts, text in given.get("reasons", {}).items()
-        for verdict in verdicts.split(" | ")
-    }
-    return Claim(given["sentence"], given["source"], _check(given), reasons)
-
-
-CLAIMS: Final = tuple(map(_claim, yaml.safe_load(Path(__file__).with_name("claims.yaml").read_text(encoding="utf-8"))))
+CLAIMS: Final = tuple(
+    Claim(**given) for given in yaml.safe_load(Path(__file__).with_name("claims.yaml").read_text(encoding="utf-8"))
+)

@@ -11,9 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from studies.common import BLUE, DASHES, DISTANCE, FAINT, FREQUENCY, GREEN, INK, LINE_COLORS, RED, tidy
-from studies.paper.findings import changes
+from studies.paper.findings import effects as effects_of
+from studies.paper.findings import steps
 from studies.paper.impacts import impacts
-from studies.paper.statistics import summary
+from studies.paper.statistics import Effect
 from warpchain import Parameters, SweepResult
 
 Numbers = Mapping[str, Any]
@@ -66,19 +67,13 @@ def distances(numbers: Numbers) -> Figure:
 
 def effects(numbers: Numbers) -> Figure:
     """What each value of each quantity does to Δx: a dot for every cell, the mean over the cells with its interval."""
-    names = [
-        name
-        for sweep in ("paper_claims", "paper_joints")
-        for name in numbers[sweep]["effects"]
-        if name not in ("start", "tolerance")
-    ]
-    lines = {name: len(changes(numbers, name)) + 0.5 for name in names}
-    half = next(place for place in range(len(names)) if sum(lines[name] for name in names[: place + 1]) > _half(lines))
-    columns = (names[: half + 1], names[half + 1 :])
-    longest = max(sum(lines[name] for name in column) for column in columns)
+    known = {name: steps(found) for name, found in effects_of(numbers).items() if name not in ("start", "tolerance")}
+    names, heights = list(known), np.cumsum([len(found) + 0.5 for found in known.values()])
+    half = int(np.argmax(heights > heights[-1] / 2 - 1.5))
+    columns, longest = (names[: half + 1], names[half + 1 :]), max(heights[half], heights[-1] - heights[half])
     figure = Figure(figsize=(10, 0.9 + 0.21 * longest), layout="constrained")
     for axes, column in zip(figure.subplots(1, 2), columns, strict=True):
-        _draw_effects(axes, numbers, column)
+        _draw_effects(axes, {name: known[name] for name in column})
         axes.set_ylim(longest - 0.25, -0.75)
     for text, color in (("rises", BLUE), ("falls", RED), ("neither at 95 %", PALE)):
         axes.plot([], [], ".", color=color, label=text)
@@ -100,26 +95,21 @@ def number_text(value: float) -> str:
     return re.sub(r"e\+?(-?)0*(?=\d)", r"e\1", f"{value:.6g}")
 
 
-def _half(lines: Mapping[str, float]) -> float:
-    """Half of the height of all lines."""
-    return sum(lines.values()) / 2 - 1.5
-
-
-def _draw_effects(axes: Axes, numbers: Numbers, names: Sequence[str]) -> None:
+def _draw_effects(axes: Axes, known: Mapping[str, Sequence[tuple[float, Effect]]]) -> None:
     """The effects of some quantities, one line for each value."""
     rng = np.random.default_rng(0)
     y, places, texts = 0.0, [], []
-    for number, name in enumerate(names):
+    for number, (name, found) in enumerate(known.items()):
         top = y - 0.5
-        for value, effect in changes(numbers, name):
-            found, sign = summary(effect), effect.sign[effect.known]
+        for value, effect in found:
+            sign = effect.sign[effect.known]
             relative = np.clip(effect.relative[effect.known], -REACH, REACH)
             height = y + rng.uniform(-0.25, 0.25, len(relative))
             for chosen, color in ((sign == 0, PALE), (sign > 0, BLUE), (sign < 0, RED)):
                 axes.plot(relative[chosen], height[chosen], ".", color=color, markersize=4, alpha=0.6, linewidth=0)
-            if found.cells:
-                mean = float(np.clip(found.mean, -REACH, REACH))
-                axes.errorbar(mean, y, xerr=found.half_width, fmt="|", color=INK, markersize=9)
+            if effect.count:
+                mean = float(np.clip(effect.mean, -REACH, REACH))
+                axes.errorbar(mean, y, xerr=effect.width, fmt="|", color=INK, markersize=9)
             places.append(y)
             texts.append(f"{symbol_of(name)} = {number_text(value)}")
             y += 1.0

@@ -5,10 +5,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from studies.common import table
-from studies.paper.findings import percent
-from studies.paper.reduction import effect_of
-from studies.paper.statistics import standard_error, summary
+from studies.common import minus, table
+from studies.paper.findings import over, percent, plain
+from studies.paper.statistics import Effect
 
 Numbers = Mapping[str, Any]
 
@@ -33,7 +32,7 @@ def strands_table(numbers: Numbers) -> str:
         for links, each in zip(content["cells"]["links"], content["strands"]["starts"][start], strict=True):
             ratio = "—"
             if "early_over_late" in each:
-                effect = effect_of(each["early_over_late"])
+                effect = Effect.of(each["early_over_late"])
                 ratio = percent(float(effect.relative), float(effect.half_width))
             for event, text, last in (
                 ("crease", "first crease", ""),
@@ -49,7 +48,7 @@ def through_table(numbers: Numbers) -> str:
     """What it does to Δx if links pass through one another, cell by cell."""
     cells, rows = numbers["paper_through"]["cells"], []
     for start, name in (("sprocket", "paper_through"), ("ellipse", "paper_through_ellipse")):
-        effect = effect_of(numbers[name]["through"])
+        effect = Effect.of(numbers[name]["through"])
         for links, values, widths in zip(cells["links"], effect.relative, effect.half_width, strict=True):
             texts = (percent(float(value), float(width)) for value, width in zip(values, widths, strict=True))
             rows.append([start, f"{links} links", *texts])
@@ -61,14 +60,14 @@ def open_table(numbers: Numbers) -> str:
     content = numbers["paper_open"]
     rows = []
     for name, found in content["left_open"].items():
-        first, walk = NAMES[name], percent(found["spread"], sign=False)
+        first, walk = NAMES[name], plain(found["spread"])
         for each in found["values"]:
-            effect = effect_of(each)
-            total = summary(effect)
+            effect = Effect.of(each)
             value, reference = (_text(other) for other in (each["value"], found["reference"]))
             ends = [percent(float(end(effect.relative[effect.known]))) for end in (np.min, np.max)]
-            mean, typical = percent(total.mean, total.half_width), percent(total.typical, sign=False)
-            rows.append([first, f"{value} for {reference}", mean, typical, ", ".join(ends), walk])
+            rows.append(
+                [first, f"{value} for {reference}", over(effect), plain(effect.cells.typical), ", ".join(ends), walk]
+            )
             first = walk = ""
     head = ["left open", "value", "Δx, mean of cells", "typical", "least and greatest cell", "spread of a walk"]
     return table(head, rows)
@@ -80,10 +79,10 @@ def rest_table(numbers: Numbers) -> str:
     links = np.array(content["cells"]["links"])
     rows = []
     for name, found in content["rest_and_hold"].items():
-        effect = effect_of(found)
-        error = standard_error(effect)
-        long, short = (_mean(effect.relative[chosen], error[chosen]) for chosen in (links >= 150, links < 150))
-        texts = [_with_error(*each) for each in ((found["mean"], found["error"]), short, long)]
+        effect = Effect.of(found)
+        short, long = (effect[chosen].cells for chosen in (links < 150, links >= 150))
+        pairs_of = ((found["mean"], found["error"]), (short.mean, short.error), (long.mean, long.error))
+        texts = [minus(f"{100 * mean:+.2f} ± {100 * error:.2f} %") for mean, error in pairs_of]
         pairs = f"{int(effect.pairs[effect.known].sum())} in {found['cells']}"
         rows.append([name, *texts, pairs, f"{found['chi2']:.1f}, {found['p']:.2g}"])
     head = "Δx | all cells | 60 and 120 links | 150 and 180 links | pairs, cells | χ² of no difference, p"
@@ -95,15 +94,13 @@ def lengths_table(numbers: Numbers) -> str:
     claims, rows = numbers["paper_claims"], []
     known = {"dx": claims["effects"]["link_length"], "until_collapse": claims["collapse"]}
     alone = {
-        quantity: {f"{1000 * each['value']:g}": summary(effect_of(each)) for each in content["values"]}
+        quantity: {f"{1000 * each['value']:g}": over(Effect.of(each)) for each in content["values"]}
         for quantity, content in known.items()
     }
     for length, found in numbers["paper_more"]["more"]["lengths"].items():
         cells = [f"{length} mm"]
         for quantity in ("dx", "until_collapse"):
-            own, fixed = summary(effect_of(found[quantity])), alone[quantity].get(length)
-            cells.append(percent(own.mean, own.half_width))
-            cells.append("—" if fixed is None else percent(fixed.mean, fixed.half_width))
+            cells += [over(Effect.of(found[quantity])), alone[quantity].get(length, "—")]
         rows.append(cells)
     return table(["ℓ", "Δx, bars of that length", "ℓ alone", "bounces until the collapse, bars", "ℓ alone"], rows)
 
@@ -152,7 +149,7 @@ def _loops_texts(mm: Any, share: Any, links: Any) -> list[str]:
             ]
         else:
             texts += ["", ""]
-    return [text.replace("-", "−") for text in texts]
+    return list(map(minus, texts))
 
 
 def same_text(numbers: Numbers) -> str:
@@ -166,16 +163,15 @@ def same_text(numbers: Numbers) -> str:
             ("energy", "in energy", 100, 3, "%"),
         )
     ]
-    return f"{found['pairs']} pairs of loops differ on average {', '.join(texts)}".replace("-", "−")
+    return minus(f"{found['pairs']} pairs of loops differ on average {', '.join(texts)}")
 
 
 def sliding_table(numbers: Numbers) -> str:
     """Time from the collapse to rest, and Δx, with other frictions of the floor."""
     rows = []
     for value, found in numbers["paper_more"]["more"]["sliding"].items():
-        time, distance = (summary(effect_of(found[name])) for name in ("time", "dx"))
-        texts = [percent(each.mean, each.half_width) for each in (time, distance)]
-        rows.append([value, texts[0], f"{time.rises}, {time.falls}", texts[1]])
+        time, distance = (Effect.of(found[name]) for name in ("time", "dx"))
+        rows.append([value, over(time), f"{time.rises}, {time.falls}", over(distance)])
     return table("μ_fc | time from collapse to rest | cells that rise, fall | Δx", rows)
 
 
@@ -196,19 +192,8 @@ def distributions_table(numbers: Numbers) -> str:
 def undamped_text(numbers: Numbers) -> str:
     """What little or no damping of the joints does to Δx, in words."""
     found = numbers["paper_more"]["more"]["undamped"]
-    effects = {value: summary(effect_of(each)) for value, each in found.items()}
-    return ", ".join(f"b = {value}: {percent(each.mean, each.half_width)}" for value, each in effects.items())
+    return ", ".join(f"b = {value}: {over(Effect.of(each))}" for value, each in found.items())
 
 
 def _text(value: object) -> str:
     return WORDS.get(value, value) if isinstance(value, str) else f"{value:g}"
-
-
-def _mean(values: Any, error: Any) -> tuple[float, float]:
-    """Mean over the cells and its standard error."""
-    known = np.isfinite(values) & np.isfinite(error)
-    return float(values[known].mean()), float(np.sqrt(np.sum(error[known] ** 2)) / known.sum())
-
-
-def _with_error(value: float, error: float) -> str:
-    return f"{100 * value:+.2f} ± {100 * error:.2f} %".replace("-", "−")

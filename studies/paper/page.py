@@ -13,9 +13,9 @@ from studies.common import table
 from studies.paper import further_tables as tables
 from studies.paper.claims import CLAIMS
 from studies.paper.figure5 import figure5_table
-from studies.paper.findings import changes, percent
+from studies.paper.findings import effects, over, percent, plain, steps
 from studies.paper.separations import separations_tables
-from studies.paper.statistics import Effect, summary
+from studies.paper.statistics import Effect
 from studies.paper.verdicts import Bounds, Verdict, scaled
 from warpchain import Parameters
 
@@ -72,7 +72,7 @@ def claims_table(numbers: Numbers) -> str:
     """All claims with what came out."""
     rows = []
     for number, claim in enumerate(CLAIMS, 1):
-        finding = claim.check(numbers)
+        finding = claim.finding(numbers)
         mark = " †" if finding.is_typed else ""
         rows.append([str(number), claim.sentence, f"{finding.text}{mark}", claim.source, f"*{finding.verdict}*"])
     return table(["", "the paper", "here", "from", "verdict"], rows)
@@ -80,13 +80,13 @@ def claims_table(numbers: Numbers) -> str:
 
 def thresholds_table(numbers: Numbers) -> str:
     """Which verdicts change if one bound of the rules is halved or doubled."""
-    usual = [claim.check(numbers).verdict for claim in CLAIMS]
+    usual = [claim.finding(numbers).verdict for claim in CLAIMS]
     rows = []
     for field in fields(Bounds):
         row = [field.name, f"{getattr(Bounds(), field.name):g}"]
         for factor in (0.5, 2.0):
             with scaled(field.name, factor):
-                found = [claim.check(numbers).verdict for claim in CLAIMS]
+                found = [claim.finding(numbers).verdict for claim in CLAIMS]
             changed = [
                 f"{number}: *{before}* → *{after}*"
                 for number, (before, after) in enumerate(zip(usual, found, strict=True), 1)
@@ -99,7 +99,7 @@ def thresholds_table(numbers: Numbers) -> str:
 
 def verdict_counts(numbers: Numbers) -> str:
     """How many claims have which verdict."""
-    counts = Counter(claim.check(numbers).verdict for claim in CLAIMS)
+    counts = Counter(claim.finding(numbers).verdict for claim in CLAIMS)
     return ", ".join(f"{counts[verdict]} × *{verdict}*" for verdict in Verdict if counts[verdict])
 
 
@@ -107,7 +107,7 @@ def reasons(numbers: Numbers) -> str:
     """The reasons of all claims that have one, numbered as in the table."""
     lines = []
     for number, claim in enumerate(CLAIMS, 1):
-        verdict = claim.check(numbers).verdict
+        verdict = claim.finding(numbers).verdict
         if reason := claim.reason(verdict):
             lines.append(f"- {number} *{verdict}*: {reason}")
     return "\n".join(lines)
@@ -157,19 +157,11 @@ def impacts_table(numbers: Numbers) -> str:
 
 def effects_table(numbers: Numbers) -> str:
     """What each value of each quantity does to Δx."""
-    names = [
-        name
-        for sweep in ("paper_claims", "paper_joints")
-        for name in numbers[sweep]["effects"]
-        if name not in ("start", "tolerance")
-    ]
     rows, cells = [], numbers["paper_claims"]["cells"]
-    for name in names:
-        first = _symbol(name)
-        for value, effect in changes(numbers, name):
-            found = summary(effect)
-            mean, typical = percent(found.mean, found.half_width), percent(found.typical, sign=False)
-            counts = mean, found.rises, found.falls, typical
+    for name, content in effects(numbers).items():
+        first = _symbol(name) if name not in ("start", "tolerance") else None
+        for value, effect in steps(content) if first else ():
+            counts = over(effect), effect.rises, effect.falls, plain(effect.cells.typical)
             rows.append([first, f"{value:g}", *counts, _extremes(effect, cells), effect.lost or ""])
             first = ""
     return table(

@@ -12,9 +12,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from studies.common import at_rest
 from studies.paper.further import (
     CELLS,
-    at_rest,
+    Cells,
     distributions,
     left_open,
     loops,
@@ -26,9 +27,10 @@ from studies.paper.further import (
     strands,
     through,
     until_collapse,
+    values_of,
 )
 from studies.paper.impacts import Block, impacts
-from studies.paper.statistics import Effect, mean, paired, spread, unpaired
+from studies.paper.statistics import mean, paired, spread, unpaired
 from warpchain import InputError, Parameters, SweepResult, preset
 
 Array = NDArray[np.float64]
@@ -104,7 +106,7 @@ def content_digest(sweep: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
-def effects_of(result: SweepResult, block: Block, name: str, table: Array) -> Numbers:
+def effects_of(result: SweepResult, block: Block, name: str, table: Cells) -> Numbers:
     """What each value of a block's further axis `name` does to a quantity, against a reference on the axis.
 
     Raises:
@@ -113,41 +115,30 @@ def effects_of(result: SweepResult, block: Block, name: str, table: Array) -> Nu
     values, reference = block.axes[name].tolist(), _reference(result, block, name)
     if reference not in values:
         raise InputError(f"{name}: {reference} is not among {values}; give a sweep that has it")
-    before = table[:, :, values.index(reference)]
-    return {
-        "reference": reference,
-        "values": [
-            {"value": value, **plain(paired(table[:, :, number], before))}
-            for number, value in enumerate(values)
-            if value != reference
-        ],
-    }
+    return {"reference": reference, "values": values_of(table, name, reference)}
 
 
 def starts(block: Block) -> Numbers:
-    """Distances by start, their steps along both axes of the cells, and when loops first ran into themselves."""
-    table, values = at_rest(block), block.axes["start"].tolist()
-    losses = shares_of_losses(block)
+    """Of each start means of Δx, bounces and losses, and the steps of Δx along both axes of the cells.
+
+    A loss is a share of the energy that a walk loses from its release to rest.
+    """
+    lost = {name: at_rest(block, name) for name in block.columns if name.startswith("loss_")}
+    total = np.sum([values.values for values in lost.values()], axis=0)
     content: Numbers = {}
-    for number, start in enumerate(values):
-        here = table[:, :, number]
+    for start in block.axes["start"].tolist():
+        here, bounces = (at_rest(block, name).sel(start=start) for name in ("dx", "bounces"))
+        shares = {name.removeprefix("loss_"): mean((each / total).sel(start=start)) for name, each in lost.items()}
         content[start] = {
-            "count": np.isfinite(here).sum(axis=-1).tolist(),
+            "count": here.notnull().sum("sample").values.tolist(),
             "mean": mean(here).tolist(),
             "sd": (spread(here) * mean(here)).tolist(),
-            "bounces": mean(at_rest(block, "bounces")[:, :, number]).tolist(),
-            "faster": plain(unpaired(here[:, 1:], here[:, :-1])),
-            "longer": plain(unpaired(here[1:], here[:-1])),
+            "bounces": mean(bounces).tolist(),
+            "faster": plain(unpaired(here.values[:, 1:], here.values[:, :-1])),
+            "longer": plain(unpaired(here.values[1:], here.values[:-1])),
+            "losses": {name: share.tolist() for name, share in shares.items()},
         }
-        content[start]["losses"] = {name: value[:, :, number].tolist() for name, value in losses.items()}
     return content
-
-
-def shares_of_losses(block: Block) -> dict[str, Array]:
-    """Mean share of each loss in the energy that a walk loses from its release to rest, cells in front."""
-    lost = {name: at_rest(block, name) for name in block.columns if name.startswith("loss_")}
-    total = np.sum(list(lost.values()), axis=0)
-    return {name.removeprefix("loss_"): mean(each / total) for name, each in lost.items()}
 
 
 def friction(block: Block) -> Numbers:
@@ -159,8 +150,7 @@ def friction(block: Block) -> Numbers:
 
 def spreads(blocks: Mapping[str, Block]) -> Numbers:
     """Relative standard deviation of Δx in each cell: everything drawn, the release alone, the parameters alone."""
-    gravity = blocks["gravity"]
-    everything = at_rest(gravity)[:, :, int(np.argmin(np.abs(gravity.axes["gravity"] - preset("soft").gravity)))]
+    everything = at_rest(blocks["gravity"]).sel(gravity=preset("soft").gravity, method="nearest")
     tables = {"both": everything, "release": at_rest(blocks["release_only"])}
     tables["parameters"] = at_rest(blocks["parameters_only"])
     return {name: spread(table).tolist() for name, table in tables.items()}
@@ -168,11 +158,10 @@ def spreads(blocks: Mapping[str, Block]) -> Numbers:
 
 def tolerance(block: Block) -> Numbers:
     """How far walks and means differ at two tolerances."""
-    table, values = at_rest(block), block.axes["tolerance"]
-    loose, tight = (table[:, :, int(end(values))] for end in (np.argmax, np.argmin))
+    values = block.axes["tolerance"]
+    loose, tight = (at_rest(block).sel({"tolerance": end(values)}).values for end in (np.max, np.min))
     single = np.abs(loose / tight - 1)
     single = single[np.isfinite(single)]
-    means = paired(loose, tight)
     return {
         "loose": float(values.max()),
         "tight": float(values.min()),
@@ -181,7 +170,7 @@ def tolerance(block: Block) -> Numbers:
         "median": float(np.median(single)),
         "nine_of_ten": float(np.quantile(single, 0.9)),
         "greatest": float(single.max()),
-        "means": plain(means),
+        "means": plain(paired(loose, tight)),
     }
 
 
@@ -218,17 +207,6 @@ def _reference(result: SweepResult, block: Block, name: str) -> float | str:
         given = next(each for each in result.sweep["blocks"] if each["name"] == block.name)
         return float(getattr(preset(given["preset"]), name))
     return DEFAULTS[name]
-
-
-def effect_of(content: Mapping[str, Any]) -> Effect:
-    """The effect that `further.plain` wrote, with its numbers rounded; null stands for NaN."""
-    return Effect(
-        relative=np.array(content["relative"], np.float64),
-        half_width=np.array(content["half_width"], np.float64),
-        sign=np.array(content["sign"], np.int64),
-        pairs=np.array(content["pairs"], np.int64),
-        lost=int(content["lost"]),
-    )
 
 
 def rounded(content: Any) -> Any:

@@ -4,20 +4,21 @@ A cell is a number of links and a frequency. Values have the shape (..., samples
 NaN and take no part; what they leave is counted.
 """
 
-import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.stats import t
+
+from studies.common import OverCells, over_cells
 
 Array = NDArray[np.float64]
 
 CONFIDENCE: Final = 0.95
 """Confidence level of every test and interval."""
-
-_TAIL: Final = (1 + CONFIDENCE) / 2
 
 
 @dataclass(frozen=True)
@@ -38,99 +39,94 @@ class Effect:
     pairs: NDArray[np.int64]
     lost: int
 
+    @classmethod
+    def of(cls, content: Mapping[str, Any]) -> "Effect":
+        """The effect that `plain` wrote, with its numbers rounded; null stands for NaN."""
+        arrays = {name: np.array(content[name], np.float64) for name in ("relative", "half_width")}
+        arrays |= {name: np.array(content[name], np.int64) for name in ("sign", "pairs")}
+        return cls(**arrays, lost=int(content["lost"]))
+
+    def __getitem__(self, rows: Any) -> "Effect":
+        """The effect in some of the cells."""
+        return Effect(self.relative[rows], self.half_width[rows], self.sign[rows], self.pairs[rows], self.lost)
+
     @property
     def known(self) -> NDArray[np.bool_]:
         """Cells that have an interval."""
         return np.isfinite(self.relative) & np.isfinite(self.half_width)
 
+    @cached_property
+    def cells(self) -> OverCells:
+        """All cells that could be compared together; the interval of their mean says nothing of other cells."""
+        return over_cells(self.relative, standard_error(self))
 
-@dataclass(frozen=True)
-class Summary:
-    """An effect over all cells.
+    @property
+    def count(self) -> int:
+        """Number of cells that could be compared."""
+        return len(self.cells)
 
-    Attributes:
-        cells: number of cells that could be compared.
-        rises: number of cells with a significant rise.
-        falls: number of cells with a significant fall.
-        mean: mean of the relative effects of the cells.
-        half_width: half of its 95 % interval, from the errors of the cells.
-        typical: root mean square of the relative effects without what their errors contribute.
-    """
+    @property
+    def mean(self) -> float:
+        """Mean of the relative effects of the cells."""
+        return self.cells.mean
 
-    cells: int
-    rises: int
-    falls: int
-    mean: float
-    half_width: float
-    typical: float
+    @property
+    def width(self) -> float:
+        """Half of its 95 % interval, from the errors of the cells."""
+        return 1.96 * self.cells.error
+
+    @property
+    def rises(self) -> int:
+        """Number of cells with a significant rise."""
+        return int((self.sign[self.known] > 0).sum())
+
+    @property
+    def falls(self) -> int:
+        """Number of cells with a significant fall."""
+        return int((self.sign[self.known] < 0).sum())
 
 
-def paired(values: Array, reference: Array) -> Effect:
+def paired(values: ArrayLike, reference: ArrayLike) -> Effect:
     """Compare the same samples after and before a change, `reference`.
 
     The sign is that of a t test of the mean difference; the interval of the ratio of the means follows from its
     linearisation.
     """
+    values, reference = np.asarray(values), np.asarray(reference)
     both = np.isfinite(values) & np.isfinite(reference)
     pairs = both.sum(axis=-1)
+    after, before = (mean(np.where(both, each, np.nan)) for each in (values, reference))
     with np.errstate(invalid="ignore", divide="ignore"):
-        after, before = (np.where(both, each, 0.0).sum(axis=-1) / pairs for each in (values, reference))
         ratio = after / before
-        error = _standard_error(values - reference, both)
-        ratio_error = _standard_error(values - ratio[..., np.newaxis] * reference, both) / np.abs(before)
-    factor = _factor(pairs - 1)
-    return Effect(
-        relative=np.where(pairs > 1, ratio - 1, np.nan),
-        half_width=factor * ratio_error,
-        sign=_sign(after - before, factor * error),
-        pairs=pairs,
-        lost=int((~both).sum()),
-    )
+        error = _standard_error(np.where(both, values - reference, np.nan))
+        left = np.where(both, values - ratio[..., np.newaxis] * reference, np.nan)
+        ratio_error = _standard_error(left) / np.abs(before)
+    return _effect(after - before, error, ratio, ratio_error, pairs - 1, pairs, int((~both).sum()))
 
 
-def unpaired(values: Array, reference: Array) -> Effect:
+def unpaired(values: ArrayLike, reference: ArrayLike) -> Effect:
     """Compare independent samples by Welch's t test."""
-    parts = []
+    both = np.asarray(values), np.asarray(reference)
+    (after, before), counts = map(mean, both), [np.isfinite(each).sum(axis=-1) for each in both]
+    (after_error, before_error), pairs = map(_standard_error, both), np.minimum(*counts)
     with np.errstate(invalid="ignore", divide="ignore"):
-        for each in (values, reference):
-            there = np.isfinite(each)
-            count = there.sum(axis=-1)
-            parts.append((np.where(there, each, 0.0).sum(axis=-1) / count, _standard_error(each, there), count))
-        (after, after_error, after_count), (before, before_error, before_count) = parts
         error = np.hypot(after_error, before_error)
-        freedom = error**4 / (after_error**4 / (after_count - 1) + before_error**4 / (before_count - 1))
+        freedom = error**4 / (after_error**4 / (counts[0] - 1) + before_error**4 / (counts[1] - 1))
         ratio = after / before
         ratio_error = np.hypot(after_error, ratio * before_error) / np.abs(before)
-    freedom = np.where(error == 0, np.minimum(after_count, before_count) - 1.0, freedom)
-    factor, pairs = _factor(freedom), np.minimum(after_count, before_count)
-    return Effect(
-        relative=np.where(pairs > 1, ratio - 1, np.nan),
-        half_width=factor * ratio_error,
-        sign=_sign(after - before, factor * error),
-        pairs=pairs,
-        lost=sum(int((~np.isfinite(each)).sum()) for each in (values, reference)),
-    )
+    freedom = np.where(error == 0, pairs - 1.0, freedom)
+    lost = sum(int((~np.isfinite(each)).sum()) for each in both)
+    return _effect(after - before, error, ratio, ratio_error, freedom, pairs, lost)
 
 
-def summary(effect: Effect) -> Summary:
-    """An effect over all cells that could be compared.
-
-    The interval of the mean is that of these cells, from their walks; it says nothing of other cells.
-    """
-    known = effect.known
-    relative, sign = effect.relative[known], effect.sign[known]
-    cells = len(relative)
-    if not cells:
-        return Summary(0, 0, 0, math.nan, math.nan, math.nan)
-    error = standard_error(effect)[known]
-    return Summary(
-        cells=cells,
-        rises=int((sign > 0).sum()),
-        falls=int((sign < 0).sum()),
-        mean=float(relative.mean()),
-        half_width=float(1.96 * np.sqrt((error**2).sum()) / cells),
-        typical=float(np.sqrt(max(0.0, float((relative**2 - error**2).mean())))),
-    )
+def _effect(
+    change: Array, error: Array, ratio: Array, ratio_error: Array, freedom: Any, pairs: NDArray[np.int64], lost: int
+) -> Effect:
+    """An effect from a change and a ratio of means with their standard errors."""
+    factor = _factor(freedom)
+    with np.errstate(invalid="ignore"):
+        sign = np.where(np.abs(change) > factor * error, np.sign(np.nan_to_num(change)), 0).astype(np.int64)
+    return Effect(np.where(pairs > 1, ratio - 1, np.nan), factor * ratio_error, sign, pairs, lost)
 
 
 def standard_error(effect: Effect) -> Array:
@@ -150,40 +146,33 @@ def within(effect: Effect, bound: float) -> int:
     return int((np.abs(effect.relative[known]) + effect.half_width[known] <= bound).sum())
 
 
-def mean(values: Array) -> Array:
+def mean(values: ArrayLike) -> Array:
     """Mean over the samples of each cell, shape (...,); NaN without a walk."""
+    values = np.asarray(values)
     there = np.isfinite(values)
     with np.errstate(invalid="ignore", divide="ignore"):
         means: Array = np.where(there, values, 0.0).sum(axis=-1) / there.sum(axis=-1)
     return means
 
 
-def spread(values: Array) -> Array:
+def spread(values: ArrayLike) -> Array:
     """Standard deviation of a walk over the mean of its cell, shape (...,); NaN with fewer than two walks."""
-    there = np.isfinite(values)
-    count = there.sum(axis=-1)
+    values = np.asarray(values)
     with np.errstate(invalid="ignore", divide="ignore"):
-        relative: Array = _standard_error(values, there) * np.sqrt(count) / mean(values)
+        relative: Array = _standard_error(values) * np.sqrt(np.isfinite(values).sum(axis=-1)) / mean(values)
     return relative
 
 
-def _standard_error(values: Array, there: NDArray[np.bool_]) -> Array:
+def _standard_error(values: Array) -> Array:
     """Standard error of the mean of the values that are there; NaN with fewer than two."""
+    there = np.isfinite(values)
     count = there.sum(axis=-1)
-    kept = np.where(there, values, 0.0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        deviation = np.where(there, kept - (kept.sum(axis=-1) / count)[..., np.newaxis], 0.0)
+        deviation = np.where(there, np.where(there, values, 0.0) - mean(values)[..., np.newaxis], 0.0)
         error: Array = np.sqrt((deviation**2).sum(axis=-1) / (count - 1) / count)
     return np.where(count > 1, error, np.nan)
 
 
 def _factor(freedom: Any) -> Array:
     """Half-width of a 95 % interval over the standard error; NaN without a degree of freedom."""
-    return t.ppf(_TAIL, np.where(np.asarray(freedom) > 0, freedom, np.nan))
-
-
-def _sign(difference: Array, half_width: Array) -> NDArray[np.int64]:
-    """Sign of a difference that is significant, 0 of another and where there is no interval."""
-    with np.errstate(invalid="ignore"):
-        significant = np.abs(difference) > half_width
-    return np.where(significant, np.sign(np.nan_to_num(difference)), 0).astype(np.int64)
+    return t.ppf((1 + CONFIDENCE) / 2, np.where(np.asarray(freedom) > 0, freedom, np.nan))

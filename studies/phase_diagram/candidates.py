@@ -108,11 +108,6 @@ CANDIDATES: Final = (
 """With a fixed drop h, its Froude number v²/(g h) is ν²ℓ/g but for a constant, and so is v²/(g R)."""
 
 
-def root_mean_square(left: Array) -> float:
-    """In per cent."""
-    return float(100 * np.sqrt(np.mean(left**2)))
-
-
 def left_out(points: Points, candidate: Candidate, block: str) -> Array:
     """ln Δx of each cell less what the law says that was fitted without the cells of its block, shape (cells,)."""
     of, left = getattr(points, block), np.zeros(len(points.links))
@@ -151,8 +146,8 @@ def table(cells: Mapping[str, Array], varied: scales.Cells) -> str:
     for candidate in CANDIDATES:
         row = [candidate.name, str(candidate.numbers)]
         for points in known.values():
-            own = root_mean_square(np.log(points.distance) - candidate.fit(points)[1](points))
-            others = [root_mean_square(left_out(points, candidate, block)) for block in BLOCKS]
+            own = laws.root_mean_square(np.log(points.distance) - candidate.fit(points)[1](points))
+            others = [laws.root_mean_square(left_out(points, candidate, block)) for block in BLOCKS]
             row.append(f"{own:.1f} / {others[0]:.1f} / {others[1]:.1f}")
         rows.append(row)
     heads = (f"{name} ({len(points.links)} cells)" for name, points in known.items())
@@ -189,9 +184,10 @@ def beyond(points: Points, varied: scales.Cells) -> str:
         a, b, p = candidate.fit(points)[0]
         left = np.log(varied.lengths) - np.log(a * reach / length + b * (reach / length) ** p)
         groups = ", ".join(
-            f"{root_mean_square(left[varied.varied(word)]):.0f} % ({name})" for word, (name, _) in scales.BLOCKS.items()
+            f"{laws.root_mean_square(left[varied.varied(word)]):.0f} % ({name})"
+            for word, (name, _) in scales.BLOCKS.items()
         )
-        parts.append(f"{candidate.name} leaves {root_mean_square(left):.0f} %: {groups}")
+        parts.append(f"{candidate.name} leaves {laws.root_mean_square(left):.0f} %: {groups}")
     return f"Of the {len(length)} cells with other g, R and ℓ, to which nothing is fitted, {'; '.join(parts)}."
 
 
@@ -207,6 +203,6 @@ def walking_time(cells: Mapping[str, Array]) -> str:
         mean_speed = points.distance[chosen] / duration[chosen] / points.speed[chosen]
         for quantity, values in (("walking time", duration[chosen]), ("mean speed over v", mean_speed)):
             weights = np.linalg.lstsq(design, np.log(values), rcond=None)[0]
-            left = root_mean_square(np.log(values) - design @ weights)
+            left = laws.root_mean_square(np.log(values) - design @ weights)
             rows.append((quantity, name, f"v^{weights[1]:.2f} L^{weights[2]:.2f}", f"{left:.1f} %"))
     return markdown(("quantity", "cells", "∝", "leaves"), rows)

@@ -1,6 +1,7 @@
 """Reduces parts of the sweep ``phase_diagram`` to statistics of its cells: the rows of results/cells.csv."""
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -75,7 +76,7 @@ def reduced(links: int, frequency: float, walks: Mapping[str, Array]) -> dict[st
     status = walks["status"]
     rest = status == Status.AT_REST
     dx, codes = walks["dx"][rest].astype(float), endings(walks)[rest]
-    count = len(dx)
+    count, (mean, sd) = len(dx), mean_and_sd(dx)
     attempts = (_known(walks["steps_accepted"]) + _known(walks["steps_rejected"]))[status != MISSING]
     deciles = np.quantile(dx, [0.1, 0.5, 0.9]) if count else np.full(3, np.nan)
     row: dict[str, float] = {
@@ -88,15 +89,15 @@ def reduced(links: int, frequency: float, walks: Mapping[str, Array]) -> dict[st
         "told": int((codes != Ending.UNKNOWN).sum()),
         "flight_told": int(np.isfinite(walks["flight_before_collapse"][rest]).sum()),
         "inaccurate": int((walks["energy_error"][rest] > MOST_ENERGY_ERROR).sum()),
-        "dx_mean": _mean(dx),
-        "dx_sd": _sd(dx),
-        "dx_se": _sd(dx) / np.sqrt(count) if count > 1 else np.nan,
+        "dx_mean": mean,
+        "dx_sd": sd,
+        "dx_se": sd / math.sqrt(max(1, count)),
         **dict(zip(("dx_10", "dx_50", "dx_90"), map(float, deciles), strict=True)),
-        **{f"{name}_mean": _mean(_known(walks[name])[rest]) for name in AVERAGED},
-        "bounces_sd": _sd(_known(walks["bounces"])[rest]),
-        "attempts_mean": _mean(attempts),
+        **{f"{name}_mean": mean_and_sd(_known(walks[name])[rest])[0] for name in AVERAGED},
+        "bounces_sd": mean_and_sd(_known(walks["bounces"])[rest])[1],
+        "attempts_mean": mean_and_sd(attempts)[0],
         **{way.label: int((codes == way).sum()) for way in WAYS},
-        **{f"dx_{way.label}": _mean(dx[codes == way]) for way in WAYS},
+        **{f"dx_{way.label}": mean_and_sd(dx[codes == way])[0] for way in WAYS},
     }
     return row
 
@@ -106,16 +107,10 @@ def _known(values: Array) -> Array:
     return np.where(values == MISSING, np.nan, values)
 
 
-def _mean(values: Array) -> float:
-    """Mean of what is not NaN; NaN of nothing."""
+def mean_and_sd(values: Array) -> tuple[float, float]:
+    """Mean and standard deviation of what is not NaN; NaN of nothing, and of fewer than two."""
     known = values[np.isfinite(values)]
-    return float(known.mean()) if len(known) else float("nan")
-
-
-def _sd(values: Array) -> float:
-    """Standard deviation of what is not NaN; NaN of fewer than two."""
-    known = values[np.isfinite(values)]
-    return float(known.std(ddof=1)) if len(known) > 1 else float("nan")
+    return float(known.mean()) if len(known) else math.nan, float(known.std(ddof=1)) if len(known) > 1 else math.nan
 
 
 def read_csv(path: Path = CSV) -> dict[str, Array]:

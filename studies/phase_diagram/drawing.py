@@ -1,7 +1,6 @@
 """Draws the maps and the master curves of the phase diagram."""
 
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -13,7 +12,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 
-from studies.common import FAINT, GROUND, INK, RED, save_figure, tidy
+from studies.common import FAINT, GROUND, INK, RED, tidy
 from studies.phase_diagram import laws
 from studies.phase_diagram.endings import Ending
 
@@ -65,7 +64,7 @@ class Grid:
         return image
 
 
-def draw_maps(cells: Mapping[str, Array], path: Path) -> None:
+def draw_maps(cells: Mapping[str, Array]) -> Figure:
     """Mean of Δx, its spread, bounces, and ways of ending with their shares; dots: share of walks that failed."""
     grid = Grid(cells)
     walks = np.maximum(cells["walks"], 1)
@@ -93,7 +92,7 @@ def draw_maps(cells: Mapping[str, Array], path: Path) -> None:
         draw_failed(axes, np.nan_to_num(grid.table(failed)))
     draw_endings(lower_right, grid, cells)
     draw_failed(lower_right, np.nan_to_num(grid.table(failed)), color="white", rim=INK)  # red is one of its colours
-    save_figure(figure, path)
+    return figure
 
 
 def draw_failed(axes: Axes, share: Array, color: str = RED, rim: str = "white") -> None:
@@ -133,12 +132,9 @@ def draw_endings(axes: Axes, grid: Grid, cells: Mapping[str, Array]) -> None:
         axes.legend(handles=handles, fontsize="x-small", loc="upper center", bbox_to_anchor=(0.5, -0.16), frameon=False)
 
 
-def draw_laws(cells: Mapping[str, Array], path: Path) -> None:
+def draw_laws(cells: Mapping[str, Array]) -> Figure:
     """Laws of Δx/(nℓ): cells coloured by links, and master curves; where the last one fails."""
     points = laws.points_of(cells)
-    if len(points.links) < laws.FEWEST:
-        print(f"{path.name}: not drawn, {len(points.links)} cells are too few")
-        return
     figure = Figure(figsize=(11, 8.2), layout="constrained")
     grid, y = list(figure.subplots(2, 2).flat), points.distance / points.length
     variables = {
@@ -157,7 +153,7 @@ def draw_laws(cells: Mapping[str, Array], path: Path) -> None:
     title = "Δx over its curve in v/(nℓ), less 1 / %"
     shades = used.map(grid[3], left, title, cmap="RdBu_r", vmin=-limit, vmax=limit)
     figure.colorbar(shades, ax=grid[3], pad=0.02, extend="both")
-    save_figure(figure, path)
+    return figure
 
 
 def draw_law(axes: Axes, links: Array, x: Array, y: Array, curve: Callable[[Array], Array]) -> Any:

@@ -143,7 +143,7 @@ def _logarithms(points: Points) -> Array:
     return np.stack([np.ones(len(points.links)), np.log(points.frequency), np.log(points.links)], axis=1)
 
 
-def root_mean_square(left: Array, numbers: int) -> float:
+def root_mean_square(left: Array, numbers: int = 0) -> float:
     """Root mean square in per cent of residuals that a fit of so many numbers leaves."""
     return float(100 * np.sqrt(np.sum(left**2) / max(len(left) - numbers, 1)))
 

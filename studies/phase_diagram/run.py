@@ -15,7 +15,7 @@ from typing import Annotated, Final
 import typer
 
 import warpchain
-from studies.common import read_rows, run_study, write_rows, write_tables
+from studies.common import publish, read_rows, run_study, write_rows
 from studies.phase_diagram import candidates, cells, drawing, scales, strands
 from studies.phase_diagram.tables import TABLES
 
@@ -46,10 +46,8 @@ def make(
         }
         | strands.tables(cells.read_csv(strands.CSV), found)
     )
-    write_tables(FOLDER / "README.md", tables)
-    drawing.draw_maps(found, FOLDER / "figures" / "maps.png")
-    drawing.draw_laws(found, FOLDER / "figures" / "laws.png")
-    scales.draw(varied, curve, FOLDER / "figures" / "scales.png")
+    figures = {"maps": drawing.draw_maps(found), "laws": drawing.draw_laws(found), "scales": scales.draw(varied, curve)}
+    publish(FOLDER, tables, figures)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ In the phase diagram Δx/(nℓ) is a curve over v/(nℓ), turns of the loop per 
 and links, and shows with which time τ all of its cells are on that very curve, now over v τ/(nℓ).
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -14,9 +15,10 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from studies.common import FAINT, INK, save_figure, tidy
+from studies.common import FAINT, INK, of_cells, tidy
 from studies.common import table as markdown
 from studies.phase_diagram import laws
+from studies.phase_diagram.cells import mean_and_sd
 from warpchain import InputError, Status, SweepResult, preset
 
 Array = NDArray[Any]
@@ -61,8 +63,8 @@ def reduced(result: SweepResult) -> list[dict[str, float | str]]:
             raise InputError(
                 f"block {content['name']}: no axes links and frequency; give a folder of the sweep scaling"
             )
-        for place in np.ndindex(block.columns["dx"].shape[:-1]):
-            at = {name: float(values[i]) for (name, values), i in zip(block.axes.items(), place, strict=True)}
+        for place, values in of_cells(block):
+            at = dict(zip(block.axes, map(float, values), strict=True))
             given = {name: at.get(name) for name in ("gravity", "sprocket_radius", "link_length")}
             known = {name: content["parameters"].get(name) if value is None else value for name, value in given.items()}
             parameters = preset("soft").with_values({name: value for name, value in known.items() if value is not None})
@@ -70,20 +72,11 @@ def reduced(result: SweepResult) -> list[dict[str, float | str]]:
             dx = block.columns["dx"][place][status == Status.AT_REST]
             if np.any(status < 0):
                 raise InputError(f"block {content['name']}: walks are missing; run the sweep to its end")
-            rows.append(
-                {
-                    "block": content["name"],
-                    "links": int(at["links"]),
-                    "frequency": at["frequency"],
-                    "gravity": parameters.gravity,
-                    "radius": parameters.sprocket_radius + parameters.circle_radius,
-                    "link_length": parameters.link_length,
-                    "walks": len(status),
-                    "at_rest": len(dx),
-                    "dx_mean": float(dx.mean()) if len(dx) else float("nan"),
-                    "dx_se": float(dx.std(ddof=1) / np.sqrt(len(dx))) if len(dx) > 1 else float("nan"),
-                }
-            )
+            cell = {"block": content["name"], "links": int(at["links"]), "frequency": at["frequency"]}
+            cell |= {"gravity": parameters.gravity, "radius": parameters.sprocket_radius + parameters.circle_radius}
+            cell |= {"link_length": parameters.link_length, "walks": len(status), "at_rest": len(dx)}
+            mean, sd = mean_and_sd(dx)
+            rows.append(cell | {"dx_mean": mean, "dx_se": sd / math.sqrt(max(1, len(dx)))})
     return rows
 
 
@@ -153,7 +146,7 @@ def table(cells: Cells, curve: Curve) -> str:
     rows = []
     for name, exponents in TIMES.items():
         left = curve.left(cells, exponents)
-        rows.append([name, *(f"{laws.root_mean_square(left[chosen], 0):.0f} %" for chosen in groups.values())])
+        rows.append([name, *(f"{laws.root_mean_square(left[chosen]):.0f} %" for chosen in groups.values())])
     count = len(cells.names)
     a, b, c = curve.best_exponents(cells, groups["all"])
     rng = np.random.default_rng(1)
@@ -191,7 +184,7 @@ def _span(values: Array) -> str:
     return f"{values.min():.2g} to {values.max():.2g}"
 
 
-def draw(cells: Cells, curve: Curve, path: Path) -> None:
+def draw(cells: Cells, curve: Curve) -> Figure:
     """Δx/(nℓ) over turns per second, and over turns in the time (R/g)^½; the phase diagram in grey."""
     figure = Figure(figsize=(11, 4.8), layout="constrained")
     panels = (
@@ -207,7 +200,7 @@ def draw(cells: Cells, curve: Curve, path: Path) -> None:
             axes.scatter(x, cells.lengths[chosen], s=16, color=color, label=name)
         fine = np.geomspace(curve.turns.min(), curve.turns.max(), 200)
         axes.plot(fine * unit, curve(fine), color=INK, linewidth=1)
-        left = laws.root_mean_square(curve.left(cells, exponents), 0)
+        left = laws.root_mean_square(curve.left(cells, exponents))
         axes.set_title(f"residual of the coloured cells {left:.0f} %", loc="left", color=INK, fontsize="medium")
         axes.set_xscale("log")
         axes.set_yscale("log")
@@ -215,4 +208,4 @@ def draw(cells: Cells, curve: Curve, path: Path) -> None:
         tidy(axes, grid="both")
     figure.axes[0].set_ylabel("Δx/(nℓ)")
     figure.axes[0].legend(frameon=False, title="varied")
-    save_figure(figure, path)
+    return figure

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.stationary_loop.theory import MeanLoop
+from studies.stationary_loop.theory import LoopParameters, MeanLoop
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ def imbalances(loop: MeanLoop) -> dict[str, Imbalance]:
         `moment`: M' + N − j v² κ'.
         `friction`: M − f(ℓ v κ'), where f is the moment of joints that turn like the mean curve.
     """
-    p, edge = loop.parameters, EDGE * loop.parameters.link_length
+    p, edge = LoopParameters.of(loop), EDGE * loop.parameters.link_length
     inside = (loop.s > loop.free[0] + edge) & (loop.s < loop.free[1] - edge)
     step = loop.length / len(loop.s)
     tangent = np.stack([-np.cos(loop.angle), np.sin(loop.angle)], axis=1)

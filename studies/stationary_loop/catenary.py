@@ -1,46 +1,24 @@
 """The catenary: the curve in which a chain hangs that neither runs nor resists bending."""
 
 import math
-from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.stationary_loop.theory import MeanLoop
+from studies.stationary_loop.theory import POINTS, MeanLoop, TheoreticalLoop
 
 Array = NDArray[np.float64]
 
-POINTS: Final = 801
-"""Number of points of a catenary."""
 
-
-class Catenary(NamedTuple):
-    """A hanging chain, as functions of the arc length at g points; signs as of `walk.mean_loop()`.
-
-    Attributes:
-        s: arc length from the lowest point [m], shape (g,).
-        position: x, y [m], shape (g, 2).
-        angle: φ [rad], shape (g,).
-        curvature: κ [1/m], shape (g,).
-        effective_tension: T_e [N], shape (g,).
-    """
-
-    s: Array
-    position: Array
-    angle: Array
-    curvature: Array
-    effective_tension: Array
-
-
-def catenary_of(loop: MeanLoop) -> Catenary:
+def catenary_of(loop: MeanLoop) -> TheoreticalLoop:
     """The catenary between the ends of the free part of a mean loop and as long as it; errors as below."""
     first, last = (np.array([np.interp(s, loop.s, column) for column in loop.position.T]) for s in loop.free)
-    weight = loop.parameters.density * loop.parameters.gravity
+    weight = loop.density * loop.parameters.gravity
     return catenary_between(first, last, loop.free[1] - loop.free[0], weight)
 
 
-def catenary_between(first: Array, last: Array, length: float, weight: float) -> Catenary:
-    """The catenary of a given length between two ends.
+def catenary_between(first: Array, last: Array, length: float, weight: float) -> TheoreticalLoop:
+    """The catenary of a given length between two ends, without shear and moment.
 
     With the width w and the height difference h, a curve y = c cosh((x − x₀)/c) has 2 c sinh(w/2c) = √(L² − h²).
 
@@ -65,10 +43,12 @@ def catenary_between(first: Array, last: Array, length: float, weight: float) ->
     from_lowest = width / 2 - c * math.atanh(rise / length)  # x of the first end, from the lowest point
     s = -c * math.sinh(from_lowest / c) + np.linspace(0.0, length, POINTS)
     lowest = first[0] - from_lowest, first[1] - c * (math.cosh(from_lowest / c) - 1)
-    return Catenary(
+    return TheoreticalLoop(
         s=s,
         position=np.stack([lowest[0] - c * np.arcsinh(s / c), lowest[1] + np.hypot(s, c) - c], axis=1),
         angle=np.arctan(s / c),
         curvature=c / (s**2 + c**2),
         effective_tension=weight * np.hypot(s, c),
+        shear=0 * s,
+        moment=0 * s,
     )

@@ -16,13 +16,13 @@ import typer
 from matplotlib.figure import Figure
 
 import warpchain
-from studies.common import DASHES, GREEN, RED, run_study, save_figure
+from studies.common import DASHES, GREEN, RED, publish, run_study
 from studies.stationary_loop.balances import imbalances
 from studies.stationary_loop.catenary import catenary_of
 from studies.stationary_loop.kinks import draw_kinks
-from studies.stationary_loop.theory import MeanLoop, NoSolutionError, TheoreticalLoop, predict
+from studies.stationary_loop.theory import LoopParameters, MeanLoop, NoSolutionError, TheoreticalLoop, predict
 
-FIGURES = Path(__file__).parent / "figures"
+FOLDER = Path(__file__).parent
 SHOWN = (120, 20.0)
 CELLS = ((60, 20.0), (120, 20.0), (120, 10.0), (180, 30.0), (60, 30.0))
 OTHERS: tuple[tuple[str, int, float, Mapping[str, float]], ...] = (
@@ -60,7 +60,7 @@ def compare(name: str, ours: MeanLoop, theirs: MeanLoop) -> None:
     )
 
 
-def row(name: str, loop: MeanLoop, theory: TheoreticalLoop | object) -> str:
+def row(name: str, loop: MeanLoop, theory: TheoreticalLoop) -> str:
     """Bottom curvature, peak and dip of a predicted curve, and how far it is from the simulated one."""
     near = np.abs(theory.s) < 0.35 * (loop.free[1] - loop.free[0])
     peak = int(np.argmax(np.where(near, theory.curvature, -np.inf)))
@@ -92,7 +92,7 @@ def show(name: str, walk: warpchain.WalkResult) -> None:
         f"least {kink.dip:6.2f} at {100 * kink.dip_at:5.1f} cm; "
         f"joints within {1e3 * loop.spread.max():.3f} mm"
     )
-    parameters = loop.parameters
+    parameters = LoopParameters.of(loop)
     for which, given in (
         ("theory", parameters),
         ("without Coulomb", dataclasses.replace(parameters, coulomb_friction=0.0)),
@@ -127,13 +127,13 @@ def draw(walk: warpchain.WalkResult) -> Figure:
 def main(kinks: Annotated[str | None, typer.Argument()] = None) -> None:
     """Print all tables and draw the figures."""
     if kinks is not None:
-        save_figure(draw_kinks(warpchain.load(kinks)), FIGURES / "kink.png", dpi=100)
+        publish(FOLDER, {}, {"kink": draw_kinks(warpchain.load(kinks))}, dpi=100)
     for links, frequency in CELLS:
         title, walk = f"{links} links, {frequency:g} Hz", held(links, frequency, {})
         show(title, walk)
         compare(title, walk.mean_loop(), held(links, frequency, UNDAMPED).mean_loop())
         if (links, frequency) == SHOWN:
-            save_figure(draw(walk), FIGURES / "loop.png", dpi=100)
+            publish(FOLDER, {}, {"loop": draw(walk)}, dpi=100)
     for text, links, frequency, values in OTHERS:
         show(f"{links} links, {frequency:g} Hz, {text}", held(links, frequency, values))
 

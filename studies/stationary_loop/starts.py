@@ -13,7 +13,18 @@ import typer
 from numpy.typing import NDArray
 
 import warpchain
-from studies.common import DRAWN, drawn_terms, read_rows, run_study, table, write_rows, write_tables
+from studies.common import (
+    DRAWN,
+    drawn_terms,
+    minus,
+    of_cells,
+    over_cells,
+    publish,
+    read_rows,
+    run_study,
+    table,
+    write_rows,
+)
 
 Array = NDArray[np.float64]
 Key = tuple[str, int, float, float]
@@ -51,11 +62,10 @@ def reduced(paths: list[str]) -> list[dict[str, Any]]:
     found: dict[Key, list[dict[str, Array]]] = {}
     for path in paths:
         for name, block in warpchain.load(path).blocks.items():
-            axes = [name for name in block.dims if name != "sample"]
             names = [name for name in block.columns if name in QUANTITIES or name.endswith(DRAWN)]
             columns = {name: np.asarray(block.columns[name], float) for name in names}
-            for place in np.ndindex(columns["dx"].shape[:-1]):
-                at = {axis: float(block.axes[axis][i]) for axis, i in zip(axes, place, strict=True)}
+            for place, numbers in of_cells(block):
+                at = dict(zip(block.axes, map(float, numbers), strict=True))
                 key = name, int(at["links"]), at["frequency"], at.get("further_hold", 0.0)
                 found.setdefault(key, []).append({name: values[place] for name, values in columns.items()})
     cells = {}
@@ -119,9 +129,8 @@ def _together(cells: dict[Key, dict[str, float]], loops: str, cell: tuple[int, f
 
 def _mean(ratios: list[tuple[float, float]]) -> str:
     """Mean over cells ± standard error, with χ² of none in any."""
-    sizes, errors = np.array(ratios).T
-    mean, error = 100 * sizes.mean(), 100 * np.sqrt(np.sum(errors**2)) / len(sizes)
-    return f"{mean:+.2f} ± {error:.2f} % (χ² {np.sum((sizes / errors) ** 2):.1f} of {len(sizes)})"
+    found = over_cells(*zip(*ratios, strict=True))
+    return f"{100 * found.mean:+.2f} ± {100 * found.error:.2f} % (χ² {found.chi2:.1f} of {len(found)})"
 
 
 def _with_error(cell: dict[str, float], quantity: str, scale: float = 1.0, digits: int = 4) -> str:
@@ -190,14 +199,14 @@ def tables(cells: dict[Key, dict[str, float]]) -> dict[str, str]:
         "swing": over_time(cells, "swing", "release_center_x", 1e3, 2),
         "swing in distance": over_time(cells, "swing", "dx"),
     }
-    return {name: text.replace("-", "−").replace("−−−", "---") for name, text in texts.items()}
+    return {name: minus(text) for name, text in texts.items()}
 
 
 def make(folders: Annotated[list[str] | None, typer.Argument()] = None) -> None:
     """Reduce the sweeps that are given into the committed file; then write all tables that are in it."""
     if folders:
         write_rows(CSV, reduced(folders))
-    write_tables(PAGE, tables(read()))
+    publish(PAGE.parent, tables(read()), {})
 
 
 if __name__ == "__main__":

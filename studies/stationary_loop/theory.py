@@ -28,8 +28,6 @@ from scipy.integrate import solve_bvp
 Array = NDArray[np.float64]
 MeanLoop = Any
 """What `walk.mean_loop()` returns."""
-LoopParameters = Any
-"""Its `parameters`, a data class."""
 
 SMOOTHINGS: Final = (300.0, 100.0, 30.0, 10.0, 3.0, 1.0)
 """Smoothings ω_c [rad/s] for which the problem is solved before that of the chain."""
@@ -47,6 +45,45 @@ IN_LINKS: Final = 1.0
 
 class NoSolutionError(ValueError):
     """The boundary value problem was not solved."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopParameters:
+    """The quantities of a chain of two kinds of links in the balances of its loop.
+
+    Attributes:
+        link_length: ℓ [m].
+        density: ρ = m̄/ℓ, mass per length [kg/m].
+        inertia: j = (Ī − m̄ ℓ²/6)/ℓ [kg m]; may be negative.
+        gravity: g [m/s²].
+        viscous_friction: β of a joint [N m s].
+        coulomb_friction: τ_c of a joint [N m].
+        friction_smoothing: ω_c of a joint on the sprocket [rad/s].
+    """
+
+    link_length: float
+    density: float
+    inertia: float
+    gravity: float
+    viscous_friction: float
+    coulomb_friction: float
+    friction_smoothing: float
+
+    def moment(self, spin: Array) -> Array:
+        """Friction moment f(w) = β w + τ_c tanh(w / ω_c) [N m] of a joint that turns at w [rad/s]."""
+        return self.viscous_friction * spin + self.coulomb_friction * np.tanh(spin / self.friction_smoothing)
+
+    @classmethod
+    def of(cls, loop: MeanLoop) -> "LoopParameters":
+        """Those of the chain of a mean loop."""
+        given, length = loop.parameters, loop.parameters.link_length
+        inertia = (given.inner_inertia + given.outer_inertia) / 2
+        alike = ("link_length", "gravity", "viscous_friction", "coulomb_friction", "friction_smoothing")
+        return cls(
+            density=loop.density,
+            inertia=inertia / length - loop.density * length**2 / 6,
+            **{name: getattr(given, name) for name in alike},
+        )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -109,7 +146,7 @@ def predict(loop: MeanLoop, parameters: LoopParameters | None = None) -> Theoret
     columns = (loop.angle, loop.curvature, loop.bending, loop.effective_tension, loop.shear)
     guess = np.stack([np.interp(s, loop.s, values) for values in (*loop.position.T, *columns)])
     ends = End.of(loop, first), End.of(loop, last)
-    return solve(ends, guess, last - first, parameters or loop.parameters, loop.speed)
+    return solve(ends, guess, last - first, parameters or LoopParameters.of(loop), loop.speed)
 
 
 def solve(

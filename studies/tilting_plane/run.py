@@ -39,8 +39,7 @@ def main(folder: str) -> None:
         raise warpchain.InputError(f"{folder}: no blocks fixed and tilted; give a folder of the sweep tilt")
     rows = list(taps.reduced(result))
     common.write_rows(FOLDER / "results" / "tilt.csv", rows)
-    common.write_tables(FOLDER / "README.md", {"tilt": table(rows)})
-    common.save_figure(result.plot(quantity="fell_over"), FOLDER / "figures" / "falls.png")
+    common.publish(FOLDER, {"tilt": table(rows)}, {"falls": result.plot(quantity="fell_over")})
 
 
 if __name__ == "__main__":

@@ -16,7 +16,6 @@ import warpchain
 from studies import common
 
 FOLDER: Final = Path(__file__).parent
-RESULTS: Final = FOLDER / "results" / "taps.csv"
 UNITS: Final = {"tilt": "rad", "tilt_rate": "rad/s", "lateral_speed": "m/s", "yaw_rate": "rad/s"}
 STRAIGHT: Final = (0.1, 0.2)
 """Greatest |drift| over Δx of a walk that counts as straight."""
@@ -48,15 +47,14 @@ def _of_cells(columns: Mapping[str, Any], fixed: Any, rows: Any) -> dict[str, ob
     dx, drift = (np.where(rest, columns[name][rows].astype(float), np.nan) for name in ("dx", "lateral_drift"))
     mean, count = np.nanmean(dx, axis=-1), rest.sum(axis=-1)
     ratio = mean / fixed.mean[rows]
-    errors = np.hypot(
-        np.nanstd(dx, axis=-1, ddof=1) / np.sqrt(count) / mean, fixed.standard_error[rows] / fixed.mean[rows]
-    )
+    own = np.nanstd(dx, axis=-1, ddof=1) / np.sqrt(count) / mean
+    over = common.over_cells(ratio, ratio * np.hypot(own, fixed.standard_error[rows] / fixed.mean[rows]))
     found: dict[str, object] = {
         "walks": int(rest.sum()),
         "fell": f"{100 * columns['fell_over'][rows].mean():.3g}",
         "early": f"{100 * columns['fell_before_collapse'][rows].mean():.3g}",
-        "ratio": f"{ratio.mean():.3f}",
-        "error": f"{np.sqrt(np.sum((ratio * errors) ** 2)) / ratio.size:.3f}",
+        "ratio": f"{over.mean:.3f}",
+        "error": f"{over.error:.3f}",
         "least": f"{ratio.min():.2f}",
         "greatest": f"{ratio.max():.2f}",
         "drift": f"{np.sqrt(np.nanmean(drift**2)):.3f}",
@@ -80,7 +78,7 @@ def table(rows: Sequence[Mapping[str, str]]) -> str:
     head = ("tap at the release", "fell over", "before the loop collapsed", "Δx over that of a fixed plane")
     lines = [
         (
-            row["tap"].replace("-", "−"),
+            common.minus(row["tap"]),
             f"{row['fell']} %",
             f"{row['early']} %",
             f"{row['ratio']} ± {row['error']} ({row['least']} to {row['greatest']})",
@@ -101,7 +99,7 @@ def by_links(rows: Sequence[Mapping[str, str]]) -> str:
     early = {(row["tap"], row["links"]): row["early"] for row in rows}
     return common.table(
         ("tap", *(f"{each} links" for each in links)),
-        ((tap.replace("-", "−"), *(f"{early[tap, each]} %" for each in links)) for tap in taps),
+        ((common.minus(tap), *(f"{early[tap, each]} %" for each in links)) for tap in taps),
     )
 
 
@@ -111,9 +109,9 @@ def main(folder: Annotated[str | None, typer.Argument()] = None) -> None:
         result = warpchain.load(folder)
         if "fixed" not in result.blocks or "lateral_speed" not in result.blocks:
             raise warpchain.InputError(f"{folder}: no blocks fixed and lateral_speed; give a folder of the sweep taps")
-        common.write_rows(RESULTS, list(reduced(result)))
-    rows = common.read_rows(RESULTS)
-    common.write_tables(FOLDER / "README.md", {"taps": table(rows), "taps by links": by_links(rows)})
+        common.write_rows(FOLDER / "results" / "taps.csv", list(reduced(result)))
+    rows = common.read_rows(FOLDER / "results" / "taps.csv")
+    common.publish(FOLDER, {"taps": table(rows), "taps by links": by_links(rows)}, {})
 
 
 if __name__ == "__main__":

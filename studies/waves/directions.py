@@ -18,10 +18,11 @@ import typer
 from numpy.typing import NDArray
 
 import warpchain
-from studies.common import read_rows, run_study, table, write_rows, write_tables
-from studies.waves.drag import END, NEAR, PARAMETERS, released
+from studies.common import minus, over_cells, publish, read_rows, run_study, table, write_rows
+from studies.waves import wave_drag
+from studies.waves.drag import END, NEAR, released
 from studies.waves.fields import normal_velocities
-from studies.waves.wave_drag import RIGID, RUNNING, loop_motions, wave_motion
+from studies.waves.wave_drag import RIGID, RUNNING, inertia_of, loop_motions, wave_motion
 
 Array = NDArray[np.float64]
 
@@ -78,14 +79,6 @@ def with_wave(
     return moved, velocity + wave_motion(rigid, change[None], inertia[None])[1][0]
 
 
-def inertia_of(links: int, parameters: warpchain.Parameters) -> Array:
-    """Mass, mass and moment of inertia of each link, (n, 3)."""
-    kinds = [
-        [getattr(parameters, f"{kind}_{name}") for name in ("mass", "mass", "inertia")] for kind in ("inner", "outer")
-    ]
-    return np.tile(kinds, (links // 2, 1))
-
-
 def running(position: Array, velocity: Array, parameters: warpchain.Parameters) -> float:
     """Speed [m/s] with which a loop runs along itself."""
     motions, _ = loop_motions(position[None], np.array([parameters.link_length]))
@@ -119,17 +112,14 @@ def distances(links: int, frequency: float) -> tuple[Array, Array]:
     phases = 2 * np.pi * np.random.default_rng(SEED).random(SAMPLES)
     chains, states = [], []
     for sample in range(SAMPLES):
-        position, velocity, numbers = released(links, frequency, SEED + sample)
-        parameters = warpchain.Parameters(**dict(zip(PARAMETERS, map(float, numbers), strict=True)))
+        position, velocity, parameters = released(links, frequency, SEED + sample)
         for way, size in VARIANTS:
             chains.append(parameters)
             states.append(with_wave(position, velocity, parameters, way, size, phases[sample]))
     position, velocity = (np.array(each) for each in zip(*states, strict=True))
     walking = warpchain.Chains(chains, position, velocity)
     walking.run(END, to_rest=True)
-    mass = np.tile([[each.inner_mass, each.outer_mass] for each in chains], links // 2)
-    dx = np.sum(mass * walking.motions()[0][..., 0], axis=1) / mass.sum(axis=1)
-    dx[walking.status != warpchain.Status.AT_REST] = np.nan
+    dx = wave_drag.distances(walking, np.array([inertia_of(links, each) for each in chains]))
     return dx.reshape(SAMPLES, -1).T, phases
 
 
@@ -143,17 +133,10 @@ def reduced(dx: Array, phases: Array) -> list[dict[str, str]]:
         found, left, *_ = np.linalg.lstsq(design, change, rcond=None)
         variance = left[0] / (both.sum() - 3)
         explained = change.var() * both.sum() - left[0]
-        rows.append(
-            {
-                "wave": way,
-                "size": f"{size:g}",
-                "pairs": str(both.sum()),
-                "change": f"{change.mean():.3f}",
-                "error": f"{change.std(ddof=1) / np.sqrt(both.sum()):.3f}",
-                "by_phase": f"{np.hypot(*found[1:]):.3f}",
-                "f": f"{explained / 2 / variance:.3f}",
-            }
-        )
+        numbers = {"change": change.mean(), "error": change.std(ddof=1) / np.sqrt(both.sum())}
+        numbers |= {"by_phase": np.hypot(*found[1:]), "f": explained / 2 / variance}
+        words = {"wave": way, "size": f"{size:g}", "pairs": str(both.sum())}
+        rows.append(words | {name: f"{value:.3f}" for name, value in numbers.items()})
     return rows
 
 
@@ -175,7 +158,8 @@ def changes(rows: Sequence[Mapping[str, str]], way: str, size: float) -> Array:
 
 def mean_of_cells(change: Array, error: Array) -> str:
     """Mean over the cells ± its standard error."""
-    return f"{change.mean():+.1f} ± {np.sqrt(np.sum(error**2)) / len(error):.1f} %".replace("-", "−")
+    over = over_cells(change, error)
+    return minus(f"{over.mean:+.1f} ± {over.error:.1f} %")
 
 
 def summary(rows: Sequence[Mapping[str, str]]) -> str:
@@ -183,14 +167,11 @@ def summary(rows: Sequence[Mapping[str, str]]) -> str:
     lines = []
     for way, size in VARIANTS[1:]:
         change, error, by_phase, f = changes(rows, way, size)
-        typical = np.sqrt(max(0.0, float(np.mean(change**2 - error**2))))
-        ends = f"{change.min():+.0f} to {change.max():+.0f} %".replace("-", "−")
-        chi2 = f"{np.sum((change / error) ** 2):.0f} of {len(change)}"
-        texts = mean_of_cells(change, error), ends, f"{typical:.1f} %", chi2, f"{by_phase.mean():.1f} %"
-        lines.append([way, f"{size:g}", *texts, f"{f.mean():.1f}"])
-    return table(
-        "wave | amplitude / rad | Δx, mean of cells | cells | typical | χ² of none | ∝ cos φ | F of that", lines
-    )
+        over, ends = over_cells(change, error), minus(f"{change.min():+.0f} to {change.max():+.0f} %")
+        texts = mean_of_cells(change, error), ends, f"{over.typical:.1f} %", f"{over.chi2:.0f} of {len(over)}"
+        lines.append([way, f"{size:g}", *texts, f"{by_phase.mean():.1f} %", f"{f.mean():.1f}"])
+    head = "wave | amplitude / rad | Δx, mean of cells | cells | typical | χ² of none | ∝ cos φ | F of that"
+    return table(head, lines)
 
 
 def about_impact(links: int, frequency: float) -> tuple[float, float]:
@@ -199,7 +180,7 @@ def about_impact(links: int, frequency: float) -> tuple[float, float]:
         links=links, frequency=frequency, preset="soft", start="spinning", frame_interval=2.5e-4, walk_limit=0.4
     )
     parameters, time, number = walk.setup.parameters, walk.frame_time, round(links / LENGTH)
-    masses = np.tile([parameters.inner_mass, parameters.outer_mass], links // 2)
+    masses = inertia_of(links, parameters)[:, 0]
     modes = np.abs(np.fft.rfft(normal_velocities(time, walk.frame_joints, masses), axis=1))[:, number - 1 : number + 2]
     angles = np.sqrt(np.sum((2 * modes / links) ** 2, axis=1)) / (4 * np.pi * frequency * RIDING)
     touches = np.flatnonzero(np.interp(time, walk.time, walk.lowest) < NEAR)
@@ -210,8 +191,7 @@ def about_impact(links: int, frequency: float) -> tuple[float, float]:
 
 def given(links: int, frequency: float) -> dict[tuple[str, float], Array]:
     """What waves of all phases change of a loop, (phases, 4): energy, angular momentum, run [%], lowest joint [mm]."""
-    position, velocity, numbers = released(links, frequency, SEED)
-    parameters = warpchain.Parameters(**dict(zip(PARAMETERS, map(float, numbers), strict=True)))
+    position, velocity, parameters = released(links, frequency, SEED)
     inertia = inertia_of(links, parameters)
 
     def numbers_of(at: Array, speeds: Array) -> Array:
@@ -248,7 +228,7 @@ def main(command: Annotated[str, typer.Argument()] = "") -> None:
         return
     if command == "run":
         run()
-    write_tables(FOLDER / "README.md", {"directions": summary(read_rows(RESULTS))})
+    publish(FOLDER, {"directions": summary(read_rows(RESULTS))}, {})
 
 
 if __name__ == "__main__":

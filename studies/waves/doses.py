@@ -11,7 +11,7 @@ from typing import Annotated, Final
 import numpy as np
 import typer
 
-from studies.common import read_rows, run_study, table, write_rows, write_tables
+from studies.common import minus, over_cells, publish, read_rows, run_study, table, write_rows
 from studies.waves.drag import CELLS, HALVES, RATES, SAMPLES, SEEDS, VARIANTS
 
 FOLDER: Final = Path(__file__).parent
@@ -62,7 +62,7 @@ def _changes_table(rows: Sequence[Row], columns: Sequence[tuple[str, float]]) ->
     lines = [
         [
             f"{links}, {float(frequency):g}",
-            *(f"{values[i]:+.1f} ± {errors[i]:.1f}".replace("-", "−") for values, errors in known),
+            *(minus(f"{values[i]:+.1f} ± {errors[i]:.1f}") for values, errors in known),
         ]
         for i, (links, frequency) in enumerate(cells)
     ]
@@ -78,13 +78,11 @@ def summary_table(rows: Sequence[Row]) -> str:
         values, errors = changes(rows, when, rate)
         sets = [changes(rows, when, rate, str(seed)) for seed in SEEDS]
         chi2 = float(np.sum((sets[0][0] - sets[1][0]) ** 2 / (sets[0][1] ** 2 + sets[1][1] ** 2)))
-        scatter = np.sqrt(max(0.0, float(np.mean(values**2 - errors**2))))
-        rises, falls = (int(np.sum(sign * values > 1.96 * errors)) for sign in (1, -1))
-        texts = f"{values.mean():+.1f} ± {np.sqrt(np.sum(errors**2)) / len(values):.1f} %", f"{scatter:.1f} %"
-        ends = f"{values.min():+.0f} to {values.max():+.0f} %"
-        lines.append([f"{rate:g}/s", when, *texts, ends, f"{rises}, {falls}", f"{chi2:.0f} of {len(values)}"])
+        over, ends = over_cells(values, errors), f"{values.min():+.0f} to {values.max():+.0f} %"
+        texts = f"{over.mean:+.1f} ± {over.error:.1f} %", f"{over.typical:.1f} %", ends, f"{over.rises}, {over.falls}"
+        lines.append([f"{rate:g}/s", when, *texts, f"{chi2:.0f} of {len(over)}"])
     head = ["drag", "acts", "mean of cells", "typical", "least to greatest", "rise, fall", "χ² between seeds"]
-    return table(head, lines).replace("-", "−").replace("−−−", "---")
+    return minus(table(head, lines))
 
 
 def tables(rows: Sequence[Row]) -> dict[str, str]:
@@ -101,7 +99,7 @@ def main(files: Annotated[list[Path] | None, typer.Argument()] = None) -> None:
     """Reduce files that are given, and write the tables."""
     if files:
         write_rows(RESULTS, list(reduced(files)))
-    write_tables(FOLDER / "README.md", tables(read_rows(RESULTS)))
+    publish(FOLDER, tables(read_rows(RESULTS)), {})
 
 
 if __name__ == "__main__":

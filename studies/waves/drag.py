@@ -8,6 +8,7 @@
 
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -16,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import warpchain
-from studies.waves.wave_drag import drag_waves
+from studies.waves.wave_drag import distances, drag_waves, inertia_of
 
 Array = NDArray[np.float64]
 
@@ -64,23 +65,15 @@ VARIANTS: Final = (
 
 NAMES: Final = ("position", "velocity", "numbers")
 """Arrays of a release."""
-PARAMETERS: Final = tuple(warpchain.Parameters.model_fields)
 
 
-def released(links: int, frequency: float, seed: int) -> tuple[Array, Array, Array]:
+def released(links: int, frequency: float, seed: int) -> tuple[Array, Array, warpchain.Parameters]:
     """Position and velocity of the links at the release, (n, 3) each, and the chain's parameters.
 
     Velocities are those of joints over the first three frames, some 1e-5 s apart, to second order: good to 1e-5 m/s.
     """
-    walk = warpchain.walk(
-        links=links,
-        frequency=frequency,
-        preset="soft",
-        start="spinning",
-        frame_interval=1e-5,
-        walk_limit=4e-5,
-        seed=seed,
-    )
+    scene = {"links": links, "frequency": frequency, "start": "spinning", "walk_limit": 4e-5}
+    walk = warpchain.walk(preset="soft", **scene, frame_interval=1e-5, seed=seed)
     first, second, third = walk.frame_joints[:3]
     one, two = walk.frame_time[1:3]
     joints = np.stack([first, ((second - first) * two / one - (third - first) * one / two) / (two - one)])
@@ -89,8 +82,7 @@ def released(links: int, frequency: float, seed: int) -> tuple[Array, Array, Arr
     center, speed = 0.5 * (joints + before)
     angle = np.arctan2(chord[:, 1], chord[:, 0])
     turning = (chord[:, 0] * change[:, 1] - chord[:, 1] * change[:, 0]) / np.sum(chord**2, axis=1)
-    numbers = np.array([getattr(walk.setup.parameters, name) for name in PARAMETERS])
-    return np.column_stack([center, angle]), np.column_stack([speed, turning]), numbers
+    return np.column_stack([center, angle]), np.column_stack([speed, turning]), walk.setup.parameters
 
 
 def release(path: Path) -> None:
@@ -99,7 +91,8 @@ def release(path: Path) -> None:
     for cell, (links, frequency) in enumerate(CELLS):
         seeds = [first + sample for first in SEEDS for sample in range(SAMPLES)]
         states = [released(links, frequency, seed) for seed in seeds]
-        kept |= {f"{name}{cell}": np.array([state[k] for state in states]) for k, name in enumerate(NAMES)}
+        arrays = ((position, velocity, list(chain.model_dump().values())) for position, velocity, chain in states)
+        kept |= {f"{name}{cell}": np.array(each) for name, each in zip(NAMES, zip(*arrays, strict=True), strict=True)}
         print(f"{links} links at {frequency:g} Hz", flush=True)
     np.savez_compressed(path, **kept)
 
@@ -112,21 +105,18 @@ class Loops:
         first: index of the first chain of each variant; they stand one variant after the other.
     """
 
-    def __init__(self, position: Array, velocity: Array, numbers: Array, device: str) -> None:
-        """Place each release once for each variant; arrays of shape (releases, n, 3) and (releases, parameters)."""
+    def __init__(
+        self, position: Array, velocity: Array, parameters: Sequence[warpchain.Parameters], device: str
+    ) -> None:
+        """Place each release once for each variant; arrays of shape (releases, n, 3)."""
         count, copies = len(position), len(VARIANTS)
-        parameters = [warpchain.Parameters(**dict(zip(PARAMETERS, map(float, row), strict=True))) for row in numbers]
         self.chains = warpchain.Chains(
-            parameters * copies, np.tile(position, (copies, 1, 1)), np.tile(velocity, (copies, 1, 1)), device=device
+            [*parameters] * copies, np.tile(position, (copies, 1, 1)), np.tile(velocity, (copies, 1, 1)), device=device
         )
         self._variant = np.repeat(np.arange(copies), count)
         self._length = np.array([each.link_length for each in parameters] * copies)
         self._radius = np.array([each.circle_radius for each in parameters] * copies)
-        halves = [
-            [(p.inner_mass, p.inner_mass, p.inner_inertia), (p.outer_mass, p.outer_mass, p.outer_inertia)]
-            for p in parameters
-        ]
-        self._inertia = np.tile(np.array(halves), (copies, position.shape[1] // 2, 1))
+        self._inertia = np.tile([inertia_of(position.shape[1], each) for each in parameters], (copies, 1, 1))
         self._rate = np.array([each.rate for each in VARIANTS])[self._variant]
         self._acts = np.array([(each.in_flight, each.in_impacts) for each in VARIANTS])[self._variant]
         self._least = np.full(len(self._variant), position.shape[1] / LONGEST)
@@ -151,10 +141,7 @@ class Loops:
             keeps &= chains.status[looping] == warpchain.Status.FINISHED
             looping, position, velocity = looping[keeps], position[keeps], velocity[keeps]
         chains.run(END, to_rest=True)
-        mass = self._inertia[..., 0]
-        dx = np.sum(mass * chains.motions()[0][..., 0], axis=1) / mass.sum(axis=1)
-        dx[chains.status != warpchain.Status.AT_REST] = np.nan
-        found = {"dx": dx, "lost_at": lost_at, "dragged_for": dragged_for}
+        found = {"dx": distances(chains, self._inertia), "lost_at": lost_at, "dragged_for": dragged_for}
         return {name: values.reshape(len(VARIANTS), -1) for name, values in found.items()}
 
     def _drag(self, looping: NDArray[np.int64], position: Array, velocity: Array) -> NDArray[np.bool_]:
@@ -184,7 +171,10 @@ def walk(releases: Path, out: Path, device: str = "cpu", only: int | None = None
     for cell, (links, frequency) in enumerate(CELLS):
         if only in (None, links) and f"position{cell}" in states:
             begun = time.perf_counter()
-            result = Loops(*(states[f"{name}{cell}"] for name in NAMES), device).walk()
+            position, velocity, numbers = (states[f"{name}{cell}"] for name in NAMES)
+            names = warpchain.Parameters.model_fields
+            chains = [warpchain.Parameters(**dict(zip(names, row, strict=True))) for row in numbers.tolist()]
+            result = Loops(position, velocity, chains, device).walk()
             found |= {f"{name}{cell}": values for name, values in result.items()}
             np.savez_compressed(out, **found)
             print(f"{links} links at {frequency:g} Hz: {time.perf_counter() - begun:.0f} s", flush=True)

@@ -28,6 +28,7 @@ from studies.waves.fields import (
     tensions,
     wave_speeds,
 )
+from studies.waves.wave_drag import inertia_of
 from warpchain import WalkResult
 
 Array = NDArray[np.float64]
@@ -85,7 +86,7 @@ def waves_figure(walk: WalkResult, *, colour: Colour = "curvature", window: tupl
     look, parameters, links = _LOOKS[colour], walk.setup.parameters, walk.setup.scene.links
     shown = (walk.frame_time >= window[0]) & (walk.frame_time <= window[1])
     time, joints, link = walk.frame_time[shown], walk.frame_joints[shown], parameters.link_length
-    masses = np.tile([parameters.inner_mass, parameters.outer_mass], links // 2)
+    masses = inertia_of(links, parameters)[:, 0]
     tension = moving_average(time, tensions(joints, walk.frame_forces[shown]).mean(axis=1), AVERAGED)
     speed, below = wave_speeds(tension, link, float(masses.mean())), joints_below(joints, masses)
     values = curvatures(joints, link) if colour == "curvature" else normal_velocities(time, joints, masses)

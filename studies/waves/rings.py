@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 import warpchain
-from studies.common import BLUE, FAINT, GREEN, GROUND, INK, RED, save_figure, tidy
+from studies.common import BLUE, FAINT, GREEN, GROUND, INK, RED, publish, tidy
 from studies.waves.dispersion import (
     LOWER_BACKWARD,
     LOWER_FORWARD,
@@ -42,7 +42,7 @@ SPINS = (0.01, 0.1, 1.0, 10.0, 60.0)
 """Amplitudes of a joint's angular velocity [rad/s]; joints turn at 60 rad/s where a loop bends."""
 WAVELENGTHS = np.array([6.0, 12.0, 24.0])
 BOTH = [LOWER_BACKWARD, LOWER_FORWARD]
-FIGURE = Path(__file__).parent / "figures" / "dispersion.png"
+FOLDER = Path(__file__).parent
 INTERVAL = 2e-4
 """Time between two instants of a tapped ring [s]."""
 
@@ -292,4 +292,4 @@ def main() -> None:
     places = []
     for how_many, wave_number, spread in ((160, 20, 12.0), (180, 15, 10.0), (360, 15, 20.0)):
         places += packets(how_many, wave_number, spread, at_20)
-    save_figure(draw(at_20, ring_angles, ring_numbers, places), FIGURE)
+    publish(FOLDER, {}, {"dispersion": draw(at_20, ring_angles, ring_numbers, places)})

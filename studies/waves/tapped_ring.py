@@ -20,14 +20,8 @@ def tapped_ring(links: int, parameters: Parameters, speed: float, spins: Array) 
     ring only if the spins have no part ∝ exp(±2πij/n), so this part, which moves the ring without bending it, is left
     out.
 
-    Args:
-        links: n, even, at least 4.
-        parameters: of the chain.
-        speed: of the joints of the closed ring before the tap [m/s]; anticlockwise if positive.
-        spins: further angular velocities [rad/s], (n,).
-
-    Returns:
-        position (n, 3) and velocity (n, 3): x, y [m], θ [rad] and their rates.
+    `speed` [m/s] is that of the joints of the closed ring before the tap, anticlockwise if positive; `spins` are
+    further angular velocities [rad/s], (n,). Returns position and velocity (n, 3): x, y [m], θ [rad] and their rates.
     """
     alpha, length = np.pi / links, parameters.link_length
     spin, coupling = speed * 2 * np.sin(alpha) / length, 2 * np.cos(2 * alpha)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 import warpchain
-from studies.common import save_figure
+from studies.common import publish
 from studies.waves.fields import (
     characteristic,
     curvatures,
@@ -16,8 +16,9 @@ from studies.waves.fields import (
     wave_speeds,
 )
 from studies.waves.picture import AVERAGED, waves_figure
+from studies.waves.wave_drag import inertia_of
 
-FIGURE = Path(__file__).parent / "figures" / "picture.png"
+FOLDER = Path(__file__).parent
 WALKS = ((120, 20.0, (0.10, 0.24)), (60, 15.0, (0.13, 0.33)))
 """Links, frequency [Hz], and times [s] between two impacts in which speeds are measured."""
 MODES = (2, 3, 4, 5, 6, 8, 10)
@@ -28,22 +29,14 @@ RATIOS = np.arange(0.05, 1.51, 0.01)
 
 def recorded(links: int, frequency: float) -> warpchain.WalkResult:
     """The first 0.35 s of a walk of soft joints, with joint forces in frames 0.1 ms apart."""
-    return warpchain.walk(
-        links=links,
-        frequency=frequency,
-        preset="soft",
-        start="spinning",
-        walk_limit=0.35,
-        record_loads=True,
-        record_before=0.0,
-        frame_interval=1e-4,
-    )
+    scene = {"links": links, "frequency": frequency, "start": "spinning", "walk_limit": 0.35}
+    return warpchain.walk(preset="soft", **scene, record_loads=True, record_before=0.0, frame_interval=1e-4)
 
 
 def print_speeds(walk: warpchain.WalkResult, begin: float, end: float) -> None:
     """Speeds of waves by their number around the loop, and the part of the variance that has this speed."""
     parameters, scene, time = walk.setup.parameters, walk.setup.scene, walk.frame_time
-    masses = np.tile([parameters.inner_mass, parameters.outer_mass], scene.links // 2)
+    masses = inertia_of(scene.links, parameters)[:, 0]
     length, shown = parameters.link_length, (time >= begin) & (time < end)
     mean = moving_average(time, tensions(walk.frame_joints, walk.frame_forces).mean(axis=1), AVERAGED)
     speed = wave_speeds(mean, length, float(masses.mean()))[shown]
@@ -67,5 +60,5 @@ def main() -> None:
     for number, (links, frequency, (begin, end)) in enumerate(WALKS):
         walk = recorded(links, frequency)
         if number == 0:
-            save_figure(waves_figure(walk, colour="curvature", window=(0.0, 0.25)), FIGURE, dpi=90)
+            publish(FOLDER, {}, {"picture": waves_figure(walk, window=(0.0, 0.25))}, dpi=90)
         print_speeds(walk, begin, end)

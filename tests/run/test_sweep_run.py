@@ -17,7 +17,6 @@ import pytest
 import yaml
 
 from tests.support.setups import setup_walk
-from warpchain.cli.main import main
 from warpchain.inputs.setup import Setup
 from warpchain.run.sweep_run import run_shards, sweep
 from warpchain.status import Status
@@ -66,18 +65,6 @@ def uninterrupted(tmp_path_factory) -> dict[str, bytes]:
     result = sweep(TINY, folder, workers=1)
     assert result.summary() == {"time_limit": 80, "at_rest": 0, "missing": 0}
     return data_of(folder)
-
-
-def test_walks_do_not_depend_on_their_batch():
-    """Number of slots, order and company change no bit of a walk, with different n, methods and starts in one batch."""
-    setups = [brief_setup(seed) for seed in range(5)]
-    setups += [brief_setup(seed, links=44, start="spinning", hold_limit=0.05) for seed in range(2)]
-    setups += [brief_setup(9, method="rkf78"), brief_setup(9, links=240)]
-    alone = [outcomes([setup])[0] for setup in setups]
-    assert outcomes(setups, slots=1) == alone
-    assert outcomes(setups, slots=4) == alone
-    assert outcomes(setups[::-1], slots=3) == alone[::-1]
-    assert len(set(alone)) == len(alone)
 
 
 def test_one_broken_walk_among_a_thousand_changes_no_other():
@@ -207,14 +194,12 @@ def test_a_dask_cluster_of_separate_processes(tmp_path, uninterrupted):
 
 
 @pytest.mark.parametrize("address", ("tls://127.0.0.1:1", "ucx://127.0.0.1:1", "inproc://1", "http://a:1"))
-def test_a_scheduler_that_cannot_be_reached_is_refused(tmp_path, capsys, address):
+def test_a_scheduler_that_cannot_be_reached_is_refused(command, address):
     """Whatever class of error Dask raises: one line, status 2, no folder, and no client that closes itself later."""
     distributed = pytest.importorskip("distributed")
-    with pytest.raises(SystemExit) as caught:
-        main(["sweep", "quickstart", "-o", str(tmp_path / "sweep"), "--scheduler", address])
-    said = capsys.readouterr().err
-    assert caught.value.code == 2 and said.startswith(f"error: --scheduler: '{address}': ") and said.count("\n") == 1
-    assert not (tmp_path / "sweep").exists()
+    answer = command("sweep", "quickstart", "-o", "sweep", "--scheduler", address)
+    assert answer.status == 2 and answer.err.count("\n") == 1 and not Path("sweep").exists()
+    assert answer.err.startswith(f"error: --scheduler: '{address}': ")
     clients = [each for each in gc.get_objects() if isinstance(each, distributed.Client)]
     assert clients and all(client.status == "closed" for client in clients)
 

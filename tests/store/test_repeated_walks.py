@@ -9,14 +9,11 @@ import numpy as np
 import pytest
 
 import warpchain
-from tests.support import command_line
 from tests.support.command_line import Command
 from warpchain import InputError, SweepResult, WalkResult
 from warpchain.inputs.validation import InputWarning
 from warpchain.store.merged_file import merge
 from warpchain.walks.rows import STORED_COLUMNS, fill_row, missing_rows, row_type
-
-command = command_line.command
 
 SWEEP: dict[str, Any] = {
     "links": 12,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from studies.common import save_figure
-from studies.films import calibration, drawing, hidden, reduce, run
+from studies.films import calibration, drawing, hidden, run
 from tests.support.made_films import films_of, made_bank
 from warpchain import films
 
@@ -32,17 +32,6 @@ def test_banks_are_joined_by_their_chains(banks: tuple[films.Bank, films.Bank]) 
     assert both.experiments == [(60, 5), (60, 20), (90, 5), (90, 20)]
     assert all(rows[at][0].center is rows[at + 2][0].center for rows in both.films for at in (0, 1))
     assert len(both.values) == len(both.films) == 50
-
-
-def test_a_reduced_bank_is_the_same(banks: tuple[films.Bank, films.Bank], tmp_path: Path) -> None:
-    """But for motions, which are kept in single precision."""
-    bank, _ = banks
-    reduce.save(bank, tmp_path / "bank.npz")
-    again = reduce.load(tmp_path / "bank.npz")
-    assert again.names == bank.names and (again.values == bank.values).all() and again.experiments == bank.experiments
-    film, same = bank.films[3][1][2], again.films[3][1][2]
-    assert same.center == pytest.approx(film.center, abs=1e-7) and same.outline == pytest.approx(film.outline, rel=1e-6)
-    assert same.speed == pytest.approx(film.speed, rel=1e-7) and (same.time == film.time).all()
 
 
 def test_calibration_tells_a_bank_that_knows_from_one_that_does_not(banks: tuple[films.Bank, films.Bank]) -> None:

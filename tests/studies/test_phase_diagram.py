@@ -130,7 +130,7 @@ def test_the_search_finds_the_exponent_of_a_made_law(exponent: float) -> None:
     assert laws.drift(points).count(f"{exponent:.2f}") == 2  # no drift: the slower and the faster half agree
     fitting = {-0.5: "spline of Δx/(nℓ) over v²/(g nℓ)", 0.0: "spline of Δx/(nℓ) over ν²ℓ/g"}.get(exponent)
     left = {law.name: np.log(points.distance) - law.fit(points)[1](points) for law in candidates.CANDIDATES[6:]}
-    rms = {name: candidates.root_mean_square(values) for name, values in left.items()}
+    rms = {name: laws.root_mean_square(values) for name, values in left.items()}
     assert all((value < 0.5) == (name == fitting) for name, value in rms.items()), rms
 
 
@@ -144,8 +144,8 @@ def test_a_sum_of_powers_is_found_and_predicts_what_it_has_not_seen() -> None:
     free, power = candidates.CANDIDATES[1], candidates.CANDIDATES[5]
     assert free.fit(points)[0] == pytest.approx((0.4, 1.9, 2.5), rel=1e-4)
     for block in candidates.BLOCKS:
-        assert candidates.root_mean_square(candidates.left_out(points, free, block)) < 1e-3
-        assert candidates.root_mean_square(candidates.left_out(points, power, block)) > 10
+        assert laws.root_mean_square(candidates.left_out(points, free, block)) < 1e-3
+        assert laws.root_mean_square(candidates.left_out(points, power, block)) > 10
         assert np.all(candidates.block_errors(points, free, block) < 1e-3)
 
 

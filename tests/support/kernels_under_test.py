@@ -12,6 +12,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from tests.support.blocks_under_test import common_laws
 from tests.support.unlike_links import UnlikeLinks
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import start_device
@@ -35,6 +36,7 @@ DEVICE = start_device("cpu").warp
 POISONED_JOINT = 2**30
 LEVEL = np.array([[-1.0, 0.0], [0.0, 0.0], [1.0, 0.0]])
 """Points of a level profile."""
+
 
 compiled = functools.partial(
     wp.kernel, module="unique", enable_backward=False, module_options={"cpu_compiler_flags": COMPILER_FLAGS}
@@ -160,14 +162,16 @@ class ContactPass:
         sprocket_speed: float = 0.0,
         push_rate: float = 0.0,
         profile: Array = LEVEL,
+        laws: Array | None = None,
     ) -> None:
         """Make room for chains and place them; the sprocket about the origin has their sprocket_radius."""
         self.links = [len(chain.position) for chain in chains]
         self.columns = layout.padded_width(max(self.links))
         self.skin, self.sprocket_speed, self.push_rate = skin, sprocket_speed, push_rate
         self.model = model_of([(len(chain.position), chain.parameters) for chain in chains])
-        sizes = chains[0].parameters.link_length, chains[0].parameters.circle_radius
-        for name, rows_of in (("faces", faces_of(profile)), ("cells", cells_of(profile, *sizes))):
+        sizes = chains[0].parameters.link_length, max(self.model.chains.numpy()["circle_radius"])
+        laws = common_laws(profile, chains[0].parameters) if laws is None else laws
+        for name, rows_of in (("faces", faces_of(profile, laws)), ("cells", cells_of(profile, *sizes))):
             same = np.repeat(rows_of[None], len(chains), axis=0)
             setattr(self.model, name, wp.array(same, dtype=wp.float64, device=DEVICE))
         worlds, rows, size = len(chains), layout.scratch_rows(0), list_layout(self.columns).size

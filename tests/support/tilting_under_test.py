@@ -46,17 +46,10 @@ def tilting_batch(
     stop_status: Status = Status.FINISHED,
     **kept: bool | int,
 ) -> Batch:
-    """A batch of chains of equal length, about to start.
+    """A batch of chains of equal length, about to start; `kept` is what it is to keep.
 
-    Args:
-        starts: of each chain.
-        parameters: of each chain.
-        options: for all.
-        stop_time: s.
-        longest_step: no step is longer, s; all are that long if the tolerance allows more. It needs contacts, among
-            links or with the floor, in the kernel's features. None: as the tolerance will have it.
-        stop_status: with which a run ends there; `FINISHED`: it doesn't end at rest before.
-        kept: what `Batch` is to keep.
+    No step is longer than `longest_step` [s]; all are that long if the tolerance allows more. It needs contacts, among
+    links or with the floor, in the kernel's features. A run that stops as `FINISHED` does not end at rest before.
     """
     links = len(starts[0][0])
     batch = Batch(len(starts), links, options, tilts=True, **kept)

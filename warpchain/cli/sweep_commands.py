@@ -153,15 +153,14 @@ def plot(
         else (picture.save(folder) for picture in figures(found, quantity or "dx"))
     )
     count = 0
-    for drawing in drawn:
+    for count, drawing in enumerate(drawn, 1):  # noqa: B007
         print(printable(str(drawing)))
-        count += 1
     if not count and is_walk:
         raise typer.Exit(FAILED)
     if not count:
         name = path if quantity is None else f"--quantity: {quantity}"
         raise InputError(
-            f"{name}: no walk at rest has a value, or no axis has several values; give another --quantity, as walk_time"
+            f"{name}: no walk at rest has a value, or no axis has several values; give another --quantity, or see info"
         )
 
 
@@ -222,10 +221,9 @@ def _executor(gpus: int | None, scheduler: str | None) -> Iterator[Any]:
     """Workers on GPUs, or the client of a Dask cluster; None if neither is asked for."""
     from warpchain.engine.devices import gpu_count
     from warpchain.inputs.validation import InputError
-    from warpchain.run.gpu_workers import gpu_workers, visible_gpus
+    from warpchain.run.gpu_workers import gpu_workers
 
     if gpus is not None:
-        visible_gpus(gpus)
         if gpus > (there := gpu_count()):
             raise InputError(f"--gpus: {gpus} wanted, but this machine has {there}; give at most {there}")
         with gpu_workers(gpus) as executor:

@@ -24,6 +24,7 @@ def constants_of(parameters: Parameters, own: LinkValues, sprocket_radius: float
         "half_length": half,
         "inverse_square": 1 / (half * half),
         "mass": own.total_mass,
+        "circle_radius": own.radius.max(),
         "inverse_smoothing": 1 / parameters.friction_smoothing,
     }
     if sprocket_radius is not None:
@@ -37,4 +38,4 @@ def constants_of(parameters: Parameters, own: LinkValues, sprocket_radius: float
 
 def rows_of(own: LinkValues) -> Sequence[NDArray[np.float64]]:
     """The rows of :attr:`Model.links`, in the order of :mod:`warpchain.kernels.layout`."""
-    return own.mass, own.inertia, own.viscous_friction, own.coulomb_friction
+    return tuple(vars(own).values())

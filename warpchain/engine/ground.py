@@ -12,8 +12,8 @@ ENDLESS = 1e9
 """How far the first and the last cell reach [m]."""
 
 
-def faces_of(points: Array) -> Array:
-    """The faces between points (p, 2) of a profile, (p − 1, FACE_VALUES)."""
+def faces_of(points: Array, laws: Array) -> Array:
+    """The faces between points (p, 2) of a profile, (p − 1, FACE_VALUES); laws: e and μ of each, (p − 1, 2)."""
     step = np.diff(points, axis=0)
     length = np.hypot(*step.T)
     along = step / length[:, None]
@@ -22,7 +22,7 @@ def faces_of(points: Array) -> Array:
     before[1:] = np.where((turn < 0)[:, None], along[:-1], 0.0)
     begin, end = np.zeros(len(along)), length
     begin[0], end[-1] = -np.inf, np.inf
-    return np.column_stack([points[:-1], along, before, begin, end])
+    return np.column_stack([points[:-1], along, before, begin, end, laws])
 
 
 def cells_of(points: Array, link_length: float, circle_radius: float) -> Array:

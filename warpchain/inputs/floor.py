@@ -1,6 +1,7 @@
 """The floor of a scene: flat, an endless slope, or a profile of heights given by points.
 
-Points are joined by straight lines; beyond the first and the last point these go on. Nothing hangs over.
+Points are joined by straight lines; beyond the first and the last point these go on. Nothing hangs over. A point may
+say what restitution and friction the line has that begins there.
 """
 
 import itertools
@@ -9,8 +10,9 @@ from typing import Annotated, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field, Strict
+from pydantic import AfterValidator, Discriminator, Field, Strict, Tag
 
+from warpchain.inputs.parameters import FRACTION, FRICTION
 from warpchain.inputs.validation import InputError
 
 Array = NDArray[np.float64]
@@ -25,11 +27,13 @@ EXACT: Final = 1e-11
 """Clearances are met to this [m]."""
 
 
-def _without_overhang(points: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+def _without_overhang(points: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
     """The points of a profile, if they make a floor."""
     if len(points) < 2:
         raise ValueError("a profile has 2 points at least; give more, such as [[0, 0], [1, 0], [1, -0.1], [2, -0.1]]")
-    for number, ((x, y), (next_x, next_y)) in enumerate(itertools.pairwise(points), start=1):
+    if len(points[-1]) > 2:
+        raise ValueError(f"point {len(points) - 1} begins no line that could have e and μ; give x and y")
+    for number, ((x, y, *_), (next_x, next_y, *_)) in enumerate(itertools.pairwise(points), start=1):
         if next_x < x:
             raise ValueError(f"point {number} lies behind the one before it; let x rise from point to point")
         if math.hypot(next_x - x, next_y - y) < SHORTEST:
@@ -42,14 +46,20 @@ def _without_overhang(points: tuple[tuple[float, float], ...]) -> tuple[tuple[fl
 
 
 _Coordinate = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
-_Point = Annotated[tuple[_Coordinate, _Coordinate], Strict(False)]
+_Restitution = Annotated[float, Field(**FRACTION)]
+_Friction = Annotated[float, Field(**FRICTION)]
+_Point = Annotated[
+    Annotated[tuple[_Coordinate, _Coordinate], Strict(False), Tag("(place)")]
+    | Annotated[tuple[_Coordinate, _Coordinate, _Restitution, _Friction], Strict(False), Tag("(law)")],
+    Discriminator(lambda given: "(law)" if isinstance(given, list | tuple) and len(given) > 2 else "(place)"),
+]
 Points = Annotated[
     tuple[_Point, ...],
     Strict(False),
     Field(max_length=MOST_POINTS),
     AfterValidator(_without_overhang),
 ]
-"""A profile: points x, y [m]."""
+"""A profile: points x, y [m], and e and μ of the line that begins there, if it has its own."""
 
 
 def slope_points(degrees: float) -> Array:
@@ -87,8 +97,7 @@ def circles_of(position: Array, link_length: float) -> Array:
 def check_above(points: Array | None, position: Array, link_length: float, path: str) -> None:
     """Check that the middle of no circle of links (n, 3) is below the floor, where it would never come out.
 
-    Raises:
-        InputError: one is; the message begins with `path`.
+    If one is, an `InputError` begins with `path`.
     """
     circles = circles_of(position, link_length)
     depth = -(circles[:, 1] if points is None else distances(points, circles))
@@ -99,11 +108,11 @@ def check_above(points: Array | None, position: Array, link_length: float, path:
         )
 
 
-def raised_by(points: Array, circles: Array, radius: float, clearance: float) -> float:
-    """How far circles about these places (p, 2) must be raised for the nearest to be so far from the floor [m]."""
-    wanted, (left, bottom), (right, _) = clearance + radius, circles.min(axis=0), circles.max(axis=0)
+def raised_by(points: Array, circles: Array, radius: Array, clearance: float) -> float:
+    """How far circles (p, 2) of these radii must be raised for the nearest to be so far from the floor [m]."""
+    wanted, (left, bottom), (right, _) = clearance + radius.max(), circles.min(axis=0), circles.max(axis=0)
     beside = points[(points[:, 0] >= left - wanted) & (points[:, 0] <= right + wanted), 1]
     high = max([*beside, *heights(points, np.array([left - wanted, right + wanted]))]) + wanted - bottom
-    while (excess := distances(points, circles + np.array([0.0, high])).min() - wanted) > EXACT:
+    while (excess := (distances(points, circles + np.array([0.0, high])) - (clearance + radius)).min()) > EXACT:
         high -= excess  # which brings nothing nearer to the floor than that
     return float(high)

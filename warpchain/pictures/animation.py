@@ -18,16 +18,17 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from warpchain.files import checked_output, replacing, write_whole
 from warpchain.pictures.chain import (
     SIDE,
+    circle_radii,
     draw_chain,
     draw_ground,
     floor_height,
     floor_line,
     sprocket_circle,
-    view_from,
     walk_box,
 )
 from warpchain.pictures.style import BLUE, FAINT, GROUND, INK, tidy
@@ -45,8 +46,8 @@ DPI: Final = 100
 INNER, OUTER, EDGE = "#9CCBE6", BLUE, "#00385A"
 """Colours of inner links, of outer links and of their edges."""
 
-_CORNER: Final = view_from(*np.radians((35.0, 22.0)))
-"""The view from the front right, slightly above."""
+_CORNER: Final = (-35.0, 22.0)
+"""View from the front right, slightly above: angles about the vertical, then about what points to the right."""
 _PADDING: Final = np.array([[50, 50], [50, 30]])
 """Pixels to the left and below, and to the right and above."""
 
@@ -168,7 +169,7 @@ def player(walk: "WalkResult", slow: float = 4.0) -> str:
         "time": _whole(times, 1e6),
         "joints": _whole(joints[frames, :, :2].reshape(count, -1)),
         "center": _whole(center),
-        "radius": walk.setup.parameters.circle_radius * 1e4,
+        "radii": _whole(circle_radii(walk)),
         "sprocket": None if sprocket is None else _whole(np.array([*sprocket, walk.sprocket_radius])),
         "view": _whole(box.ravel()),
         "marks": marks,
@@ -195,8 +196,13 @@ def floor_marks(low: float, high: float, most: int = 9) -> list[float]:
 
 
 def side_box(walk: "WalkResult", joints: Array) -> Array:
-    """Left and right, bottom and top of what is shown from the side [m], shape (2, 2), with some of the floor."""
+    """Left and right, bottom and top of what is shown from the side [m], shape (2, 2), with some of the floor.
+
+    It is at least as broad as high, so that titles and marks have room.
+    """
     low, high = walk_box(walk, joints)
+    broad = max(0.0, (high[1] - low[1]) - (high[0] - low[0])) / 2
+    low[0], high[0] = low[0] - broad, high[0] + broad
     return np.array([[low[0], low[1] - 0.045 * max(high[:2] - low[:2])], high[:2]]).T
 
 
@@ -214,9 +220,11 @@ class Film:
             ValueError: the walk has no frames or broken ones.
         """
         self._walk, self._joints, self._center = walk, checked_joints(walk), center_in_room(walk)
-        self._view = SIDE if walk.joints_in_room is None else _CORNER
+        self._radii = circle_radii(walk)
+        self._tilts = walk.joints_in_room is not None
+        self._view = Rotation.from_euler("yx", _CORNER, degrees=True).as_matrix() if self._tilts else SIDE
         low, high = walk_box(walk, self._joints)
-        if self._view is SIDE:
+        if not self._tilts:
             box = side_box(walk, self._joints)
         else:  # the floor at least as broad as the chain is high
             broad = max(0.0, high[1] - (high[2] - low[2])) / 2
@@ -231,7 +239,7 @@ class Film:
         self._canvas: Any = FigureCanvasAgg(self.figure)
         share = _PADDING / size
         self._axes = self.figure.add_axes((*share[0], *(1 - share.sum(axis=0))), xlim=box[0], ylim=box[1])
-        if self._view is SIDE:
+        if not self._tilts:
             draw_ground(self._axes, floor_line(walk, *box[0]), box[1, 0])
             self._axes.set(xlabel="$x$ / m", yticks=[], xticks=floor_marks(*box[0]))
             tidy(self._axes)
@@ -253,16 +261,16 @@ class Film:
         for artist in self._moving:
             artist.remove()
         walk, axes, joints = self._walk, self._axes, self._joints[frame]
-        parameters, moment = walk.setup.parameters, walk.frame_time[frame]
+        moment = walk.frame_time[frame]
         path = self._project(self._center[: max(1, int(np.searchsorted(walk.time, moment, side="right")))])
         clock: dict[str, Any] = {"ha": "right", "va": "top", "fontsize": 11, "color": INK}
         self._moving = [
-            draw_chain(axes, joints, parameters.circle_radius, self._view, (INNER, OUTER, EDGE), edge=0.45, halo=False),
+            draw_chain(axes, joints, self._radii, self._view, (INNER, OUTER, EDGE), edge=0.45, halo=False),
             *axes.plot(*path, color=INK, linewidth=0.8, zorder=4),
             *axes.plot(*path[:, -1:], "o", color=INK, markersize=5, zorder=4),
             self.figure.text(0.985, 0.975, f"{moment:.3f} s", **clock),
         ]
-        if self._view is not SIDE:
+        if self._tilts:
             shadow = self._project(np.concatenate([joints, joints[:1]]) * (1.0, 0.0, 1.0))
             self._moving += axes.plot(*shadow, color="#BDBDBD", linewidth=3.0, zorder=1.5)
 

@@ -13,7 +13,7 @@ from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
 from warpchain.inputs.floor import distances, heights
-from warpchain.inputs.scene import floor_points
+from warpchain.inputs.scene import floor_points, link_values
 from warpchain.pictures.style import GROUND, INK
 
 if TYPE_CHECKING:
@@ -26,24 +26,17 @@ ABOVE: Final = np.eye(3)[[0, 2, 1]]
 """Its upper axis is z, which such a viewer sees grow downwards: invert it."""
 
 
-def view_from(azimuth: float, elevation: float) -> Array:
-    """A view with the vertical upright in the picture.
-
-    Args:
-        azimuth: angle [rad] of the viewer about the vertical: 0 beside the chain, a right angle in front of it.
-        elevation: angle [rad] of the viewer above the floor.
-    """
-    sine, cosine, high, far = np.sin(azimuth), np.cos(azimuth), np.sin(elevation), np.cos(elevation)
-    right, toward = np.array([cosine, 0.0, -sine]), np.array([sine * far, high, cosine * far])
-    return np.stack([right, np.cross(toward, right), toward])
+def circle_radii(walk: "WalkResult") -> Array:
+    """Radius of the circles of each link [m], shape (n,)."""
+    return link_values(walk.setup.scene, walk.setup.parameters).radius
 
 
-def link_outlines(joints: Array, radius: float) -> Array:
+def link_outlines(joints: Array, radius: Array | float) -> Array:
     """Outlines of the links of one chain in a picture: two circles and a waist between them.
 
     Args:
         joints: joint positions [m], shape (n, 2); link i reaches from joint i − 1 to joint i.
-        radius: radius of the circles at the joints [m].
+        radius: of the circles of all links, or of each, shape (n,) [m].
 
     Returns:
         Corners of a polygon for each link [m], anticlockwise, shape (n, c, 2).
@@ -62,20 +55,20 @@ def link_outlines(joints: Array, radius: float) -> Array:
     outlines: Array = (
         middle[:, None]
         + corners[:, :1] * half[:, None]
-        + radius * (corners[:, 1:2] * along[:, None] + corners[:, 2:] * across[:, None])
+        + np.reshape(radius, (-1, 1, 1)) * (corners[:, 1:2] * along[:, None] + corners[:, 2:] * across[:, None])
     )
     return outlines
 
 
 def draw_chain(
-    axes: Axes, joints: Array, radius: float, view: Array, colors: Any, *, edge: float, halo: bool = True
+    axes: Axes, joints: Array, radius: Array, view: Array, colors: Any, *, edge: float, halo: bool = True
 ) -> PolyCollection:
     """Draw one chain, its rearmost link first; odd links, the outer ones, cover their neighbours.
 
     Args:
         axes: where to draw.
         joints: joints in the room [m], shape (n, 3).
-        radius: radius of the circles at the joints [m].
+        radius: of the circles of each link [m], shape (n,).
         view: where the viewer is.
         colors: of inner links, of outer links and of edges.
         edge: width of the edges [points].
@@ -107,8 +100,8 @@ def sprocket_circle(walk: "WalkResult") -> Array | None:
 
 def walk_box(walk: "WalkResult", joints: Array) -> tuple[Array, Array]:
     """Least and greatest x, y, z of a walk and its sprocket, with a margin; from the floor on [m], each shape (3,)."""
-    parameters = walk.setup.parameters
-    margin = parameters.circle_radius + 2 * max(parameters.circle_radius, parameters.half_width)
+    widest = circle_radii(walk).max()
+    margin = widest + 2 * max(widest, walk.setup.parameters.half_width)
     low, high = joints.min(axis=(0, 1)) - margin, joints.max(axis=(0, 1)) + margin
     circle = sprocket_circle(walk)
     if circle is not None:

@@ -165,7 +165,7 @@ def _loop(walk: "WalkResult", figure: Figure) -> None:
     inset = IN_LINKS * loop.parameters.link_length
     inside = (loop.s > loop.free[0] + inset) & (loop.s < loop.free[1] - inset)
     _draw_line(pull, "effective_tension", loop, inside)
-    carried = loop.parameters.density * loop.speed**2
+    carried = loop.density * loop.speed**2
     pull.set_title(f"$\\rho v^2$ = {carried:.2f} N", fontsize="small", loc="left")
     pull.set(xlim=(loop.free[0] - 0.03, loop.free[1] + 0.03), ylabel="tension $T - \\rho v^2$ / N")
     pull.set_xlabel("arc length $s$ from the lowest point, along the motion / m")

@@ -86,7 +86,7 @@ def figures(result: SweepResult, quantity: str = "dx") -> Iterator[Picture]:
             text = quantity_name(quantity_of(quantity))
             caption = f"{text[:1].upper()}{text[1:]} against {words}: means of the walks at rest."
             yield Picture(f"{'distance' if quantity == 'dx' else quantity}_{over}", caption, figure)
-    if quantity == "dx" and len([count for count in result.summary().values() if count]) > 1:
+    if quantity == "dx" and result.summary()[Status.AT_REST.label] < result.walk_count:
         yield status_counts(result)
 
 

@@ -12,16 +12,18 @@ import numpy as np
 from warpchain.engine.devices import gpu_turn
 from warpchain.engine.processors import processors
 from warpchain.inputs.options import on_gpu
-from warpchain.run.sweep_run import checked_part, on_device, prepare
+from warpchain.run.sweep_run import checked_part, kinds_of, on_device
 from warpchain.sweeps.plan import PlannedWalk, Sweep, load_sweep
 from warpchain.walks.rows import row_type
-from warpchain.walks.scheduler import run_setups
+from warpchain.walks.scheduler import compile_kernels, run_setups
 from warpchain.walks.walk_result import MOTION
 
 PILOTS: Final = 16
 """Walks that are tried on CPUs, two for each processor if there are more."""
 GPU_PILOTS: Final = 1024
 """On a GPU, where few walks take as long as many."""
+AXES: Final = {"series": "t", "frames": "f"}
+"""What may be kept of a motion → first axis of its arrays."""
 
 
 @dataclass(frozen=True)
@@ -49,51 +51,41 @@ def estimate_sweep(
     device: str | None = None,
     workers: int | None = None,
     part: str | None = None,
-    seed: int | None = None,
-    samples: int | None = None,
+    **replaced: int | None,
 ) -> Estimate:
     """Try walks that are evenly spread over a sweep; arguments and errors as of :func:`warpchain.sweep`."""
-    replaced = {name: value for name, value in (("seed", seed), ("samples", samples)) if value is not None}
-    planned = load_sweep(source, **replaced)
+    planned = load_sweep(source, **{name: value for name, value in replaced.items() if value is not None})
     planned = planned if device is None else on_device(planned, device)
-    indices = planned.indices
-    walks = -(-len(indices) // checked_part(part)[1])
-    uses_gpu = any(on_gpu(walk.setup.options.device) for walk in planned.undrawn(indices[:1].tolist()))
+    indices, kinds = planned.indices, kinds_of(planned)
+    uses_gpu = all(on_gpu(setup.options.device) for setup in kinds)
     at_once = 1 if uses_gpu else workers or processors()
     count = min(len(indices), GPU_PILOTS if uses_gpu else max(PILOTS, 2 * at_once))
     pilots = [planned.planned(int(indices[place])) for place in np.linspace(0, len(indices) - 1, count).astype(int)]
-    prepare(planned)
+    compile_kernels(kinds, count)
     with concurrent.futures.ThreadPoolExecutor(at_once) as threads:
-        shares = [pilots[number::at_once] for number in range(at_once)]
-        found = list(threads.map(lambda share: _tried(planned, share), shares))
-    seconds, series, frames = np.sum(found, axis=0) / count
-    kept = {name: _chosen(planned, name) for name in ("series", "frames")}
-    row = row_type([name for block in planned.blocks for name in block.drawn]).itemsize
-    size = row * len(indices) + series * kept["series"] + frames * kept["frames"]
+        found = list(threads.map(_tried, [planned] * at_once, [pilots[number::at_once] for number in range(at_once)]))
+    seconds, *motions = np.sum(found, axis=0) / count
+    size = len(indices) * row_type([name for block in planned.blocks for name in block.drawn]).itemsize
+    for name, taken in zip(AXES, motions, strict=True):
+        if (choice := planned.recording.choices.get(name)) is not None:
+            chosen = (
+                block.walk_count // block.samples * sum(map(choice.includes, range(block.samples)))
+                for block in planned.blocks
+            )
+            size += taken * sum(chosen)
+    walks = -(-len(indices) // checked_part(part)[1])
     return Estimate(walks, count, at_once, seconds * walks / at_once, size * walks / len(indices))
 
 
-def _tried(planned: Sweep, pilots: Sequence[PlannedWalk]) -> tuple[float, float, float]:
+def _tried(planned: Sweep, pilots: Sequence[PlannedWalk]) -> tuple[float, ...]:
     """Time [s] of some walks, and bytes of their series and of their frames, as if all of them were kept."""
     choices = planned.recording.choices.values()
     first = next((choice.samples[0] for choice in choices if choice.samples != "all"), 0)
-    keeps = [planned.keep(replace(walk, sample=first)) for walk in pilots]
-    sizes = {"t": 0, "f": 0}
-    setups = [walk.setup for walk in pilots]
-    began = time.perf_counter()
+    setups, keeps = [walk.setup for walk in pilots], [planned.keep(replace(walk, sample=first)) for walk in pilots]
+    sizes, began = dict.fromkeys(AXES.values(), 0.0), time.perf_counter()
     with gpu_turn(setup.options.device for setup in setups):
-        for number, run in run_setups(setups, keeps=keeps):
-            motion = run.recorder.motion() if keeps[number].series_every is not None else {}
+        for _, run in run_setups(setups, keeps=keeps):
+            motion = run.recorder.motion() if choices else {}
             for name, stored in MOTION.items() if motion else ():
                 sizes[stored.shape[0]] += motion[name].size * (4 if "n" in stored.shape else 8)
-    return time.perf_counter() - began, sizes["t"], sizes["f"]
-
-
-def _chosen(planned: Sweep, name: str) -> int:
-    """Number of walks of which something is kept."""
-    choice = planned.recording.choices.get(name)
-    if choice is None:
-        return 0
-    return sum(
-        block.walk_count // block.samples * sum(map(choice.includes, range(block.samples))) for block in planned.blocks
-    )
+    return time.perf_counter() - began, *sizes.values()

@@ -1,6 +1,7 @@
 """The motion of any given chain: what tests and analysts use."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
@@ -13,12 +14,11 @@ from warpchain.engine.tallies import LOST
 from warpchain.inputs.floor import check_above
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.scene import Scene, check_links_on_gpu, floor_body, floor_points, link_values
+from warpchain.inputs.scene import Scene, check_links_on_gpu, floor_body, floor_laws, floor_points, link_values
 from warpchain.inputs.sections import takes_fields
 from warpchain.inputs.state import State, checked_array
 from warpchain.inputs.validation import InputError, checked, plain, shown, validated
 from warpchain.status import Status
-from warpchain.walks.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
@@ -28,6 +28,39 @@ MOST_PLACES = 10_000_000
 """Most links × instants of a trajectory, which take 0.5 GB."""
 _UNSOFTENED = {"soften_pile": False, "soften_drive": False}
 """A given chain has no phases in which joints soften."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Trajectory:
+    """Motion of a chain of n links at t chosen instants, as `warpchain.simulate` returns it.
+
+    Attributes:
+        status: how the simulation ended.
+        time: instants [s], shape (t,).
+        position: x, y [m] and θ [rad] of each link's centre of mass, shape (t, n, 3).
+        velocity: their rates [m/s, m/s, rad/s], shape (t, n, 3).
+        steps_accepted: number of accepted steps.
+        steps_rejected: number of rejected steps.
+        impulses: number of impulses by kind of contact.
+        losses: energy lost by cause [J], positive.
+        greatest_opening: greatest distance between two joined link ends [m].
+        greatest_penetration: greatest overlap by kind of contact [m].
+    """
+
+    status: Status
+    time: Array
+    position: Array
+    velocity: Array
+    steps_accepted: int
+    steps_rejected: int
+    impulses: dict[str, int]
+    losses: dict[str, float]
+    greatest_opening: float
+    greatest_penetration: dict[str, float]
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"<Trajectory of {self.position.shape[1]} links, {len(self.time)} instants: {self.status.label}>"
 
 
 @takes_fields("options", without=("soften_pile", "soften_drive"))
@@ -56,8 +89,8 @@ def simulate(
         duration: Simulated time [s], from time 0, which is that of the state.
         times: Instants of the trajectory [s], rising, in [0, duration]; steps land on them exactly. Default: 101
             instants evenly spread.
-        floor: True (at y = 0), False (none) or points ``[[x, y], …]`` [m] like ``floor`` of a scene; None: that of the
-            state's scene, for arrays at y = 0.
+        floor: True (at y = 0), False (none) or points ``[x, y]`` [m] or ``[x, y, e, μ]`` like ``floor`` of a scene;
+            None: that of the state's scene, for arrays at y = 0.
         gravity: Whether gravity acts.
         self_contact: Whether links touch one another.
         method: A key of ``warpchain.inputs.methods.METHODS``, such as ``"dp5"``.
@@ -97,7 +130,7 @@ def simulate(
         check_above(points, state.position, chain.link_length, "position")
     with gpu_turn([options.device]):
         body = "none" if floor is False else floor_body(scene)
-        return _follow(options, state, chain, instants, end, body, points)
+        return _follow(options, state, chain, instants, end, body, points, floor_laws(scene, chain))
 
 
 def _checked_state(given: State | Parameters | str, position: Array | None, velocity: Array | None) -> State:
@@ -188,7 +221,7 @@ class Chains:
         numbers = self._numbers(chains)
         rates = checked_array(velocity, "velocity", len(numbers), self._links, 3)
         if numbers:
-            self._batch.set_velocities(numbers, rates)
+            self._batch.place(numbers, self.motions(numbers)[0], rates)
 
     def run(
         self,
@@ -225,13 +258,20 @@ class Chains:
 
 
 def _follow(
-    options: Options, state: State, chain: Parameters, instants: Array, end: float, body: str, points: Array | None
+    options: Options,
+    state: State,
+    chain: Parameters,
+    instants: Array,
+    end: float,
+    body: str,
+    points: Array | None,
+    laws: Array,
 ) -> Trajectory:
     """Integrate a chain whose values are checked, see `simulate`; ``chain``: the state's parameters, or weightless."""
     batch = Batch(1, state.links, options, faces=1 if points is None else len(points) - 1)
     batch.set_chain(0, chain, state.links, own=link_values(state.setup.scene, state.parameters))
     if points is not None:
-        batch.set_floor(0, points, chain)
+        batch.set_floor(0, points, laws)
     batch.load(0, state.position, state.velocity, stop_time=instants[0], stop_status=Status.FINISHED)
     features = batch.features(fixed_body=body)
     reached, positions, velocities = [], [], []

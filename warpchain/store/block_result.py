@@ -1,10 +1,8 @@
 """One block of a sweep as arrays with named axes."""
 
-import itertools
 import math
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -19,9 +17,9 @@ from warpchain.status import Status
 from warpchain.store.cell_statistics import CellStatistics
 from warpchain.sweeps.block import POINT
 from warpchain.sweeps.plan import Sweep
+from warpchain.walks.faults import LENGTHS
 from warpchain.walks.rows import (
     COLUMNS,
-    LENGTHS,
     MISSING,
     Column,
     drawn_column,
@@ -41,8 +39,6 @@ Array = NDArray[Any]
 
 _Variables = dict[str, tuple[tuple[str, ...], Array, dict[str, Any]]]
 """Name → axes, values and attributes, as xarray takes them."""
-Motion = tuple[Callable[[], "AbstractContextManager[h5py.File]"], str]
-"""What opens the file with a kept motion, and the group in there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +73,7 @@ class BlockResult:
         drawn: names of the quantities that samples draw; the values are in the columns NAME_drawn.
         columns: name → values.
         origin: what it was computed from.
-        motions: place of a walk in a flat column → where its kept motion is, file by file.
+        motions: of each walk what opens the file with its kept motion, and the group in there; None if there is none.
     """
 
     name: str
@@ -86,7 +82,7 @@ class BlockResult:
     drawn: tuple[str, ...]
     columns: dict[str, Array]
     origin: Origin
-    motions: Mapping[int, Motion]
+    motions: Array
 
     @property
     def dims(self) -> tuple[str, ...]:
@@ -139,21 +135,24 @@ class BlockResult:
 
     def filled_from(self, other: "BlockResult") -> "BlockResult":
         """The same block with the walks that only another result of it has."""
-        columns = {name: np.where(self.is_there, values, other.columns[name]) for name, values in self.columns.items()}
-        return replace(self, columns=columns, motions={**other.motions, **self.motions})
+        there = self.is_there
+        columns = {name: np.where(there, values, other.columns[name]) for name, values in self.columns.items()}
+        return replace(self, columns=columns, motions=np.where(there, self.motions, other.motions))
 
-    @cached_property
+    @property
     def kept(self) -> NDArray[np.bool_]:
         """Whether the motion of a walk was kept and is there, shape `shape`."""
-        return np.isin(np.arange(self.columns["index"].size), list(self.motions)).reshape(self.shape)
+        return np.asarray(self.motions != None)  # noqa: E711 - of each element
 
     def kept_motions(self, places: Iterable[int]) -> "Iterator[tuple[int, h5py.Group]]":
-        """Places in a flat column, of those given, and groups of kept motions, file by file; errors as of `series`."""
-        wanted = set(places)
-        here = ((*self.motions[place], place) for place in self.motions if place in wanted)
-        for opened, walks in itertools.groupby(here, lambda walk: walk[0]):
+        """Places in a flat column and groups of kept motions, file by file; errors as of `series`."""
+        files: dict[Any, list[tuple[int, str]]] = {}
+        for place in places:
+            opened, group = self.motions.flat[place]
+            files.setdefault(opened, []).append((place, group))
+        for opened, walks in files.items():
             with opened() as file:
-                yield from ((place, file[group]) for _, group, place in walks)
+                yield from ((place, file[group]) for place, group in walks)
 
     def series(self, *, sample: int = 0, **at: float | str | None) -> WalkResult:
         """One walk whose motion was kept: `series(links=60, frequency=15, sample=2).time`.

@@ -112,12 +112,7 @@ def _joined(results: Sequence[SweepResult]) -> SweepResult:
     origin, blocks = Origin(sweeps, provenance), {}
     for parts in zip(*(result.blocks.values() for result in results), strict=True):
         columns = {name: np.concatenate([part.columns[name] for part in parts], axis=-1) for name in parts[0].columns}
-        samples, first, motions = columns["index"].shape[-1], 0, {}
-        for part in parts:
-            for place, motion in part.motions.items():
-                cell, sample = divmod(place, part.shape[-1])
-                motions[cell * samples + first + sample] = motion
-            first += part.shape[-1]
+        motions = np.concatenate([part.motions for part in parts], axis=-1)
         blocks[parts[0].name] = replace(parts[0], columns=columns, origin=origin, motions=motions)
     return SweepResult(blocks=blocks, origin=origin)
 
@@ -153,7 +148,7 @@ def _fill(file: "h5py.File", whole: SweepResult) -> None:
             variables["seed"] = (("sample",), np.array(seeds, object), notes)
         for name, (dims, values, notes) in {**coordinates, **variables}.items():
             _put(group, name, values, notes, () if dims == (name,) else dims)
-        for place, motion in block.kept_motions(block.motions):
+        for place, motion in block.kept_motions(np.flatnonzero(block.kept)):
             group.copy(motion, group.require_group("motion"), str(place))
 
 

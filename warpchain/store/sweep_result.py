@@ -5,29 +5,28 @@ A folder can be read while its sweep runs: walks that are not there yet are miss
 
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.hdf5_files import reading_hdf5
 from warpchain.inputs.validation import InputError, shown, suggestion
-from warpchain.store.block_result import BlockResult, Motion, Origin, counted, located, status_counts
+from warpchain.store.block_result import BlockResult, Origin, counted, located, status_counts
 from warpchain.store.cell_statistics import CellStatistics
 from warpchain.store.folder import read_rows
 from warpchain.store.manifest import Folder, read_manifest, stored_sweep
-from warpchain.store.shards import opened_motions, stamp
-from warpchain.walks.rows import COLUMNS, KEYS, STORED_COLUMNS, derived_columns, drawn_column, missing_rows, quantity_of
+from warpchain.store.shards import stamp
+from warpchain.walks.rows import COLUMNS, STORED_COLUMNS, derived_columns, drawn_column, quantity_of
 from warpchain.walks.walk_result import WalkResult
 
 if TYPE_CHECKING:
     import pandas
     import xarray
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
 Array = NDArray[Any]
@@ -156,33 +155,28 @@ class SweepResult:
 
     def plot(
         self,
-        kind: Literal["lines", "map"] | None = None,
         quantity: str = "dx",
         x: str | None = None,
-        ax: "Axes | None" = None,
         figure: "Figure | SubFigure | None" = None,
     ) -> "Figure | SubFigure":
         """Draw the mean of a quantity over the grids of all blocks, with its standard error.
 
         Args:
-            kind: `lines` or `map`; None for lines, unless two axes have many values.
             quantity: a column of numbers, such as `dx`, `walk_time`, `bounces` or a drawn quantity.
             x: the axis along x, such as `frequency`; by default the frequency if it has three values or more, else the
                 longest axis of numbers.
-            ax: where to draw a figure of one panel.
             figure: an empty figure to draw into; by default a new one.
 
         Returns:
-            The figure, that of `ax` if it is given.
+            The figure.
 
         Raises:
             InputError: no block has such a column or axis, or there is nothing to show: no axis of several values, or
                 no walk that has the quantity.
-            ValueError: the kind is unknown, or `ax` is given together with `figure` or for several panels.
         """
         from warpchain.pictures.grid_figure import draw_grid
 
-        return draw_grid(self.cell_statistics(quantity), quantity_of(quantity), kind, x=x, ax=ax, figure=figure)
+        return draw_grid(self.cell_statistics(quantity), quantity_of(quantity), x=x, figure=figure)
 
     def to_xarray(self) -> "xarray.Dataset | xarray.DataTree":
         """The only block as a data set, or several as a tree with one child each."""
@@ -227,33 +221,23 @@ def load(path: Folder) -> SweepResult:
 
 
 def _load_folder(directory: Folder) -> SweepResult:
-    folder = Path(directory).absolute()
     while True:
         manifest, begun = read_manifest(directory), stamp(directory)
         try:
-            shards, rows = read_rows(directory, manifest)
+            rows, motions = read_rows(directory, manifest)
             break
         except (OSError, InputError):
             if stamp(directory) == begun:  # else a run has begun anew or added samples meanwhile
                 raise
-    sweep, series = manifest.sweep, manifest.sweep.recording.series
-    motions: list[dict[int, Motion]] = [{} for _ in sweep.blocks]
-    for shard in shards:
-        opened = partial(opened_motions, folder, shard)
-        for row, (number, cell, sample) in enumerate(shard.keys.tolist() if shard.keeps_motion else ()):
-            if series is not None and series.includes(sample):
-                motions[number][cell * sweep.blocks[number].samples + sample] = opened, str(row)
+    blocks = manifest.sweep.blocks
 
     def column(number: int, name: str) -> Array:
-        block, here = sweep.blocks[number], rows[rows["block"] == number]
-        if name == "index":
-            return block.indices
-        values = missing_rows(rows.dtype, np.empty(1, KEYS))[name].repeat(block.walk_count)
-        values[here["cell"].astype(np.int64) * block.samples + here["sample"]] = here[name]
-        return values.reshape(block.shape)
+        values = blocks[number].indices if name == "index" else rows[number][name]
+        return np.ascontiguousarray(values).reshape(blocks[number].shape)
 
-    provenance = {name: getattr(manifest, name) for name in ("digest", "numerics_version", "versions")}
-    return _result(Origin((sweep,), provenance), column, motions)
+    provenance = {"digest": manifest.sweep.digest(), "numerics_version": manifest.numerics_version}
+    origin = Origin((manifest.sweep,), provenance | {"versions": manifest.versions})
+    return _result(origin, column, lambda number: motions[number].reshape(blocks[number].shape))
 
 
 def _load_merged(path: Folder) -> SweepResult:
@@ -263,18 +247,20 @@ def _load_merged(path: Folder) -> SweepResult:
         sweeps = tuple(stored_sweep(path, each) for each in (given if isinstance(given, list) else [given]))
         provenance = {"digest": file.attrs["digest"], "numerics_version": int(file.attrs["numerics_version"])}
         origin = Origin(sweeps, provenance | {"versions": json.loads(file.attrs["versions"])})
-        groups = [block.name if len(sweeps[0].blocks) > 1 else "/" for block in sweeps[0].blocks]
-        motions: list[dict[int, Motion]] = [
-            {int(place): (opened, f"{group}/motion/{place}") for place in file[group].get("motion", ())}
-            for group in groups
-        ]
-        return _result(origin, lambda number, name: file[groups[number]][name][()], motions)
+        groups = [file[block.name] if len(sweeps[0].blocks) > 1 else file for block in sweeps[0].blocks]
+
+        def motions(number: int) -> Array:
+            group = groups[number]
+            found = np.full(group["index"].shape, None)
+            for place in group.get("motion", ()):
+                found.flat[int(place)] = opened, f"{group.name}/motion/{place}"
+            return found
+
+        return _result(origin, lambda number, name: groups[number][name][()], motions)
 
 
-def _result(
-    origin: Origin, column: Callable[[int, str], Array], motions: Sequence[Mapping[int, Motion]]
-) -> SweepResult:
-    """A result, given what returns a stored column of a block by its number, and the motions of each block."""
+def _result(origin: Origin, column: Callable[[int, str], Array], motions: Callable[[int], Array]) -> SweepResult:
+    """A result, given what returns a stored column of a block by its number, and the motions of a block."""
     blocks = {}
     for number, block in enumerate(origin.sweeps[0].blocks):
         drawn = [*map(drawn_column, block.drawn)]
@@ -287,6 +273,6 @@ def _result(
             drawn=block.drawn,
             columns={name: columns[name] for name in (*COLUMNS, *drawn)},
             origin=origin,
-            motions=motions[number],
+            motions=motions(number),
         )
     return SweepResult(blocks=blocks, origin=origin)

@@ -17,8 +17,6 @@ from warpchain.kernels.physics.elementary import HALF, order_bits
 from warpchain.kernels.physics.geometry import whole_lanes
 from warpchain.kernels.types import Chain, Integers, Rows
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.func
 def greatest_displacement(K: Rows, chain: Chain):

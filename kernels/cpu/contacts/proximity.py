@@ -9,33 +9,17 @@ import functools
 
 import warp as wp
 
-from warpchain.kernels.contacts.fixed_body import BODIES, Touching, link_and_body
+from warpchain.kernels import layout
+from warpchain.kernels.contacts.fixed_body import BODIES, link_and_body
+from warpchain.kernels.contacts.impulse import Touching
 from warpchain.kernels.contacts.terrain import Face
-from warpchain.kernels.layout import (
-    COSINE,
-    ERROR,
-    INVERSE_INERTIA,
-    INVERSE_MASS,
-    LEFT_X,
-    LEFT_Y,
-    LOST_FIXED,
-    OMEGA,
-    RIGHT_X,
-    RIGHT_Y,
-    SINE,
-    U,
-    V,
-    X,
-    Y,
-)
+from warpchain.kernels.layout import LEFT_X, LEFT_Y, LOST_FIXED, OMEGA, RADIUS, RIGHT_X, RIGHT_Y, SINE, U, V, X, Y
 from warpchain.kernels.physics.elementary import ONE, TWO, ZERO, from_order_key, order_bits, order_key
 from warpchain.kernels.physics.geometry import LANES, whole_lanes
-from warpchain.kernels.types import Chain, Ground, Rows
-
-wp.set_module_options({"enable_backward": False})
+from warpchain.kernels.types import Chain, Ground, Rows, with_circles
 
 FURTHEST = wp.constant(wp.int64(2**63 - 1))
-GAP = ERROR
+GAP = layout.ERROR
 """Row of the links' gaps to the fixed body [m]. Between attempts nothing else uses it."""
 
 
@@ -84,10 +68,12 @@ def placed_link(K: Rows, i: int) -> Touching:
     link.right_y = K[RIGHT_Y, i]
     link.x = K[X, i]
     link.y = K[Y, i]
-    link.cosine = K[COSINE, i]
+    link.cosine = K[layout.COSINE, i]
     link.sine = K[SINE, i]
-    link.inverse_mass = K[INVERSE_MASS, i]
-    link.inverse_inertia = K[INVERSE_INERTIA, i]
+    link.mass = K[layout.MASS, i]
+    link.inertia = K[layout.INERTIA, i]
+    link.inverse_mass = K[layout.INVERSE_MASS, i]
+    link.inverse_inertia = K[layout.INVERSE_INERTIA, i]
     link.u = K[U, i]
     link.v = K[V, i]
     link.omega = K[OMEGA, i]
@@ -125,7 +111,7 @@ def fixed_contacts(fixed_body: str):
         least = FURTHEST
         i = int(0)
         while i < whole_lanes(chain.link_count):
-            gap = gap_of(chain, ground, face, placed_link(K, i))
+            gap = gap_of(with_circles(chain, K[RADIUS, i]), ground, face, placed_link(K, i))
             K[GAP, i] = wp.where(i < chain.link_count, gap, ONE)
             least = wp.min(least, wp.where(i < chain.link_count, order_key(gap), FURTHEST))
             i += 1
@@ -144,7 +130,7 @@ def fixed_contacts(fixed_body: str):
                     if wp.static(in_cells):
                         if K[GAP, i] >= ZERO:
                             continue
-                    link = meet(chain, ground, face, placed_link(K, i))
+                    link = meet(with_circles(chain, K[RADIUS, i]), ground, face, placed_link(K, i))
                     K[U, i] = link.u
                     K[V, i] = link.v
                     K[OMEGA, i] = link.omega

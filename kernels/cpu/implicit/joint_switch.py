@@ -21,8 +21,6 @@ from warpchain.kernels.layout import X
 from warpchain.kernels.physics.elementary import ONE, TWO, ZERO
 from warpchain.kernels.types import Chain, Rows
 
-wp.set_module_options({"enable_backward": False})
-
 QUIET_TIME = wp.constant(wp.float64(5e-5))
 """A chain may close its joints after no impulse for this long [s].
 
@@ -40,10 +38,6 @@ def joint_switch(columns: int, first_row: int):
         ``open_joints(K, chain)``, right after a step of the flight and its impulses → the energy lost [J], negative.
     """
     rigid = rigid_joints(columns)
-    load, store, solve_joints, displace = rigid.load, rigid.store, rigid.solve_joints, rigid.displace
-    openings, stretching = rigid.openings, rigid.stretching
-    close, begin = rigid.close, rigid.begin
-    kinetic_energy, are_stiff = rigid.kinetic_energy, rigid.are_stiff
     flight_rows, force_rows, _ = flight_memory(columns, first_row)
     right = force_layout(columns).right
 
@@ -53,21 +47,21 @@ def joint_switch(columns: int, first_row: int):
         R = force_rows(K)
         places, full, _ = segment_places(chain.link_count)
         end = place_column(places + 1)
-        load(S, K, chain)
-        openings(S, chain, places, full)
-        held = stretching(S, chain, places)
-        kinetic = kinetic_energy(S, end)
+        rigid.load(S, K, chain)
+        rigid.openings(S, chain, places, full)
+        held = rigid.stretching(S, chain, places)
+        kinetic = rigid.kinetic_energy(S, end)
         closed = bool(False)
         ringing = ZERO
         if held <= GREATEST_STRETCHING * kinetic:
-            closed = close(S, R, chain, places, full)
-            ringing = kinetic - kinetic_energy(S, end)
+            closed = rigid.close(S, R, chain, places, full)
+            ringing = kinetic - rigid.kinetic_energy(S, end)
             closed = closed and wp.abs(ringing) <= GREATEST_RINGING * kinetic
         if closed:
-            begin(S, R, chain, places, full)
-            closed = are_stiff(S, chain, end)
+            rigid.begin(S, R, chain, places, full)
+            closed = rigid.are_stiff(S, chain, end)
         if closed:
-            store(S, K, chain)
+            rigid.store(S, K, chain)
         return closed, held + ringing
 
     @wp.func
@@ -79,10 +73,10 @@ def joint_switch(columns: int, first_row: int):
         end = place_column(places + 1)
         # where all links lie on one line S is singular, and neither F nor the openings are bounded: there the joints
         # stay closed, and the springs find their forces by themselves
-        if not are_stiff(S, chain, end):
+        if not rigid.are_stiff(S, chain, end):
             return ZERO
-        openings(S, chain, places, full)
-        before = stretching(S, chain, places)
+        rigid.openings(S, chain, places, full)
+        before = rigid.stretching(S, chain, places)
         give = ONE / chain.joint_stiffness
         c = int(8)
         while c < end:
@@ -92,11 +86,11 @@ def joint_switch(columns: int, first_row: int):
             S[wp.static(right), c] = wp.where(repeats, ZERO, cx)
             S[wp.static(right + 1), c] = wp.where(repeats, ZERO, cy)
             c += 1
-        solve_joints(S, R, places, full)
-        displace(S, chain, places)
-        openings(S, chain, places, full)
-        after = stretching(S, chain, places)
-        if after > TWO * GREATEST_STRETCHING * kinetic_energy(S, end):
+        rigid.solve_joints(S, R, places, full)
+        rigid.displace(S, chain, places)
+        rigid.openings(S, chain, places, full)
+        after = rigid.stretching(S, chain, places)
+        if after > TWO * GREATEST_STRETCHING * rigid.kinetic_energy(S, end):
             return ZERO
         p = int(0)
         while p < places:

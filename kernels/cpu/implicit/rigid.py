@@ -21,42 +21,21 @@ from typing import Any
 import warp as wp
 
 from warpchain.kernels import layout
-from warpchain.kernels.cpu.implicit.rigid_layout import (
-    BASE,
-    BASE_RATE,
-    COSINE,
-    COULOMB,
-    COUNTED,
-    FORCE,
-    FREE,
-    INERTIA,
-    INVERSE_INERTIA,
-    INVERSE_MASS,
-    INVERSE_SMOOTHING,
-    MASS,
-    RATE,
-    ROWS_OF_RIGID,
-    SINE,
-    SPIN,
-    TORQUE,
-    VISCOUS,
-    force_layout,
-    pad_behind,
-    pad_joints,
-)
+from warpchain.kernels.cpu.implicit import rigid_layout as at
+from warpchain.kernels.cpu.implicit.rigid_layout import BASE, COSINE, FREE, INVERSE_INERTIA, INVERSE_MASS, SINE, SPIN
 from warpchain.kernels.cpu.implicit.solver import LANES, cyclic_solver, link_at, place_column, row_at, segment_places
 from warpchain.kernels.layout import STAGES, X
 from warpchain.kernels.physics.elementary import HALF, ONE, ZERO, cos_sin, order_bits
+from warpchain.kernels.physics.geometry import Link
 from warpchain.kernels.physics.joint import friction_torque
-from warpchain.kernels.physics.rigid_joint import inward_pull, opening_rate_of, pushed, turning_share
+from warpchain.kernels.physics.load import link_load
+from warpchain.kernels.physics.rigid_joint import inward_pull, turning_share
 from warpchain.kernels.types import Chain, Rows
-
-wp.set_module_options({"enable_backward": False})
 
 CLOSED = wp.constant(wp.float64(1e-11))
 """Opening [m] below which a joint counts as closed; a spring of 1e9 N/m has 1e-2 N there."""
 MOST_CORRECTIONS = 5
-LINK_CONSTANTS = (MASS, INERTIA, INVERSE_MASS, INVERSE_INERTIA, VISCOUS, COULOMB)
+LINK_CONSTANTS = (at.MASS, at.INERTIA, INVERSE_MASS, INVERSE_INERTIA, at.VISCOUS, at.COULOMB)
 CONSTANTS_OF_LINK = tuple(range(layout.MASS, layout.MASS + len(LINK_CONSTANTS)))
 """Rows of :mod:`layout` that hold the same."""
 GREATEST_RINGING = wp.constant(wp.float64(1e-5))
@@ -77,51 +56,36 @@ links of a loop lie on one line, S is singular, and unbounded forces would be ha
 
 @dataclass(frozen=True)
 class RigidJoints:
-    """Warp functions on the rows S of :mod:`cpu.implicit.rigid_layout` and the separators' rows R.
+    """Warp functions on the rows S of :mod:`cpu.implicit.rigid_layout` and the separators' rows R."""
 
-    Attributes:
-        load: Copies the state and the links' constants from the scratch.
-        store: Copies the state to the scratch, and accelerations to where the step loop checks them.
-        factorise: Assembles and factorises the matrix S for the present directions.
-        solve_joints: Solves with the last factors; the solution replaces the right-hand side.
-        solve_forces: Joint forces and accelerations for the directions, spins and smoothing of a stage.
-        displace: Moves the links by the last solution.
-        openings: Sets directions and spins of the state and the right-hand side C; returns the greatest |C| [m].
-        stretching: Energy [J] of springs that are open by the right-hand side.
-        close: Projects the state on C = 0 (to rounding) and Ċ = 0; returns False if the joints could not be closed.
-        begin: Joint forces and accelerations of a state that ``close`` has left, with the chain's own smoothing.
-        kinetic_energy: Of the state [J].
-        are_stiff: Whether springs would hold so little energy with these forces that they count as rigid.
-    """
-
-    load: Any
-    store: Any
-    factorise: Any
-    solve_joints: Any
-    solve_forces: Any
-    displace: Any
-    openings: Any
-    stretching: Any
-    close: Any
-    begin: Any
-    kinetic_energy: Any
-    are_stiff: Any
+    load: Any  # copies the state and the links' constants from the scratch
+    store: Any  # copies the state to the scratch, and accelerations to where the step loop checks them
+    factorise: Any  # assembles and factorises the matrix S for the present directions
+    solve_joints: Any  # solves with the last factors; the solution replaces the right-hand side
+    solve_forces: Any  # joint forces and accelerations for the directions, spins and smoothing of a stage
+    displace: Any  # moves the links by the last solution
+    openings: Any  # sets directions and spins of the state and the right-hand side C; returns the greatest |C| [m]
+    stretching: Any  # energy [J] of springs that are open by the right-hand side
+    close: Any  # projects the state on C = 0 (to rounding) and Ċ = 0; returns False if the joints could not be closed
+    begin: Any  # joint forces and accelerations of a state that ``close`` has left, with the chain's own smoothing
+    kinetic_energy: Any  # of the state [J]
+    are_stiff: Any  # whether springs would hold so little energy with these forces that they count as rigid
 
 
 @functools.cache
 def rigid_joints(columns: int) -> RigidJoints:
     """The functions of rigid joints for scratch of this width."""
-    system = force_layout(columns)
+    system = at.force_layout(columns)
     factor, solve = cyclic_solver(system)
     lower, diagonal, upper = (system.submatrix(k) for k in range(3))
     right, width, separator_rows = system.right, system.columns, system.separator_rows
-    pad_constants = pad_behind((INVERSE_MASS, INVERSE_INERTIA))
-    pad_directions = pad_behind((COSINE, SINE, SPIN))
-    pad_free = pad_behind((FREE,))
-    pad_places = pad_behind((BASE, BASE + 1))
-    pad_rates = pad_behind((BASE + 3, BASE + 4, BASE + 5))
-    pad_torques = pad_joints((TORQUE,))
-    pad_solution = pad_joints((right, right + 1))
+    pad_constants = at.pad_behind((INVERSE_MASS, INVERSE_INERTIA))
+    pad_directions = at.pad_behind((COSINE, SINE, SPIN))
+    pad_free = at.pad_behind((FREE,))
+    pad_places = at.pad_behind((BASE, BASE + 1))
+    pad_rates = at.pad_behind((BASE + 3, BASE + 4, BASE + 5))
+    pad_torques = at.pad_joints((at.TORQUE,))
+    pad_solution = at.pad_joints((right, right + 1))
 
     @wp.func
     def load(S: Rows, K: Rows, chain: Chain):
@@ -138,7 +102,7 @@ def rigid_joints(columns: int) -> RigidJoints:
                 for k in range(wp.static(len(LINK_CONSTANTS))):
                     S[wp.static(LINK_CONSTANTS[k]), c] = K[wp.static(CONSTANTS_OF_LINK[k]), i]
                 repeats = (p == 0 and s >= full) or row_at(p, s, places, full) >= n
-                S[COUNTED, c] = wp.where(repeats, ZERO, ONE)
+                S[at.COUNTED, c] = wp.where(repeats, ZERO, ONE)
                 s += 1
             p += 1
         pad_constants(S, places, full)
@@ -156,7 +120,7 @@ def rigid_joints(columns: int) -> RigidJoints:
                 for k in range(6):
                     K[wp.static(X + k), i] = S[wp.static(BASE + k), c]
                 for k in range(3):
-                    K[wp.static(STAGES + k), i] = S[wp.static(BASE_RATE + k), c]
+                    K[wp.static(STAGES + k), i] = S[wp.static(at.BASE_RATE + k), c]
                 s += 1
             p += 1
 
@@ -198,19 +162,14 @@ def rigid_joints(columns: int) -> RigidJoints:
 
     @wp.func
     def pushed_at(S: Rows, a: wp.float64, c: int):
-        """Change of the link of a column by the last solution, forces or impulses of the joints."""
-        ax, ay, turn = pushed(
-            a,
-            S[INVERSE_MASS, c],
-            S[INVERSE_INERTIA, c],
-            S[COSINE, c],
-            S[SINE, c],
-            S[wp.static(right), c - 8],
-            S[wp.static(right + 1), c - 8],
-            S[wp.static(right), c],
-            S[wp.static(right + 1), c],
-        )
-        return ax, ay, turn
+        """M⁻¹ Gᵀ P of a link: how the last solution P (forces, impulses or displacements) changes x, y and θ."""
+        left_x = S[wp.static(right), c - 8]
+        left_y = S[wp.static(right + 1), c - 8]
+        right_x = S[wp.static(right), c]
+        right_y = S[wp.static(right + 1), c]
+        lever = a * (S[COSINE, c] * (right_y + left_y) - S[SINE, c] * (right_x + left_x))
+        inverse_mass = S[INVERSE_MASS, c]
+        return (right_x - left_x) * inverse_mass, (right_y - left_y) * inverse_mass, lever * S[INVERSE_INERTIA, c]
 
     @wp.func
     def solve_forces(S: Rows, R: Rows, chain: Chain, places: int, full: int):
@@ -219,12 +178,12 @@ def rigid_joints(columns: int) -> RigidJoints:
         c = int(8)
         while c < end:
             spin = S[SPIN, c] - S[SPIN, c + 8]
-            S[TORQUE, c] = friction_torque(S[VISCOUS, c], S[COULOMB, c], spin, S[INVERSE_SMOOTHING, c])
+            S[at.TORQUE, c] = friction_torque(S[at.VISCOUS, c], S[at.COULOMB, c], spin, S[at.INVERSE_SMOOTHING, c])
             c += 1
         pad_torques(S, places, full)
         c = int(8)
         while c < end:
-            S[FREE, c] = (S[TORQUE, c - 8] - S[TORQUE, c]) * S[INVERSE_INERTIA, c]
+            S[FREE, c] = (S[at.TORQUE, c - 8] - S[at.TORQUE, c]) * S[INVERSE_INERTIA, c]
             c += 1
         pad_free(S, places, full)
         c = int(8)
@@ -239,9 +198,10 @@ def rigid_joints(columns: int) -> RigidJoints:
         c = int(8)
         while c < end:
             ax, ay, turn = pushed_at(S, a, c)
-            S[RATE, c] = ax
-            S[wp.static(RATE + 1), c] = ay - chain.gravity
-            S[wp.static(RATE + 2), c] = S[FREE, c] + turn
+            load_x, load_y, load_turn = link_load(chain, c, Link(), S[INVERSE_MASS, c], S[INVERSE_INERTIA, c])
+            S[at.RATE, c] = ax + load_x
+            S[wp.static(at.RATE + 1), c] = ay + load_y
+            S[wp.static(at.RATE + 2), c] = S[FREE, c] + (turn + load_turn)
             c += 1
 
     def pusher(row: int):
@@ -297,19 +257,10 @@ def rigid_joints(columns: int) -> RigidJoints:
         c = int(8)
         while c < end:
             repeats = c < 16 and c >= 8 + full
-            cu, cv = opening_rate_of(
-                a,
-                S[wp.static(BASE + 3), c],
-                S[wp.static(BASE + 4), c],
-                S[SPIN, c],
-                S[COSINE, c],
-                S[SINE, c],
-                S[wp.static(BASE + 3), c + 8],
-                S[wp.static(BASE + 4), c + 8],
-                S[SPIN, c + 8],
-                S[COSINE, c + 8],
-                S[SINE, c + 8],
-            )
+            turn_x = S[SPIN, c] * S[SINE, c] + S[SPIN, c + 8] * S[SINE, c + 8]
+            turn_y = S[SPIN, c] * S[COSINE, c] + S[SPIN, c + 8] * S[COSINE, c + 8]
+            cu = S[wp.static(BASE + 3), c + 8] - S[wp.static(BASE + 3), c] + a * turn_x
+            cv = S[wp.static(BASE + 4), c + 8] - S[wp.static(BASE + 4), c] - a * turn_y
             S[wp.static(right), c] = wp.where(repeats, ZERO, cu)
             S[wp.static(right + 1), c] = wp.where(repeats, ZERO, cv)
             c += 1
@@ -321,14 +272,14 @@ def rigid_joints(columns: int) -> RigidJoints:
         while c < place_column(places + 1):
             cx = S[wp.static(right), c]
             cy = S[wp.static(right + 1), c]
-            total += S[COUNTED, c] * (cx * cx + cy * cy)
+            total += S[at.COUNTED, c] * (cx * cx + cy * cy)
             c += 1
         return HALF * chain.joint_stiffness * total
 
     @wp.func
     def close(rows: Rows, separators: Rows, chain: Chain, places: int, full: int):
         # clang does not inline this function: its loops vectorise only if static shapes are given here again
-        S = wp.array(ptr=rows.ptr, shape=(wp.static(ROWS_OF_RIGID), wp.static(width)), dtype=wp.float64)
+        S = wp.array(ptr=rows.ptr, shape=(wp.static(at.ROWS_OF_RIGID), wp.static(width)), dtype=wp.float64)
         R = wp.array(ptr=separators.ptr, shape=(wp.static(separator_rows), LANES), dtype=wp.float64)
         corrections = int(0)
         widest = openings(S, chain, places, full)
@@ -355,15 +306,15 @@ def rigid_joints(columns: int) -> RigidJoints:
         end = place_column(places + 1)
         c = int(8)
         while c < end:
-            S[INVERSE_SMOOTHING, c] = chain.inverse_smoothing
+            S[at.INVERSE_SMOOTHING, c] = chain.inverse_smoothing
             c += 1
         solve_forces(S, R, chain, places, full)
         c = int(8)
         while c < end:
-            S[FORCE, c] = S[wp.static(right), c]
-            S[wp.static(FORCE + 1), c] = S[wp.static(right + 1), c]
+            S[at.FORCE, c] = S[wp.static(right), c]
+            S[wp.static(at.FORCE + 1), c] = S[wp.static(right + 1), c]
             for k in range(3):
-                S[wp.static(BASE_RATE + k), c] = S[wp.static(RATE + k), c]
+                S[wp.static(at.BASE_RATE + k), c] = S[wp.static(at.RATE + k), c]
             c += 1
 
     @wp.func
@@ -374,7 +325,7 @@ def rigid_joints(columns: int) -> RigidJoints:
             u = S[wp.static(BASE + 3), c]
             v = S[wp.static(BASE + 4), c]
             w = S[wp.static(BASE + 5), c]
-            total += S[COUNTED, c] * (S[MASS, c] * (u * u + v * v) + S[INERTIA, c] * w * w)
+            total += S[at.COUNTED, c] * (S[at.MASS, c] * (u * u + v * v) + S[at.INERTIA, c] * w * w)
             c += 1
         return HALF * total
 
@@ -383,9 +334,9 @@ def rigid_joints(columns: int) -> RigidJoints:
         square = ZERO
         c = int(8)
         while c < end:
-            fx = S[FORCE, c]
-            fy = S[wp.static(FORCE + 1), c]
-            square += S[COUNTED, c] * (fx * fx + fy * fy)
+            fx = S[at.FORCE, c]
+            fy = S[wp.static(at.FORCE + 1), c]
+            square += S[at.COUNTED, c] * (fx * fx + fy * fy)
             c += 1
         held = HALF * square / chain.joint_stiffness
         return held <= GREATEST_STRETCHING * kinetic_energy(S, end)

@@ -22,36 +22,9 @@ import functools
 
 import warp as wp
 
+from warpchain.kernels.cpu.implicit import rigid_layout as at
 from warpchain.kernels.cpu.implicit.rigid import rigid_joints
-from warpchain.kernels.cpu.implicit.rigid_layout import (
-    BASE,
-    BASE_RATE,
-    COSINE,
-    COULOMB,
-    COUNTED,
-    COUPLED,
-    DRAG,
-    FIRST_STAGE_ROW,
-    FLIGHT_SYSTEM,
-    INERTIA,
-    INVERSE_MASS,
-    INVERSE_SMOOTHING,
-    NEW,
-    POWER,
-    RATE,
-    SINE,
-    SLOPE,
-    SPIN,
-    STAGE_U,
-    STAGE_V,
-    TARGET,
-    TORQUE,
-    VISCOUS,
-    force_layout,
-    friction_layout,
-    pad_behind,
-    pad_joints,
-)
+from warpchain.kernels.cpu.implicit.rigid_layout import BASE, COSINE, COUPLED, POWER, RATE, SINE, SLOPE, SPIN, TARGET
 from warpchain.kernels.cpu.implicit.solver import (
     LANES,
     cyclic_solver,
@@ -67,8 +40,6 @@ from warpchain.kernels.physics.elementary import ONE, TWO, ZERO, cos_sin, order_
 from warpchain.kernels.physics.rigid_joint import steepness, switch_smoothing
 from warpchain.kernels.types import Chain, Rows
 
-wp.set_module_options({"enable_backward": False})
-
 GREATEST_TURN = wp.constant(wp.float64(1.0))
 """Greatest turn of a link [rad] in one step: beyond it the error estimate, made from four places, is no estimate."""
 
@@ -80,8 +51,8 @@ def flight_memory(columns: int, first_row: int):
     Returns:
         (the rows in segment order, the separators' rows of S, the separators' rows of the stages' system).
     """
-    forces, friction = force_layout(columns), friction_layout(columns)
-    count, width = FLIGHT_SYSTEM + 48, forces.columns
+    forces, friction = at.force_layout(columns), at.friction_layout(columns)
+    count, width = at.FLIGHT_SYSTEM + 48, forces.columns
     offset = 8 * first_row * columns
     force_offset = offset + 8 * count * width
     friction_offset = force_offset + 8 * LANES * forces.separator_rows
@@ -103,20 +74,18 @@ def flight_method(columns: int, first_row: int):
     table = ROS34PW2
     stages, gamma = table.stages, table.gamma
     nodes, couplings, weights, errors = table.nodes, table.couplings, table.weights, table.errors
-    friction = friction_layout(columns)
+    friction = at.friction_layout(columns)
     rigid = rigid_joints(columns)
-    factorise, solve_forces = rigid.factorise, rigid.solve_forces
-    close, begin, store, are_stiff = rigid.close, rigid.begin, rigid.store, rigid.are_stiff
     flight_rows_of, force_rows_of, friction_rows_of = flight_memory(columns, first_row)
     factor, solve = cyclic_solver(friction)
     lower, diagonal, upper = (friction.submatrix(k) for k in range(3))
     right = friction.right
-    pad_stage = pad_behind((COSINE, SINE, SPIN))
-    pad_target = pad_behind((TARGET,))
-    pad_slopes = pad_joints((SLOPE,))
-    pad_drag = pad_joints((DRAG,))
-    pad_solution = pad_joints((right, right + 1))
-    first = FIRST_STAGE_ROW
+    pad_stage = at.pad_behind((COSINE, SINE, SPIN))
+    pad_target = at.pad_behind((TARGET,))
+    pad_slopes = at.pad_joints((SLOPE,))
+    pad_drag = at.pad_joints((at.DRAG,))
+    pad_solution = at.pad_joints((right, right + 1))
+    first = at.FIRST_STAGE_ROW
 
     @wp.func
     def prepare(S: Rows, chain: Chain, h: wp.float64, places: int, full: int):
@@ -130,15 +99,15 @@ def flight_method(columns: int, first_row: int):
             S[COSINE, c] = cosine
             S[SINE, c] = sine
             S[SPIN, c] = S[wp.static(BASE + 5), c]
-            S[TARGET, c] = S[wp.static(BASE_RATE + 2), c]
+            S[TARGET, c] = S[wp.static(at.BASE_RATE + 2), c]
             c += 1
         pad_stage(S, places, full)
         pad_target(S, places, full)
         c = int(8)
         while c < end:
             inverse = switch_smoothing(chain, h, S[TARGET, c] - S[TARGET, c + 8])
-            S[INVERSE_SMOOTHING, c] = inverse
-            S[SLOPE, c] = g * steepness(S[VISCOUS, c], S[COULOMB, c], S[SPIN, c] - S[SPIN, c + 8], inverse)
+            S[at.INVERSE_SMOOTHING, c] = inverse
+            S[SLOPE, c] = g * steepness(S[at.VISCOUS, c], S[at.COULOMB, c], S[SPIN, c] - S[SPIN, c + 8], inverse)
             S[POWER, c] = ZERO
             c += 1
         pad_slopes(S, places, full)
@@ -147,8 +116,8 @@ def flight_method(columns: int, first_row: int):
             repeats = c < 16 and c >= 8 + full
             tx = -a * S[SINE, c]
             ty = a * S[COSINE, c]
-            m_left = S[INVERSE_MASS, c]
-            m_right = S[INVERSE_MASS, c + 8]
+            m_left = S[at.INVERSE_MASS, c]
+            m_right = S[at.INVERSE_MASS, c + 8]
             before = S[SLOPE, c - 8]
             here = S[SLOPE, c]
             S[wp.static(diagonal), c] = wp.where(repeats, ONE, m_left + m_right)
@@ -159,7 +128,7 @@ def flight_method(columns: int, first_row: int):
             S[wp.static(diagonal + 5), c] = wp.where(repeats, ZERO, ty)
             S[wp.static(diagonal + 6), c] = wp.where(repeats, ZERO, -tx)
             S[wp.static(diagonal + 7), c] = wp.where(repeats, ZERO, -ty)
-            S[wp.static(diagonal + 8), c] = wp.where(repeats, ONE, S[INERTIA, c] + here + before)
+            S[wp.static(diagonal + 8), c] = wp.where(repeats, ONE, S[at.INERTIA, c] + here + before)
             S[wp.static(lower), c] = wp.where(repeats, -ONE, -m_left)
             S[wp.static(lower + 1), c] = ZERO
             S[wp.static(lower + 2), c] = ZERO
@@ -206,8 +175,8 @@ def flight_method(columns: int, first_row: int):
                         cv += wp.static(wp.float64(couplings[i][j])) * kv
                         cw += wp.static(wp.float64(couplings[i][j])) * kw
                     S[TARGET, c] = S[wp.static(BASE + 2), c] + turn
-                    S[STAGE_U, c] = u
-                    S[STAGE_V, c] = v
+                    S[at.STAGE_U, c] = u
+                    S[at.STAGE_V, c] = v
                     S[SPIN, c] = w
                     S[COUPLED, c] = cu
                     S[wp.static(COUPLED + 1), c] = cv
@@ -232,8 +201,8 @@ def flight_method(columns: int, first_row: int):
         pad_target(S, places, full)
         c = int(8)
         while c < end:
-            S[DRAG, c] = S[SLOPE, c] * (S[TARGET, c] - S[TARGET, c + 8])
-            S[POWER, c] = S[POWER, c] + weight * S[TORQUE, c] * (S[SPIN, c] - S[SPIN, c + 8])
+            S[at.DRAG, c] = S[SLOPE, c] * (S[TARGET, c] - S[TARGET, c + 8])
+            S[POWER, c] = S[POWER, c] + weight * S[at.TORQUE, c] * (S[SPIN, c] - S[SPIN, c + 8])
             c += 1
         pad_drag(S, places, full)
         c = int(8)
@@ -241,7 +210,7 @@ def flight_method(columns: int, first_row: int):
             repeats = c < 16 and c >= 8 + full
             S[wp.static(right), c] = ZERO
             S[wp.static(right + 1), c] = ZERO
-            S[wp.static(right + 2), c] = wp.where(repeats, ZERO, S[DRAG, c - 8] - S[DRAG, c])
+            S[wp.static(right + 2), c] = wp.where(repeats, ZERO, S[at.DRAG, c - 8] - S[at.DRAG, c])
             c += 1
         solve(S, R, places)
         pad_solution(S, places, full)
@@ -253,7 +222,7 @@ def flight_method(columns: int, first_row: int):
             if stage == i:
                 c = int(8)
                 while c < end:
-                    share = S[INVERSE_MASS, c]
+                    share = S[at.INVERSE_MASS, c]
                     ku = h * S[RATE, c] + share * (S[wp.static(right), c] - S[wp.static(right), c - 8])
                     kv = h * S[wp.static(RATE + 1), c] + share * (
                         S[wp.static(right + 1), c] - S[wp.static(right + 1), c - 8]
@@ -262,8 +231,8 @@ def flight_method(columns: int, first_row: int):
                     S[wp.static(first + 6 * i + 3), c] = ku
                     S[wp.static(first + 6 * i + 4), c] = kv
                     S[wp.static(first + 6 * i + 5), c] = kw
-                    ku = S[STAGE_U, c] + S[COUPLED, c] + wp.static(wp.float64(gamma)) * ku
-                    kv = S[STAGE_V, c] + S[wp.static(COUPLED + 1), c] + wp.static(wp.float64(gamma)) * kv
+                    ku = S[at.STAGE_U, c] + S[COUPLED, c] + wp.static(wp.float64(gamma)) * ku
+                    kv = S[at.STAGE_V, c] + S[wp.static(COUPLED + 1), c] + wp.static(wp.float64(gamma)) * kv
                     kw = S[SPIN, c] + S[wp.static(COUPLED + 2), c] + wp.static(wp.float64(gamma)) * kw
                     S[wp.static(first + 6 * i), c] = h * ku
                     S[wp.static(first + 6 * i + 1), c] = h * kv
@@ -282,8 +251,8 @@ def flight_method(columns: int, first_row: int):
         stage = int(0)
         while stage < wp.static(stages):
             place_stage(S, stage, end)
-            factorise(S, R, chain, places, full)
-            solve_forces(S, R, chain, places, full)
+            rigid.factorise(S, R, chain, places, full)
+            rigid.solve_forces(S, R, chain, places, full)
             weight = ZERO
             for i in range(wp.static(stages)):
                 if stage == i:
@@ -302,12 +271,12 @@ def flight_method(columns: int, first_row: int):
                 for j in range(wp.static(stages)):
                     change += wp.static(wp.float64(weights[j])) * S[wp.static(first + 6 * j + k), c]
                     error += wp.static(wp.float64(errors[j])) * S[wp.static(first + 6 * j + k), c]
-                S[wp.static(NEW + k), c] = value + change
+                S[wp.static(at.NEW + k), c] = value + change
                 rate = ZERO
                 if wp.static(k < 3):
                     rate = S[wp.static(BASE + 3 + k), c]
                 else:
-                    rate = S[wp.static(BASE_RATE + k - 3), c]
+                    rate = S[wp.static(at.BASE_RATE + k - 3), c]
                 worst = wp.max(worst, error_bits(error, value, rate, h))
                 if wp.static(k == 2):
                     turned = wp.max(turned, order_bits(change))
@@ -328,8 +297,8 @@ def flight_method(columns: int, first_row: int):
         c = int(8)
         while c < end:
             for k in range(6):
-                S[wp.static(BASE + k), c] = S[wp.static(NEW + k), c]
-            S[POWER, c] = h * S[COUNTED, c] * S[POWER, c]
+                S[wp.static(BASE + k), c] = S[wp.static(at.NEW + k), c]
+            S[POWER, c] = h * S[at.COUNTED, c] * S[POWER, c]
             c += 1
         p = int(0)
         while p < places:
@@ -339,9 +308,9 @@ def flight_method(columns: int, first_row: int):
                 K[LOST_FRICTION, i] = K[LOST_FRICTION, i] + S[POWER, 8 * p + 8 + s]
                 s += 1
             p += 1
-        closed = close(S, R, chain, places, full)
-        begin(S, R, chain, places, full)
-        store(S, K, chain)
-        return closed and are_stiff(S, chain, end)
+        closed = rigid.close(S, R, chain, places, full)
+        rigid.begin(S, R, chain, places, full)
+        rigid.store(S, K, chain)
+        return closed and rigid.are_stiff(S, chain, end)
 
     return attempt, commit

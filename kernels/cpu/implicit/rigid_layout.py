@@ -12,8 +12,6 @@ from warpchain.kernels.cpu.implicit.solver import LANES, SegmentLayout, segment_
 from warpchain.kernels.methods.w_tableaus import ROS34PW2
 from warpchain.kernels.types import Rows
 
-wp.set_module_options({"enable_backward": False})
-
 # Rows in segment order. The state; constants of the links and joints.
 BASE = 0
 INVERSE_MASS, INVERSE_INERTIA, MASS, INERTIA, VISCOUS, COULOMB, COUNTED = range(6, 13)

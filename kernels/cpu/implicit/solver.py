@@ -19,8 +19,6 @@ import warp as wp
 
 from warpchain.kernels.types import Rows
 
-wp.set_module_options({"enable_backward": False})
-
 LANES = 8
 """Segments of a loop: doubles in the widest vectors of a CPU."""
 ROUNDS = 3
@@ -35,18 +33,12 @@ class SegmentLayout:
     after the last hold copies of neighbours. A loop of n rows has P = ⌈n / 8⌉ places a segment. If n is no multiple of
     eight, the last segments are *short*: their place 0 repeats the separator of the segment before, and their own rows
     begin at place 1. A B × B submatrix takes B² memory rows, one after the other.
-
-    Attributes:
-        size: Order B of the submatrices.
-        columns: Static width of a memory row, see :func:`segment_columns`.
-        matrix: First memory row of the matrix: submatrices L, D, U, then two that elimination adds.
-        right: First of B memory rows of the right-hand side, which the solution replaces.
     """
 
-    size: int
-    columns: int
-    matrix: int
-    right: int
+    size: int  # order B of the submatrices
+    columns: int  # static width of a memory row, see :func:`segment_columns`
+    matrix: int  # first memory row of the matrix: submatrices L, D, U, then two that elimination adds
+    right: int  # first of B memory rows of the right-hand side, which the solution replaces
 
     def submatrix(self, index: int) -> int:
         """First memory row of one of the five submatrices, see ``matrix``."""

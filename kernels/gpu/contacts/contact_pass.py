@@ -11,14 +11,12 @@ from warpchain.kernels.events.tallies import add_count, count_bounce
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.board import publish, raise_value
 from warpchain.kernels.gpu.contacts.neighbour_list import block_list
-from warpchain.kernels.gpu.contacts.proximity import block_proximity, moving_sprocket_contact, upper_bound
+from warpchain.kernels.gpu.contacts.proximity import block_contact, block_proximity, upper_bound
 from warpchain.kernels.gpu.contacts.self_contacts import TouchLayout, block_self_contacts
 from warpchain.kernels.gpu.stage import Place, Proximity, constants
 from warpchain.kernels.gpu.threads import barrier_if_any
 from warpchain.kernels.gpu.upright import BlockPlane
 from warpchain.kernels.types import Control, Drive, Ground, Integers, Row, Rows, State
-
-wp.set_module_options({"enable_backward": False})
 
 HALF = wp.constant(wp.float32(0.5))
 
@@ -42,8 +40,7 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
     _, _, time_to_contact = block_proximity(features, block_dim)
     build_list = block_list(features.columns, block_dim)
     clear_contacts, find_contacts, resolve_contacts = block_self_contacts(features.columns, block_dim, touch)
-    meet_sprocket = moving_sprocket_contact()
-    begin_run, meet_fixed = plane.begin_run, plane.meet
+    meet_sprocket = block_contact("moving sprocket")
     values = layout.BOARD_VALUES
 
     @wp.func
@@ -70,7 +67,7 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
                 pairs = build_list(K, L, constants(K), place.lane, control.skin, upper_bound(proximity.opening))
                 if pairs > wp.static(lists.capacity):
                     status = int(LIST_OVERFLOW)
-            begin_run(K, P, M, place)
+            plane.begin_run(K, P, M, place)
             slack = HALF * wp.float32(control.skin) - proximity.opening
             reach = time_to_contact(control, pairs, proximity.gap, slack, proximity.speed)
         return pairs, reach, status
@@ -107,13 +104,16 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
         if wp.static(has_fixed):
             if gap < wp.float32(0.0):
                 is_near = bool(True)
-                hits = meet_fixed(K, P, M, place, ground, drive, world, time)
+                hits = plane.meet(K, P, M, place, ground, drive, world, time)
                 if hits > 0:
                     wp.atomic_add(T, wp.static(touch.fixed_hits), hits)
         if wp.static(moves):
             is_near = bool(True)
             if lane < place.links:
-                hits += meet_sprocket(K, place, ground, drive, state, world, time)
+                struck = meet_sprocket(K, place, ground, drive, world, time)
+                hits += struck
+                if struck > 0:
+                    wp.atomic_add(state.counts, world, wp.static(layout.SPROCKET_IMPULSES), wp.int64(struck))
         if wp.static(has_self):
             is_stale = not slack > wp.float32(0.0)
             if is_stale or pairs > 0:

@@ -13,8 +13,6 @@ from warpchain.kernels.gpu.threads import barrier
 from warpchain.kernels.layout import BOARD_LISTED_X, BOARD_LISTED_Y, RIGHT_X, RIGHT_Y
 from warpchain.kernels.types import Chain, Integers, Rows
 
-wp.set_module_options({"enable_backward": False})
-
 
 @functools.cache
 def block_list(columns: int, block_dim: int):

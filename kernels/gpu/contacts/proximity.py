@@ -5,18 +5,18 @@ import functools
 import warp as wp
 
 from warpchain.kernels import layout
-from warpchain.kernels.contacts.fixed_body import BODIES, Touching, link_and_body
+from warpchain.kernels.contacts.fixed_body import BODIES, link_and_body
+from warpchain.kernels.contacts.impulse import Touching
 from warpchain.kernels.contacts.tilting_floor import greatest_across_speed, middle_height, steepness
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.board import ends_of
-from warpchain.kernels.gpu.stage import Link, Place, Proximity, constants, felt_plane, read_link, vec5d
+from warpchain.kernels.gpu.stage import Place, Proximity, constants, felt_plane, read_link, vec5d
 from warpchain.kernels.gpu.threads import block_maxima, vec4i
-from warpchain.kernels.layout import COSINE, INVERSE_INERTIA, INVERSE_MASS, OMEGA, SINE, U, V
+from warpchain.kernels.layout import COSINE, INVERSE_INERTIA, INVERSE_MASS, OMEGA, RADIUS, SINE, U, V
 from warpchain.kernels.methods.controller import quick_quotient, quick_root
 from warpchain.kernels.physics.elementary import TWO, from_order_key_single, order_bits_single, order_key_single
-from warpchain.kernels.types import Chain, Control, Drive, Ground, Rows, State
-
-wp.set_module_options({"enable_backward": False})
+from warpchain.kernels.physics.geometry import Link
+from warpchain.kernels.types import Chain, Control, Drive, Ground, Rows, with_circles
 
 OPENING_MARGIN = wp.constant(wp.float64(1.0 + 1e-6))
 
@@ -46,6 +46,20 @@ def placed_link(chain: Chain, own: Link) -> Touching:
     return link
 
 
+@wp.func
+def touching_link(K: Rows, chain: Chain, place: Place) -> Touching:
+    """A thread's link, from the board, as a fixed body meets it."""
+    link = placed_link(chain, read_link(K, place.lane))
+    link.cosine = K[COSINE, place.lane]
+    link.sine = K[SINE, place.lane]
+    link.mass = K[layout.MASS, place.column]
+    link.inertia = K[layout.INERTIA, place.column]
+    link.inverse_mass = K[INVERSE_MASS, place.column]
+    link.inverse_inertia = K[INVERSE_INERTIA, place.column]
+    link.lost = K[layout.BOARD_LOST_FIXED, place.lane]
+    return link
+
+
 @functools.cache
 def block_proximity(features: Features, block_dim: int):
     """Warp functions (write_proximity, read_proximity, time_to_contact) for these features."""
@@ -69,7 +83,7 @@ def block_proximity(features: Features, block_dim: int):
             cy = next_end[1] - right_y
             values[0] = order_bits_single(wp.float32(cx * cx + cy * cy))
             if wp.static(tilts):
-                felt = felt_plane(K, constants(K), wp.static(layout.VALUE_PLANE))
+                felt = with_circles(felt_plane(K, constants(K), wp.static(layout.VALUE_PLANE)), K[RADIUS, place.lane])
             if wp.static(has_floor and tilts):
                 slope = steepness(felt)
                 lowest = wp.min(
@@ -78,7 +92,7 @@ def block_proximity(features: Features, block_dim: int):
                 gap = lowest - felt.half_width * wp.abs(felt.up_z)
                 values[1] = order_key_single(wp.float32(-gap))
             elif wp.static(has_fixed):
-                own = constants(K)
+                own = with_circles(constants(K), K[RADIUS, place.lane])
                 gap = gap_of(own, ground, face_of(ground), placed_link(own, link))
                 values[1] = order_key_single(wp.float32(-gap))
             if wp.static(has_self):
@@ -128,14 +142,9 @@ def block_contact(fixed_body: str):
 
     @wp.func
     def meet_body(K: Rows, place: Place, ground: Ground, drive: Drive, world: int, time: wp.float64):
-        chain = constants(K)
-        link = placed_link(chain, read_link(K, place.lane))
-        link.cosine = K[COSINE, place.lane]
-        link.sine = K[SINE, place.lane]
-        link.inverse_mass = K[INVERSE_MASS, place.column]
-        link.inverse_inertia = K[INVERSE_INERTIA, place.column]
-        link.lost = K[layout.BOARD_LOST_FIXED, place.lane]
-        link = meet(chain, ground, face_at(face_of(ground), drive, world, time), link)
+        chain = with_circles(constants(K), K[RADIUS, place.lane])
+        face = face_at(face_of(ground), drive, world, time)
+        link = meet(chain, ground, face, touching_link(K, chain, place))
         K[U, place.lane] = link.u
         K[V, place.lane] = link.v
         K[OMEGA, place.lane] = link.omega
@@ -143,18 +152,3 @@ def block_contact(fixed_body: str):
         return int(link.hits)
 
     return meet_body
-
-
-@functools.cache
-def moving_sprocket_contact():
-    """Warp function: as that of `block_contact` for the moving sprocket; it counts the impulses itself."""
-    meet_sprocket = block_contact("moving sprocket")
-
-    @wp.func
-    def meet_and_count(K: Rows, place: Place, ground: Ground, drive: Drive, state: State, world: int, time: wp.float64):
-        hits = meet_sprocket(K, place, ground, drive, world, time)
-        if hits > 0:
-            wp.atomic_add(state.counts, world, wp.static(layout.SPROCKET_IMPULSES), wp.int64(hits))
-        return hits
-
-    return meet_and_count

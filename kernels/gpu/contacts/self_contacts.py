@@ -23,8 +23,6 @@ from warpchain.kernels.layout import BOARD_LOST_SELF, RIGHT_X, RIGHT_Y, consecut
 from warpchain.kernels.physics.elementary import TWO, ZERO
 from warpchain.kernels.types import Chain, Integers, Rows
 
-wp.set_module_options({"enable_backward": False})
-
 JOINT_BITS = 11
 """Bits of a joint's number in a key: chains have fewer than 2048 links."""
 
@@ -34,37 +32,21 @@ DONE = wp.constant(-1)
 
 @dataclass(frozen=True)
 class TouchLayout:
-    """Where the integers of the contact pass lie: offsets into one row of int32.
+    """Where the integers of the contact pass lie: offsets into one row of int32."""
 
-    Attributes:
-        width: Columns of the owners, at least the number of links.
-        shared_pairs: How many touching pairs of joints lie at ``pairs``; further ones lie in the list's row.
-        owners: Three arrays of ``width`` keys, one per link; rounds use them in turn.
-        pairs: See ``shared_pairs``.
-        touching: Number of touching pairs of joints.
-        votes: See :func:`gpu.threads.barrier_if_any`.
-        fixed_hits: Impulses with floor or sprocket in this launch.
-        self_hits: Impulses between links in this launch.
-        strand_hits: Those between strands of the loop.
-        mailbox: A status from one thread to all.
-        deepest: Greatest depth of a contact in this launch [m], bits of a single-precision number.
-        is_late: 1 when the launch has lasted long enough.
-        size: Integers from the row's start to the end of the last.
-    """
-
-    width: int
-    shared_pairs: int
-    owners: int
-    pairs: int
-    touching: int
-    votes: int
-    fixed_hits: int
-    self_hits: int
-    strand_hits: int
-    mailbox: int
-    deepest: int
-    is_late: int
-    size: int
+    width: int  # columns of the owners, at least the number of links
+    shared_pairs: int  # how many touching pairs of joints lie at ``pairs``; further ones lie in the list's row
+    owners: int  # three arrays of ``width`` keys, one per link; rounds use them in turn
+    pairs: int  # see ``shared_pairs``
+    touching: int  # number of touching pairs of joints
+    votes: int  # see :func:`gpu.threads.barrier_if_any`
+    fixed_hits: int  # impulses with floor or sprocket in this launch
+    self_hits: int  # impulses between links in this launch
+    strand_hits: int  # those between strands of the loop
+    mailbox: int  # A status from one thread to all
+    deepest: int  # greatest depth of a contact in this launch [m], bits of a single-precision number
+    is_late: int  # 1 when the launch has lasted long enough
+    size: int  # integers from the row's start to the end of the last
 
 
 @functools.cache

@@ -65,10 +65,8 @@ def _watch(
 class Watched:
     """A loop that is sampled every STEP, and the world that watches it.
 
-    Attributes:
-        duration: Of all samples [s].
-        drive: Fields of the world's drive that are not the usual ones.
-        loads: Factor of the loads after each sample.
+    `drive` has fields of the world's drive that are not the usual ones, `loads` the factor of the loads after each
+    sample.
     """
 
     duration: float = 4.0
@@ -122,13 +120,9 @@ def first_sample(moment: float) -> float:
 
 
 def end_of_watch(start: float, window: float, wanted: float, since: float | None = None) -> float:
-    """When the first window ends that is not before a time wanted.
+    """When the first window ends that is not before a time wanted, for which the shape must be kept.
 
-    Args:
-        start: Of the first window.
-        window: Length of each.
-        wanted: The time for which the shape must be kept.
-        since: From when on it is counted; None: from the end of the first window.
+    The time is counted from `since`, or from the end of the first window.
     """
     length = first_sample(window)
     if since is None:
