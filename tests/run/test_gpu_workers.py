@@ -57,10 +57,13 @@ def test_an_exception_ends_what_workers_are_doing(monkeypatch: pytest.MonkeyPatc
 @pytest.mark.skipif(wp.get_cuda_device_count() > 0, reason="there is a GPU")
 @pytest.mark.parametrize("given", (["--device", "cuda"], ["--gpus", "1"], ["--gpus", "99999"]))
 def test_a_missing_gpu_leaves_no_folder(given: list[str], monkeypatch: pytest.MonkeyPatch, command: Command) -> None:
-    """One line says that there is no GPU, before the folder is made."""
+    """One line names the option and says that there is no GPU, before the folder is made."""
     monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
     answer = command("sweep", "figure6", "-o", "sweep", *given)
-    assert answer.err == "error: options.device: there is no cuda on this machine; give one of cpu\n"
+    problem = "--gpus: no GPU is found on this machine; leave it out to run on the CPU"
+    if given[0] == "--device":
+        problem = "options.device: there is no cuda on this machine; give one of cpu"
+    assert answer.err == f"error: {problem}\n"
     assert answer.status == 2 and not Path("sweep").exists()
 
 

@@ -160,10 +160,11 @@ def test_a_changed_sweep_is_refused(tmp_path: Path) -> None:
 def test_other_numerics_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Walks of another version of the numerics are not gone on with, but still read."""
     run(tmp_path)
+    (tmp_path / "lock").unlink()  # as of a copied folder
     monkeypatch.setattr(folder, "NUMERICS_VERSION", 99)
     with refused(InputError, tmp_path, f"numerics {NUMERICS_VERSION}, but this warpchain has 99", "start anew"):
         open_folder(tmp_path)
-    assert load(tmp_path).missing_count == 0
+    assert load(tmp_path).missing_count == 0 and not (tmp_path / "lock").exists()
 
 
 @pytest.mark.parametrize("fresh", [False, True])
@@ -173,7 +174,7 @@ def test_files_of_others_are_not_touched(tmp_path: Path, name: str, fresh: bool)
     (tmp_path / name).write_text("mine: true")
     with refused(InputError, tmp_path, str(tmp_path / name), "give"):
         open_folder(tmp_path, fresh=fresh)
-    assert (tmp_path / name).read_text() == "mine: true"
+    assert (tmp_path / name).read_text() == "mine: true" and os.listdir(tmp_path) == [name]
 
 
 def test_a_shard_of_another_sweep_is_refused(tmp_path: Path) -> None:

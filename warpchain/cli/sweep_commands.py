@@ -224,7 +224,13 @@ def _executor(gpus: int | None, scheduler: str | None) -> Iterator[Any]:
     from warpchain.run.gpu_workers import gpu_workers
 
     if gpus is not None:
-        if gpus > (there := gpu_count()):
+        try:
+            there = gpu_count()
+        except InputError as error:
+            if not str(error).startswith("options.device"):
+                raise
+            raise InputError("--gpus: no GPU is found on this machine; leave it out to run on the CPU") from None
+        if gpus > there:
             raise InputError(f"--gpus: {gpus} wanted, but this machine has {there}; give at most {there}")
         with gpu_workers(gpus) as executor:
             yield executor

@@ -94,7 +94,7 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         Raises:
             OSError: the folder cannot be made, locked, read or written.
             InputError: another process holds the folder, it belongs to another sweep or to something else, or a
-                shard is foreign. Nothing has been deleted.
+                shard is foreign. Nothing has been deleted, and nothing new is left.
 
         Warns:
             InputWarning: a shard was damaged; its walks are missing now.
@@ -102,13 +102,16 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         path = given_path(directory)
         make_folder(path)
         _refuse_strangers(path)
+        is_new = not (path / "lock").exists()
         lock = _locked(path)
         try:
             manifest = _prepared(path, sweep, Manifest.of(sweep, shard_size, part), fresh)
             folder = cls(path, manifest, lock, np.zeros(len(manifest.keys), bool))
             folder._check()
             folder._describe()
-        except BaseException:
+        except BaseException as error:
+            if is_new and isinstance(error, InputError):
+                (path / "lock").unlink(missing_ok=True)
             _unlock(lock)
             raise
         return folder
@@ -343,6 +346,8 @@ def _locked(folder: Path) -> int:
                         f"{folder}: in use by {holder or 'another process'}; wait for it to end, or give another folder"
                     ) from None
                 time.sleep(LOCK_PAUSE)
+        if os.fstat(descriptor).st_nlink == 0:  # by a process that was refused the folder
+            raise InputError(f"{path}: was deleted at this moment; try again")
         os.ftruncate(descriptor, 0)
         os.pwrite(descriptor, f"process {os.getpid()} on {socket.gethostname()}\n".encode(), 0)
     except BaseException:
