@@ -1,15 +1,19 @@
 """Figures of walks."""
 
 import math
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib.collections import PolyCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.patches import Circle
 
 from tests.support.made_tilting_walks import make_tilting_walk
-from tests.support.made_walks import make_unreleased, make_walk
+from tests.support.made_walks import made_setup, make_unreleased, make_walk
+from warpchain.inputs.sprocket_motion import sprocket_places
+from warpchain.pictures.animation import Film
 from warpchain.pictures.chain import link_outlines
 from warpchain.pictures.film_strip import film_strip
 from warpchain.pictures.walk_shape import kinds_of
@@ -139,3 +143,61 @@ def test_film_strip_shows_two_sides_of_a_plane_that_tilts() -> None:
             np.testing.assert_allclose(corners.max(axis=0), drawn.max(axis=0) + RADIUS, atol=0.1 * RADIUS)
     assert above.yaxis_inverted() and not side.xaxis_inverted()
     np.testing.assert_allclose([scales(axes) for axes in (side, above)], scales(side)[0], rtol=1e-6)
+
+
+def test_times_in_a_film_strip_do_not_touch() -> None:
+    """Instants at which the chain is in the same place have their times above one another."""
+    walk = make_walk()
+    waits = walk.frame_joints.copy()
+    waits[10:] = waits[10]
+    for texts in (film_strip(walk), film_strip(make_walk(frame_joints=waits))):
+        texts.draw_without_rendering()
+        boxes = [text.get_window_extent() for text in texts.axes[0].texts if text.get_text().endswith(" s")]
+        assert len(boxes) >= 6
+        assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
+
+
+# What is beside the chain
+
+
+def circles(axes: Any) -> list[tuple[float, float]]:
+    """Centres of the sprockets in a panel."""
+    return [patch.center for patch in axes.patches if isinstance(patch, Circle)]
+
+
+def test_a_sprocket_that_moves_is_drawn_where_it_is_until_it_vanishes() -> None:
+    """In film strips at each instant and in films in each frame; one that vanishes at once is in none."""
+    release = ((0.2, 0.3, 0.1, 5.0), (0.5, 0.2, -0.05, 0.0))
+    moved, usual = make_walk(setup=made_setup(release=release)), make_walk()
+    assert not circles(film_strip(usual).axes[0]) and not circles(Film(usual).figure.axes[0])
+    film = Film(moved)
+    (axes,) = film.figure.axes
+    assert axes.get_ylim()[1] == pytest.approx(0.2 + moved.sprocket_radius)
+    places = sprocket_places(release, moved.frame_time) + moved.sprocket_center
+    for frame, place in enumerate(places):
+        film.draw(frame)
+        assert circles(axes) == ([] if moved.frame_time[frame] >= 0.5 else [pytest.approx(place)])
+    in_strip = circles(film_strip(moved).axes[0])
+    assert 2 <= len(in_strip) < len(chains(film_strip(moved).axes[0]))
+    assert all(np.isclose(places, place).all(axis=1).any() for place in in_strip)
+
+
+def test_stretches_of_a_floor_with_coefficients_of_their_own_have_a_label() -> None:
+    """In film strip, film and figure, where they are; those of the usual coefficients, or out of sight, have none."""
+    ice, mat, usual = (0.018, 0.05), (0.5, 0.9), (0.018, 0.27)
+    points = [(0, 0, *ice), (0.2, 0, *usual), (0.3, 0.02, *mat), (0.4, 0.02, *ice), (0.5, 0), (7, 0, 1, 1), (8, 0)]
+    walk = make_walk(setup=made_setup(floor=points))
+    labels = ["e = 0.018, μ = 0.05", "e = 0.5, μ = 0.9"]
+    for figure in (film_strip(walk), Film(walk).figure):
+        left = figure.axes[0].get_xlim()[0]
+        expected = [[(left, 0), (0.2, 0)], [(0.4, 0.02), (0.5, 0)]], [[(0.3, 0.02), (0.4, 0.02)]]
+        found = [child for child in figure.axes[0].collections if isinstance(child, LineCollection)]
+        assert [str(lines.get_label()) for lines in found] == labels
+        assert {text.get_text() for text in figure.legends[0].get_texts()} >= {*labels}
+        for lines, faces in zip(found, expected, strict=True):
+            np.testing.assert_allclose(lines.get_segments(), faces, atol=1e-12)
+    height = walk.plot().axes[0]
+    lines = {str(line.get_label()): line for line in height.lines}
+    over_ice = np.isfinite(np.asarray(lines[labels[0]].get_ydata(), float))
+    x = walk.center[:, 0]
+    np.testing.assert_array_equal(over_ice, (x < 0.2) | ((x >= 0.4) & (x < 0.5)))

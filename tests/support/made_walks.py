@@ -7,7 +7,7 @@ from typing import Any, get_args
 import numpy as np
 
 from warpchain.engine.tallies import CONTACTS
-from warpchain.inputs.setup import resolve
+from warpchain.inputs.setup import Setup, resolve
 from warpchain.loop.stationary_loop import BeforeRelease
 from warpchain.status import Status
 from warpchain.walks.landmarks import RELEASE
@@ -61,6 +61,11 @@ def make_walk(links: int = 30, **changes: Any) -> WalkResult:
         "frame_joints": offset + middle[:, None],
     }
     return WalkResult(**(_unset(links) | values | changes))
+
+
+def made_setup(**scene: Any) -> Setup:
+    """The setup of a made walk with something else in its scene."""
+    return resolve("soft", scene={"links": 30, **scene}, options={"method": "dp5"}, parameters={})
 
 
 def _unset(links: int) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from scipy import stats
 
 from tests.support.setups import setup_walk
 from tests.support.sweep_content import TABLE_1, UNIFORM, blocks, content, drawn
-from warpchain.inputs.distributions import Gaussian, random_generator, sampled
+from warpchain.inputs.distributions import Gaussian, Uniform, draw, random_generator, sampled
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import check_scene, fewest_links
 from warpchain.inputs.setup import resolve
@@ -210,6 +210,18 @@ def test_every_planned_walk_is_possible(sampler: str) -> None:
     longest = max(walk.setup.parameters.sprocket_radius for walk in walks[: len(walks) // 2])
     impossible = (values[1, :, :, 0] > longest).any(axis=1)
     assert (redrawn == impossible).all()
+
+
+def test_samples_that_are_never_possible_are_refused() -> None:
+    """One line names what is drawn, whether one quantity alone or all of them together are never physical."""
+    never = Uniform(2.0, 3.0, (0.0, 1.0))
+    with pytest.raises(InputError, match=r"^scene\.phase: 1000 draws between 2\.0 and 3\.0 were all outside the phys"):
+        draw({"gravity": Uniform(0.0, 1.0, (0.0, 1.0)), "phase": never}, np.random.default_rng(0))
+    too_large = {"all": "fixed", "sprocket_radius": {"uniform": [0.061, 0.07]}}
+    problem = r"^sweep\.distributions: 1000 samples made no possible walk; the last: scene\.links: 32 links of 0\.01268"
+    for sampler in ("random", "sobol"):
+        with pytest.raises(InputError, match=problem):
+            load_sweep(content(grid=None, scene={"links": 32}, samples=4, sampler=sampler, distributions=too_large))
 
 
 @pytest.mark.parametrize("name", ["circle_radius", "charm_radius"])

@@ -11,6 +11,7 @@ import warpchain
 from tests.walks.test_states import assert_rest_of
 from warpchain import InputError
 from warpchain.engine.sprocket_motion import motion_rows
+from warpchain.inputs.sprocket_motion import sprocket_places
 from warpchain.kernels.contacts.fixed_body import moved_sprocket
 from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.types import Drive
@@ -32,7 +33,10 @@ def places(times: wp.array(dtype=wp.float64), drive: Drive, found: wp.array2d(dt
 
 
 def test_the_sprocket_is_where_scipy_has_it() -> None:
-    """Between its rows it goes on SciPy's monotone cubics, from rest; its rate of turning changes evenly."""
+    """Between its rows it goes on SciPy's monotone cubics, from rest; its rate of turning changes evenly.
+
+    Pictures have it where kernels do, until it vanishes.
+    """
     height, frequency = 0.08, 20.0
     times = np.sort(np.append(np.random.default_rng(1).uniform(0, 0.06, 200), [0.0, 0.02, 0.05, 0.06]))
     drive, found = Drive(), wp.zeros((len(times), 5), dtype=wp.float64, device="cpu")
@@ -46,6 +50,9 @@ def test_the_sprocket_is_where_scipy_has_it() -> None:
     curve = CubicHermiteSpline(rows[:, 0], place, slopes)
     ours = found.numpy()
     np.testing.assert_allclose(ours[:, :2], curve(times), rtol=1e-12, atol=1e-15)
+    drawn = sprocket_places(MOTION, times) + np.array([0.0, height])
+    np.testing.assert_allclose(drawn[times < 0.06], ours[times < 0.06, :2], rtol=1e-12, atol=1e-15)
+    assert np.isnan(drawn[times >= 0.06]).all() and np.isnan(sprocket_places(None, times)).all()
     np.testing.assert_allclose(ours[:, 2:4], curve.derivative()(times), rtol=1e-10, atol=1e-12)
     np.testing.assert_allclose(ours[:, 4], -2 * np.pi * np.interp(times, rows[:, 0], rows[:, 3]), rtol=1e-12)
     assert (np.abs(ours[:, 0] - 0.05) <= 0.05 + 1e-15).all()  # no overshoot

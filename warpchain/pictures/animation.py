@@ -26,12 +26,15 @@ from warpchain.pictures.chain import (
     circle_radii,
     draw_chain,
     draw_ground,
+    draw_sprocket,
     floor_height,
     floor_line,
+    sprocket_centers,
     sprocket_circle,
+    stretches,
     walk_box,
 )
-from warpchain.pictures.style import BLUE, FAINT, GROUND, INK, tidy
+from warpchain.pictures.style import BLUE, DASHES, FAINT, GROUND, INK, tidy
 from warpchain.pictures.walk_shape import center_in_room, checked_joints, headline
 
 if TYPE_CHECKING:
@@ -165,16 +168,19 @@ def player(walk: "WalkResult", slow: float = 4.0) -> str:
     times, box = walk.frame_time[frames], side_box(walk, joints)
     marks = floor_marks(*box[0])
     center = np.stack([np.interp(times, walk.time, walk.center[:, axis]) for axis in (0, 1)], axis=1)
+    places, ends = sprocket_centers(walk, times), box[0] + np.array([-3, 3]) * np.ptp(box[0])
     data = {
         "time": _whole(times, 1e6),
         "joints": _whole(joints[frames, :, :2].reshape(count, -1)),
         "center": _whole(center),
         "radii": _whole(circle_radii(walk)),
         "sprocket": None if sprocket is None else _whole(np.array([*sprocket, walk.sprocket_radius])),
+        "places": _whole(places[~np.isnan(places[:, 0])]),
         "view": _whole(box.ravel()),
         "marks": marks,
         "heights": _whole(np.array(floor_height(walk, np.array(marks)))),
-        "floor": _whole(floor_line(walk, *(box[0] + np.array([-3, 3]) * np.ptp(box[0])))),
+        "floor": _whole(floor_line(walk, *ends)),
+        "stretches": [[color, label, _whole(faces)] for color, label, faces in stretches(walk, *ends)],
         "slow": slow,
         "colors": {"inner": INNER, "outer": OUTER, "edge": EDGE},
     }
@@ -207,7 +213,7 @@ def side_box(walk: "WalkResult", joints: Array) -> Array:
 
 
 class Film:
-    """Draws the frames of one walk.
+    """Draws the frames of one walk; dashed is where the sprocket was at the release.
 
     Attributes:
         figure: the picture of the frame that was drawn last; an even number of pixels wide and high, for video.
@@ -240,8 +246,11 @@ class Film:
         share = _PADDING / size
         self._axes = self.figure.add_axes((*share[0], *(1 - share.sum(axis=0))), xlim=box[0], ylim=box[1])
         if not self._tilts:
-            draw_ground(self._axes, floor_line(walk, *box[0]), box[1, 0])
-            self._axes.set(xlabel="$x$ / m", yticks=[], xticks=floor_marks(*box[0]))
+            draw_ground(self._axes, walk, floor_line(walk, *box[0]), box[1, 0])
+            self._axes.set(yticks=[], xticks=floor_marks(*box[0]))
+            self._axes.set_xlabel("$x$ / m", loc="right")
+            labels = self._axes.get_legend_handles_labels()
+            self.figure.legend(*labels, loc="lower left", frameon=False, ncols=4, fontsize="small")
             tidy(self._axes)
             self._axes.spines[["left", "bottom"]].set_visible(False)
         else:
@@ -252,12 +261,12 @@ class Film:
             center = circle[:-1].mean(axis=0)
             foot = np.array([center[0], floor_height(walk, center[0]), center[2]])
             for path in (circle, np.stack([center, foot])):
-                self._axes.plot(*self._project(path), color=FAINT, linewidth=0.8)
+                self._axes.plot(*self._project(path), color=FAINT, linewidth=0.8, linestyle=DASHES)
         self.figure.text(0.015, 0.975, headline(walk), va="top", fontsize=11, color=INK)
         self._moving: list[Any] = []
 
     def draw(self, frame: int) -> None:
-        """Draw one frame: the chain, its shadow on the floor, the path of its centre of mass so far, the time."""
+        """Draw one frame: chain, sprocket while it is there, shadow, path of the centre of mass so far, time."""
         for artist in self._moving:
             artist.remove()
         walk, axes, joints = self._walk, self._axes, self._joints[frame]
@@ -265,6 +274,7 @@ class Film:
         path = self._project(self._center[: max(1, int(np.searchsorted(walk.time, moment, side="right")))])
         clock: dict[str, Any] = {"ha": "right", "va": "top", "fontsize": 11, "color": INK}
         self._moving = [
+            *draw_sprocket(axes, walk, moment),
             draw_chain(axes, joints, self._radii, self._view, (INNER, OUTER, EDGE), edge=0.45, halo=False),
             *axes.plot(*path, color=INK, linewidth=0.8, zorder=4),
             *axes.plot(*path[:, -1:], "o", color=INK, markersize=5, zorder=4),

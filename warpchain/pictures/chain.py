@@ -7,14 +7,17 @@ up, and what points towards the viewer.
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
-from matplotlib.patches import Polygon
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import to_hex
+from matplotlib.patches import Circle, Patch, Polygon
 from numpy.typing import NDArray
 
 from warpchain.inputs.floor import distances, heights
-from warpchain.inputs.scene import floor_points, link_values
-from warpchain.pictures.style import GROUND, INK
+from warpchain.inputs.scene import floor_laws, floor_points, link_values
+from warpchain.inputs.sprocket_motion import sprocket_places
+from warpchain.pictures.style import FAINT, GROUND, INK
 
 if TYPE_CHECKING:
     from warpchain.walks.walk_result import WalkResult
@@ -90,12 +93,27 @@ def draw_chain(
 
 
 def sprocket_circle(walk: "WalkResult") -> Array | None:
-    """Points of the sprocket's circle x, y, z [m], shape (100, 3); None without one."""
+    """Points of the sprocket's circle at the release x, y, z [m], shape (100, 3); None without one."""
     if walk.sprocket_center is None:
         return None
     angle = np.linspace(0.0, 2 * np.pi, 100)
     circle = walk.sprocket_radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     return np.asarray(circle + np.array([*walk.sprocket_center, 0.0]))
+
+
+def sprocket_centers(walk: "WalkResult", times: Array) -> Array:
+    """The sprocket's centre x, y at times since the release [m], shape (t, 2); NaN where it has vanished."""
+    center = (np.nan, np.nan) if walk.sprocket_center is None else walk.sprocket_center
+    return sprocket_places(walk.setup.scene.release, times) + center
+
+
+def draw_sprocket(axes: Axes, walk: "WalkResult", time: float, **style: Any) -> list[Patch]:
+    """The sprocket at a time since the release [s], if it has not vanished."""
+    (center,) = sprocket_centers(walk, np.array([time]))
+    if np.isnan(center[0]):
+        return []
+    style = {"facecolor": GROUND, "edgecolor": FAINT, "zorder": 1.5, **style}
+    return [axes.add_patch(Circle(tuple(center), walk.sprocket_radius, **style))]
 
 
 def walk_box(walk: "WalkResult", joints: Array) -> tuple[Array, Array]:
@@ -106,6 +124,9 @@ def walk_box(walk: "WalkResult", joints: Array) -> tuple[Array, Array]:
     circle = sprocket_circle(walk)
     if circle is not None:
         low, high = np.minimum(low, circle.min(axis=0)), np.maximum(high, circle.max(axis=0))
+        moved = sprocket_centers(walk, walk.frame_time)
+        low[:2] = np.fmin(low[:2], np.fmin.reduce(moved) - walk.sprocket_radius)
+        high[:2] = np.fmax(high[:2], np.fmax.reduce(moved) + walk.sprocket_radius)
     low[1] = floor_line(walk, low[0], high[0])[:, 1].min()
     return low, high
 
@@ -131,7 +152,32 @@ def from_floor(walk: "WalkResult", joints: Array) -> Array:
     return joints[..., 1] if points is None else distances(points, joints.reshape(-1, 2)).reshape(joints.shape[:-1])
 
 
-def draw_ground(axes: Axes, line: Array, bottom: float) -> None:
-    """The floor along a line from left to right, from the side, down to `bottom` [m]."""
+def stretches(walk: "WalkResult", left: float, right: float) -> list[tuple[str, str, Array]]:
+    """What of the floor has coefficients of its own, between two x [m].
+
+    Returns:
+        For each pair of coefficients a colour, a label, and ends of the straight faces that have it [m], (f, 2, 2).
+    """
+    scene, parameters = walk.setup.scene, walk.setup.parameters
+    points, laws = floor_points(scene), floor_laws(scene, parameters)
+    usual = parameters.floor_restitution, parameters.floor_friction
+    own = [law for law in dict.fromkeys(map(tuple, laws.tolist())) if law != usual]
+    if points is None or not own:
+        return []
+    ends = np.array([min(left, points[0, 0]), max(right, points[-1, 0])])
+    points[[0, -1]] = np.column_stack([ends, heights(points, ends)])
+    faces = np.stack([points[:-1], points[1:]], axis=1)
+    in_sight = (faces[:, 0, 0] < right) & (faces[:, 1, 0] > left)
+    colors = colormaps["plasma"](np.linspace(0.6, 0.0, len(own)))
+    found = ((color, law, faces[in_sight & (laws == law).all(axis=1)]) for color, law in zip(colors, own, strict=True))
+    return [(to_hex(color), "e = {:g}, μ = {:g}".format(*law), its) for color, law, its in found if len(its)]
+
+
+def draw_ground(axes: Axes, walk: "WalkResult", line: Array, bottom: float) -> None:
+    """The floor along its `floor_line`, from the side, down to `bottom` [m], with labelled `stretches`."""
     axes.add_patch(Polygon([(line[0, 0], bottom), *line, (line[-1, 0], bottom)], facecolor=GROUND, zorder=3))
     axes.plot(*line.T, color=INK, linewidth=1.0, zorder=3)
+    for color, label, faces in stretches(walk, line[0, 0], line[-1, 0]):
+        axes.add_collection(
+            LineCollection(list(faces), colors=color, linewidths=3.5, label=label, zorder=3), autolim=False
+        )

@@ -20,6 +20,7 @@ from warpchain.pictures.chain import (
     circle_radii,
     draw_chain,
     draw_ground,
+    draw_sprocket,
     floor_height,
     floor_line,
     from_floor,
@@ -88,7 +89,7 @@ def film_strip(walk: "WalkResult", figure: Figure | None = None) -> Figure:
     side = panel(left, bottom, width, height)
     side.set(xlim=(low[0], high[0]), ylim=(low[1] - depth, high[1] + top), xlabel="x / m", ylabel="y / m")
     views = [(setting(walk), side, SIDE)]
-    draw_ground(side, floor_line(walk, low[0], high[0]), low[1] - depth)
+    draw_ground(side, walk, floor_line(walk, low[0], high[0]), low[1] - depth)
     _draw_distance(side, walk, low[1], 0.5 * depth)
     if tilts:
         z = (low[2] + high[2]) / 2 + np.array([0.5, -0.5]) * broad
@@ -105,6 +106,7 @@ def film_strip(walk: "WalkResult", figure: Figure | None = None) -> Figure:
     for title, axes, view in views:
         for frame in shown:
             draw_chain(axes, joints[frame], radius, view, _link_colors(colors[frame]), edge=0.25)
+            draw_sprocket(axes, walk, walk.frame_time[frame], facecolor="none", edgecolor=colors[frame])
         _draw_way(axes, walk, center, view)
         tidy(axes)
         axes.set_title(title, fontsize="medium", loc="left")
@@ -115,7 +117,8 @@ def film_strip(walk: "WalkResult", figure: Figure | None = None) -> Figure:
         half_height = half / _CLOSE_UP_ASPECT
         bottom = max(spot[1] - half_height, line[:, 1].min() - 0.2 * half_height)
         draw_chain(axes, joints[frame], radius, SIDE, _link_colors(colors[frame]), edge=0.6)
-        draw_ground(axes, line, min(bottom, line[:, 1].min()))
+        draw_sprocket(axes, walk, walk.frame_time[frame], facecolor="none", edgecolor=colors[frame])
+        draw_ground(axes, walk, line, min(bottom, line[:, 1].min()))
         axes.set(xlim=line[[0, -1], 0], ylim=(bottom, bottom + 2 * half_height), yticks=[], xlabel="x / m")
         axes.set_xticks([x for x in MaxNLocator(4).tick_values(*line[[0, -1], 0]) if abs(x - spot[0]) < 0.8 * half])
         axes.set_title(f"{title}, {walk.frame_time[frame]:.3f} s", fontsize="medium", loc="left")
@@ -161,7 +164,8 @@ def _draw_way(axes: Axes, walk: "WalkResult", center: Array, view: Array) -> Non
         middle = circle[:-1].mean(axis=0)
         upright = np.stack([middle, [middle[0], floor_height(walk, middle[0]), middle[2]]])
         ends = np.stack([circle.min(axis=0), circle.max(axis=0)])  # from its edge the circle is a line
-        for part, label in ((circle if view is SIDE else ends, "sprocket until release"), (upright, "_")):
+        title = "sprocket until release" if walk.setup.scene.release is None else "sprocket at the release"
+        for part, label in ((circle if view is SIDE else ends, title), (upright, "_")):
             axes.plot(*(view @ part.T)[:2], label=label, **style)
     axes.plot(*(view @ center.T)[:2], color=INK, linewidth=1.4, linestyle=DOTS, label="centre of mass", zorder=4)
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from warpchain.inputs.scene import floor_points
 from warpchain.loop.stationary_loop import StationaryLoop
-from warpchain.pictures.chain import floor_height
+from warpchain.pictures.chain import floor_height, stretches
 from warpchain.pictures.film_strip import film_strip
 from warpchain.pictures.inline import InlineFigure
 from warpchain.pictures.style import BLUE, DASHES, DOTS, FAINT, GREEN, GROUND, INK, RED, tidy
@@ -60,7 +60,8 @@ def draw(walk: "WalkResult", kind: Kind, *, figure: Figure | None = None, ax: Ax
 def _height_and_speed(walk: "WalkResult", figure: Figure) -> None:
     """Height and horizontal speed of the centre of mass against time since the release, as in Figure 5.
 
-    A thin line is the height of a floor that is not flat, below the centre of mass.
+    A thin line is the height of a floor that is not flat, below the centre of mass; it is thick and has a label where
+    the floor has coefficients of its own.
     """
     height, speed = figure.subplots(2, 1, sharex=True)
     height.plot(walk.time, walk.center[:, 1], color=BLUE, linewidth=1.4)
@@ -70,7 +71,12 @@ def _height_and_speed(walk: "WalkResult", figure: Figure) -> None:
     if floor_points(walk.setup.scene) is None:
         height.set_ylim(bottom=0.0)
     else:
-        height.plot(walk.time, floor_height(walk, walk.center[:, 0]), color=FAINT, linewidth=0.8)
+        x, floor = walk.center[:, 0], floor_height(walk, walk.center[:, 0])
+        height.plot(walk.time, floor, color=FAINT, linewidth=0.8)
+        for color, label, faces in stretches(walk, x.min(), x.max()):
+            is_above = ((faces[:, 0, 0, None] <= x) & (x < faces[:, 1, 0, None])).any(axis=0)
+            height.plot(walk.time, np.where(is_above, floor, np.nan), color=color, linewidth=3.5, label=label)
+            height.legend(frameon=False)
     _finish(walk, height, speed)
 
 
