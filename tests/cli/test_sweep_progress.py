@@ -1,7 +1,6 @@
 """What the command line says of a sweep that is running, and how long a walk took."""
 
 import json
-import os
 import re
 import time
 from pathlib import Path
@@ -13,11 +12,9 @@ import yaml
 from tests.run.test_sweep_run import TINY
 from tests.support import synthetic_sweep
 from tests.support.command_line import Command
-from tests.support.synthetic_sweep import SWEEP, synthetic_rows, write
 from warpchain.run import progress_bar, sweep_run
 from warpchain.run.estimate import estimate_sweep
 from warpchain.run.single_walk import walk
-from warpchain.store.folder import SweepFolder
 from warpchain.store.sweep_result import load
 from warpchain.sweeps.plan import load_sweep
 from warpchain.walks import one_walk
@@ -54,24 +51,6 @@ def test_an_estimate_says_time_and_size(tmp_path: Path, command: Command) -> Non
         file["motion/0"].visititems(lambda name, item: arrays.append(getattr(item, "nbytes", 0)))
     rows = load(tmp_path / "all").walk_count * row_type(load_sweep(recorded).blocks[0].drawn).itemsize
     assert found.bytes == pytest.approx(rows + 4 * sum(arrays), rel=0.05)
-
-
-def test_info_tells_rate_and_time_left_of_a_running_sweep(tmp_path: Path, command: Command) -> None:
-    """Counted are the shards written since the run began; a sweep that nobody runs has no rate."""
-    with SweepFolder.open(tmp_path, SWEEP, shard_size=20) as opened:
-        first, second, third, *_ = opened.missing()
-        for shard in (first, second, third):
-            write(opened, shard, synthetic_rows(SWEEP, shard))
-        now = time.time()
-        os.utime(tmp_path / "lock", (now - 10, now - 10))
-        os.utime(opened.directory / "shards/000000.h5", (now - 60, now - 60))  # of an earlier run
-        assert "running: 4.0" in (text := command("info", ".").out) or "running: 3.9" in text
-        assert "walks a second, 25 s left" in text or "26 s left" in text
-        found = json.loads(command("info", ".", "--json").out)
-        assert 3.0 < found["rate"] <= 4.0 and found["time_left"] == pytest.approx(100 / found["rate"])
-    assert "running" not in command("info", ".").out
-    found = json.loads(command("info", ".", "--json").out)
-    assert found["rate"] is None and found["time_left"] is None
 
 
 def test_the_time_of_a_walk_is_without_compilation(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,16 +1,13 @@
-"""One file of several folders: samples of sweeps with different seeds one behind the other."""
+"""One file of several folders, which are parts of one sweep."""
 
 import itertools
-import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-import xarray
 import yaml
 
-from tests.run.test_sweep_run import BRIEF, TINY
+from tests.run.test_sweep_run import TINY
 from tests.support.command_line import Command
 from tests.support.made_sweeps import make_sweep
 from tests.support.made_walks import assert_same
@@ -21,41 +18,15 @@ from warpchain.store.merged_file import merge
 from warpchain.store.sweep_result import load
 
 
-def test_samples_of_several_folders_are_put_together(tmp_path: Path, command: Command) -> None:
-    """Rows and motions of each folder are at its samples, with its seed; a folder may have grown."""
-    given = TINY | {"grid": {"links": [30, 44]}, "scene": BRIEF | {"frequency": 12.0}}
-    given |= {"record": {"series": {"samples": [0, 2]}, "frames": {"samples": [2]}}, "samples": 3}
-    sweep(given | {"seed": 8}, tmp_path / "a", workers=1)
-    for samples in (3, 5):
-        sweep(given | {"seed": 9, "samples": samples, "name": "other"}, tmp_path / "b", workers=1)
-    assert command("merge", "a", "b", "both.h5").status == 0
-    parts = [load(tmp_path / name) for name in "ab"]
-    with xarray.open_dataset(tmp_path / "both.h5", engine="h5netcdf") as data:
-        assert data.seed.dims == ("sample",) and data.seed.values.tolist() == ["8"] * 3 + ["9"] * 5
-        assert data.attrs["seed"] == "8, 9" and data.attrs["walks"] == 16 and data.attrs["walks_time_limit"] == 16
-        assert [each["seed"] for each in json.loads(data.attrs["sweep"])] == [8, 9]
-        for name in ("loss_joint_friction", "index", "floor_friction_drawn"):
-            np.testing.assert_array_equal(data[name], np.concatenate([part.columns[name] for part in parts], axis=-1))
-    both = load(tmp_path / "both.h5")
-    for part, sample, place in ((0, 0, 0), (0, 2, 2), (1, 0, 3), (1, 2, 5)):
-        for links in (30, 44):
-            one, other = parts[part].series(links=links, sample=sample), both.series(links=links, sample=place)
-            assert one.setup == other.setup and one.frame_joints.tobytes() == other.frame_joints.tobytes()
-            np.testing.assert_array_equal(one.center, other.center)
-    assert both.kept.tolist() == [[True, False, True, True, False, True, False, False]] * 2
-    assert command("merge", "both.h5", "again.h5").status == 0
-    np.testing.assert_array_equal(load(tmp_path / "again.h5").index, both.index)
-
-
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (content(), "has walks that a has, of seed 7"),
-        (content(samples=5), "has walks that a has, of seed 7"),
-        (content(seed=8, grid={"links": [60, 90], "frequency": [5, 12]}), "is not the sweep of"),
-        (content(seed=8, options={"tolerance": 1e-5}), "is not the sweep of"),
-        (blocks({"grid": {"links": [60, 90]}}, {"grid": {"frequency": [5, 10]}}, seed=8), "is not the sweep of"),
-        (content(seed=8, samples=1, distributions={"all": "fixed"}), "block main draws nothing"),
+        (content(), "has walks that a folder before it has; give each part"),
+        (content(samples=5), "is not the sweep of a, with the same seed and samples"),
+        (content(seed=8), "is not the sweep of"),
+        (content(grid={"links": [60, 90], "frequency": [5, 12]}), "is not the sweep of"),
+        (content(options={"tolerance": 1e-5}), "is not the sweep of"),
+        (blocks({"grid": {"links": [60, 90]}}, {"grid": {"frequency": [5, 10]}}), "is not the sweep of"),
     ],
 )
 def test_folders_that_do_not_fit_are_refused(

@@ -108,10 +108,9 @@ def info(
     Of a merged file the checksum is compared first.
     """
     from warpchain.cli.terminal import print_sweep
-    from warpchain.store.folder import running_rate
     from warpchain.store.sweep_result import load
 
-    print_sweep(load(directory), as_json, None if os.path.isfile(directory) else running_rate(directory))
+    print_sweep(load(directory), as_json)
 
 
 def plot(
@@ -190,13 +189,10 @@ def report(
 
 
 def merge(
-    directories: Annotated[list[Path], argument("DIR...", "Folder of a sweep, or several; merged files, too.")],
+    directories: Annotated[list[Path], argument("DIR...", "Folder of a sweep, or of each part; merged files, too.")],
     path: Annotated[Path, argument("FILE.h5", "The file to write.", parser=output_path)],
 ) -> None:
-    """Put the results of folders into one file, which xarray opens.
-
-    Folders of the same sweep with different seeds are put together: their samples stand one behind the other.
-    """
+    """Put the results of a folder, or of all parts of a sweep, into one file, which xarray opens."""
     from warpchain.inputs.validation import printable
     from warpchain.store.merged_file import merge as merge_shards
 

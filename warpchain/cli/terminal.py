@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Final
 from warpchain.engine.tallies import LOST
 from warpchain.inputs.validation import json_value, printable
 from warpchain.pictures.labels import cell_table
-from warpchain.run.progress_bar import duration_text
 from warpchain.walks.faults import FAULTS
 from warpchain.walks.walk_result import WalkResult
 
@@ -36,15 +35,8 @@ def print_table(headings: Iterable[str], rows: Iterable[Sequence[str]], left: Co
     Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else _WIDE).print(table)
 
 
-def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None) -> None:
-    """Print the statuses of a sweep and the mean Δx of each cell on standard output.
-
-    Args:
-        result: the sweep.
-        as_json: whether to print one JSON object instead of a table.
-        rate: walks per second of the process that runs the sweep; None if none does.
-    """
-    time_left = result.missing_count / rate if rate else None
+def print_sweep(result: "SweepResult", as_json: bool) -> None:
+    """Print the statuses of a sweep and the mean Δx of each cell on standard output, as a table or one JSON object."""
     summary, statistics = result.summary(), result.cell_statistics()
     if as_json:
         blocks = {
@@ -55,7 +47,7 @@ def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None)
             for name, cells in statistics.items()
         }
         whole = {"name": result.name, "walks": result.walk_count, "statuses": summary}
-        whole |= {"inaccurate": result.inaccurate_count, "rate": rate, "time_left": time_left, "blocks": blocks}
+        whole |= {"inaccurate": result.inaccurate_count, "blocks": blocks}
         print(json.dumps(json_value(whole), indent=2, allow_nan=False))
         return
     counts = ", ".join(f"{count:,} {label}" for label, count in summary.items() if count)
@@ -63,9 +55,6 @@ def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None)
     for fault, remedy in FAULTS.items():
         if number := sum(int(block.faults[fault].sum()) for block in result.blocks.values()):
             print(f"{number:,} inaccurate: {remedy}")
-    if rate is not None:
-        left = "" if time_left is None else f", {duration_text(time_left)} left"
-        print(f"running: {rate:.2f} walks a second{left}")
     room = _MOST_CELLS
     for name, cells in statistics.items():
         head, rows = cell_table(cells)

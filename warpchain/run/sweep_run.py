@@ -11,6 +11,7 @@ import re
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Final, TypeVar
 
@@ -256,13 +257,14 @@ def on_device(planned: Sweep, device: str) -> Sweep:
     """
     if any("device" in block.varied for block in planned.blocks):
         raise InputError(f"device: {device} is given, but the sweep's grid goes over devices; leave one of them out")
-    canonical = planned.canonical()
-    for block, content in zip(planned.blocks, canonical["blocks"], strict=True):
-        first = {name: values[0] for name, values in block.varied.items() if name in Options.model_fields}
-        given = {**block.sections["options"], **first, "device": device}
-        options = validated(Options, given, "options").model_dump()
-        content["options"] = {name: options[name] for name in content["options"]}
-    return load_sweep(canonical)
+    validated(Options, {"device": device}, "options")
+    blocks = []
+    for block in planned.blocks:
+        options = {**block.sections["options"], "device": device}
+        blocks.append(replace(block, sections={**block.sections, "options": options}))
+    moved = replace(planned, blocks=tuple(blocks))
+    moved.check()
+    return moved
 
 
 def shard_size(walks: int) -> int:

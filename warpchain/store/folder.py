@@ -19,7 +19,6 @@ import os
 import re
 import shutil
 import socket
-import time
 import warnings
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
@@ -32,7 +31,6 @@ import yaml
 from numpy.typing import NDArray
 
 from warpchain.files import given_path, make_folder, naming, remove_output, write_whole
-from warpchain.hdf5_files import open_regular
 from warpchain.inputs.validation import DamagedFileError, InputError, InputWarning
 from warpchain.store.manifest import EARLIER, OWN, Folder, Manifest, Shard, read_manifest
 from warpchain.store.shards import FOREIGN, opened_shard, rows_of, shard_files, stamp
@@ -40,11 +38,6 @@ from warpchain.sweeps.designs import EXTENSIBLE
 from warpchain.sweeps.plan import Sweep
 from warpchain.version import NUMERICS_VERSION
 from warpchain.walks.rows import KEYS, MISSING, Rows, missing_rows
-
-LOCK_TRIES: Final = 5
-"""Tries to lock a folder: `running_rate` of another process holds the lock for a moment."""
-LOCK_PAUSE: Final = 0.02
-"""Time [s] between two of them."""
 
 _PART: Final = re.compile(r"\.(?:sweep|\d{6,})\.[0-9a-f]{8}\.part\.(?:yaml|h5)")
 _HOLDER: Final = re.compile(r"process \d+ on \S*")
@@ -202,33 +195,6 @@ def read_rows(
     return tables, motions
 
 
-def running_rate(directory: Folder) -> float | None:
-    """Walks per second that the process that runs a sweep has written since it began; None if none runs it.
-
-    The times of the files tell: a run writes the lock when it begins, and then its shards.
-
-    Raises:
-        OSError: the folder cannot be read.
-        InputError: there is no sweep in it.
-    """
-    manifest, folder = read_manifest(directory), Path(directory) / "shards"
-    try:
-        with open_regular(Path(directory) / "lock") as lock:
-            began = os.fstat(lock.fileno()).st_mtime
-            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        done = 0
-        for name in shard_files(directory):
-            if (folder / name).stat().st_mtime >= began:
-                with opened_shard(directory, name, manifest.digest) as file:
-                    done += len(file["rows"])
-        seconds = time.time() - began  # negative if the clock was set back
-        return done / seconds if seconds > 0 else 0.0
-    except FileNotFoundError:
-        pass
-    return None
-
-
 def _prepared(folder: Path, sweep: Sweep, manifest: Manifest, fresh: bool) -> Manifest:
     """Make manifest and folder of the shards, in an order in which a kill at any moment does no harm.
 
@@ -336,16 +302,12 @@ def _locked(folder: Path) -> int:
         holder = os.pread(descriptor, 200, 0).decode(errors="replace").strip()
         if holder and not _HOLDER.fullmatch(holder):
             raise InputError(f"{path}: in the way of a sweep; give another folder")
-        for tries_left in reversed(range(LOCK_TRIES)):
-            try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                break
-            except BlockingIOError:
-                if not tries_left:
-                    raise InputError(
-                        f"{folder}: in use by {holder or 'another process'}; wait for it to end, or give another folder"
-                    ) from None
-                time.sleep(LOCK_PAUSE)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise InputError(
+                f"{folder}: in use by {holder or 'another process'}; wait for it to end, or give another folder"
+            ) from None
         if os.fstat(descriptor).st_nlink == 0:  # by a process that was refused the folder
             raise InputError(f"{path}: was deleted at this moment; try again")
         os.ftruncate(descriptor, 0)

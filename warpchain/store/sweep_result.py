@@ -50,8 +50,8 @@ class SweepResult:
 
     @cached_property
     def sweep(self) -> dict[str, Any]:
-        """The resolved sweep, as in sweep.yaml; of several that were merged the first one."""
-        return self.origin.sweeps[0].canonical()
+        """The resolved sweep, as in sweep.yaml."""
+        return self.origin.sweep.canonical()
 
     @property
     def name(self) -> str:
@@ -198,13 +198,12 @@ class SweepResult:
 
     def notes(self) -> dict[str, Any]:
         """Attributes of a file: what the result is and how to make it again."""
-        sweeps = [sweep.canonical() for sweep in self.origin.sweeps]
         return {
             "title": self.name,
-            "seed": ", ".join(str(sweep["seed"]) for sweep in sweeps),
+            "seed": str(self.seed),
             "walks": self.walk_count,
             **{f"walks_{label}": count for label, count in self.summary().items()},
-            "sweep": json.dumps(sweeps if len(sweeps) > 1 else sweeps[0], ensure_ascii=False),
+            "sweep": json.dumps(self.sweep, ensure_ascii=False),
             **self.provenance,
             "versions": json.dumps(self.provenance["versions"]),
         }
@@ -236,18 +235,17 @@ def _load_folder(directory: Folder) -> SweepResult:
         return np.ascontiguousarray(values).reshape(blocks[number].shape)
 
     provenance = {"digest": manifest.sweep.digest(), "numerics_version": manifest.numerics_version}
-    origin = Origin((manifest.sweep,), provenance | {"versions": manifest.versions})
+    origin = Origin(manifest.sweep, provenance | {"versions": manifest.versions})
     return _result(origin, column, lambda number: motions[number].reshape(blocks[number].shape))
 
 
 def _load_merged(path: Folder) -> SweepResult:
     opened = partial(reading_hdf5, Path(path).absolute(), KIND, REMEDY, WANTED)
     with reading_hdf5(path, KIND, REMEDY, WANTED) as file:
-        given = json.loads(file.attrs["sweep"])
-        sweeps = tuple(stored_sweep(path, each) for each in (given if isinstance(given, list) else [given]))
+        sweep = stored_sweep(path, json.loads(file.attrs["sweep"]))
         provenance = {"digest": file.attrs["digest"], "numerics_version": int(file.attrs["numerics_version"])}
-        origin = Origin(sweeps, provenance | {"versions": json.loads(file.attrs["versions"])})
-        groups = [file[block.name] if len(sweeps[0].blocks) > 1 else file for block in sweeps[0].blocks]
+        origin = Origin(sweep, provenance | {"versions": json.loads(file.attrs["versions"])})
+        groups = [file[block.name] if len(sweep.blocks) > 1 else file for block in sweep.blocks]
 
         def motions(number: int) -> Array:
             group = groups[number]
@@ -262,7 +260,7 @@ def _load_merged(path: Folder) -> SweepResult:
 def _result(origin: Origin, column: Callable[[int, str], Array], motions: Callable[[int], Array]) -> SweepResult:
     """A result, given what returns a stored column of a block by its number, and the motions of a block."""
     blocks = {}
-    for number, block in enumerate(origin.sweeps[0].blocks):
+    for number, block in enumerate(origin.sweep.blocks):
         drawn = [*map(drawn_column, block.drawn)]
         columns = {name: column(number, name) for name in ("index", "status", *STORED_COLUMNS, *drawn)}
         columns |= derived_columns(columns)
