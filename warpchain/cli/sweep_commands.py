@@ -127,7 +127,7 @@ def plot(
 ) -> None:
     """Draw all figures of a sweep or of a saved walk.
 
-    Of a sweep: the distance as in the paper's Figure 6, maps, lines over any axes, sensitivity, statuses. Of a walk:
+    Of a sweep: the distance as in the paper's Figure 6, maps, lines over any axes, sensitivity. Of a walk:
     film_strip.png, height_and_speed.png, loop.png, energy.png and, if the plane tilts, tilt.png; a line says what is
     left out and why.
     """

@@ -158,19 +158,10 @@ class Block:
 
         They lie along the axes, one for all samples, shape (…, 1).
         """
-        section, along = self.sections[SECTION_OF[name]], POINT if name in self.points else name
-        if name in self.varied:
-            values = tuple(self.named[name].values()) if name in self.named else self.varied[name]
-        elif name in section:
-            values = (section[name],)
-        elif name in Scene.model_fields:
-            values = (Scene.model_fields[name].default,)
-        else:
-            presets, along = self.axes.get("preset", (self.preset,)), "preset"
-            values = tuple(getattr(parameter_preset(str(preset)), name) for preset in presets)
-        sizes = [len(values) if axis == along else 1 for axis in self.axes]
-        numbers = np.reshape([least(value) for value in values], (*sizes, 1))
-        return np.broadcast_to(numbers, (*self.shape[:-1], 1))
+        cells, section = list(self.cells_along((name, "preset"))), SECTION_OF[name]
+        values = [least(getattr(getattr(setup, section), name)) for setup in self.fixed_in(cells)]
+        sizes = [1 + max(places) for places in zip(*cells, strict=True)]
+        return np.broadcast_to(np.reshape(values, (*sizes, 1)), (*self.shape[:-1], 1))
 
     def canonical(self) -> dict[str, Any]:
         """The block as JSON-able content of a file, with every default and range written out.
