@@ -45,7 +45,6 @@ REFUSED = {
     "sweep --new no/new.yaml": "--new: no/new.yaml: cannot be written (No such file or directory); give",
     "sweep --new new.yaml -o new": "--new: given together with other arguments; leave them out",
     "sweep tiny.yaml -o new --gpus 2 --workers 3": "--workers: given together with --gpus; leave one out",
-    "sweep tiny.yaml -o new --gpus 2 --scheduler tcp://a:1": "--scheduler: given together with --gpus; leave one out",
     "sweep tiny.yaml -o new --gpus 2 --device cpu": "--device: cpu is given together with --gpus; give cuda",
     "bench --links 61": "bench.links: 61 is odd",
     "bench --device cuda:99 --links 2000": "bench.links: 2000 links are more than a GPU's block has threads",

@@ -1,24 +1,18 @@
 """Sweeps as they are run: on slots, threads, processes and a Dask cluster, killed and resumed."""
 
 import concurrent.futures
-import contextlib
-import gc
 import multiprocessing
 import os
 import signal
-import subprocess
-import sys
-import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 
 from tests.support.setups import setup_walk
 from warpchain.inputs.setup import Setup
 from warpchain.run.sweep_run import run_shards, sweep
+from warpchain.run.workers import LostWorkersError
 from warpchain.status import Status
 from warpchain.walks.scheduler import run_setups
 
@@ -152,70 +146,16 @@ def test_a_dask_worker_may_be_killed(tmp_path, uninterrupted):
     np.testing.assert_array_equal(indices, np.arange(80))
 
 
-@contextlib.contextmanager
-def dask_cluster(folder: Path, workers: int) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
-    """Address of a scheduler that was started by itself, with so many workers, and its process."""
-    from distributed import Client
-
-    where, dask = folder / "scheduler.json", [sys.executable, "-m", "dask"]
-    commands = [["scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"]]
-    commands += [["worker", "--no-nanny", "--nthreads", "1", "--no-dashboard", "--local-directory", folder]] * workers
-    processes: list[subprocess.Popen[bytes]] = []
-    with (folder / "dask.log").open("wb") as log:
-        try:
-            for command in commands:
-                command = [*dask, *command, "--scheduler-file", where]
-                processes.append(subprocess.Popen(command, stdout=log, stderr=log))
-            until = time.monotonic() + 60
-            while not (where.exists() and where.read_text()):
-                assert time.monotonic() < until, "no scheduler"
-                time.sleep(0.1)
-            with Client(scheduler_file=str(where)) as client:
-                client.wait_for_workers(workers, timeout=60)
-                address = str(client.scheduler.address)
-            yield address, processes[0]
-        finally:
-            for process in reversed(processes):
-                process.kill()
-                process.wait()
-
-
 @pytest.mark.slow
-def test_a_dask_cluster_of_separate_processes(tmp_path, uninterrupted):
-    """`--scheduler` on a scheduler and two workers that were started by themselves: the bytes are the same."""
-    pytest.importorskip("distributed")
-    source = tmp_path / "tiny.yaml"
-    source.write_text(yaml.safe_dump(TINY, sort_keys=False))
-    with dask_cluster(tmp_path, 2) as (address, _):
-        command = [sys.executable, "-m", "warpchain", "sweep", source, "-o", tmp_path / "sweep", "--scheduler", address]
-        done = subprocess.run(command, capture_output=True, encoding="utf-8")
-    assert "80 time_limit" in done.stdout, done.stderr
-    assert data_of(tmp_path / "sweep") == uninterrupted
-
-
-@pytest.mark.parametrize("address", ("tls://127.0.0.1:1", "ucx://127.0.0.1:1", "inproc://1", "http://a:1"))
-def test_a_scheduler_that_cannot_be_reached_is_refused(command, address):
-    """Whatever class of error Dask raises: one line, status 2, no folder, and no client that closes itself later."""
+def test_a_dask_cluster_may_be_closed_midway(tmp_path):
+    """The sweep ends in one line, and the shards that were written are kept."""
     distributed = pytest.importorskip("distributed")
-    answer = command("sweep", "quickstart", "-o", "sweep", "--scheduler", address)
-    assert answer.status == 2 and answer.err.count("\n") == 1 and not Path("sweep").exists()
-    assert answer.err.startswith(f"error: --scheduler: '{address}': ")
-    clients = [each for each in gc.get_objects() if isinstance(each, distributed.Client)]
-    assert clients and all(client.status == "closed" for client in clients)
+    cluster = distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None)
 
+    def close(progress):
+        if progress.done >= 10:
+            cluster.close()
 
-@pytest.mark.slow
-def test_a_scheduler_may_be_closed_midway(tmp_path):
-    """The command ends in one line with status 1, and the shards that were written are kept."""
-    pytest.importorskip("distributed")
-    source, folder = tmp_path / "tiny.yaml", tmp_path / "sweep"
-    source.write_text(yaml.safe_dump(TINY | {"samples": 400}, sort_keys=False))
-    with dask_cluster(tmp_path, 1) as (address, scheduler):
-        command = [sys.executable, "-m", "warpchain", "sweep", source, "-o", folder, "--scheduler", address]
-        run = subprocess.Popen(command, stderr=subprocess.PIPE, encoding="utf-8")
-        while run.poll() is None and len(list((folder / "shards").glob("[0-9]*.h5"))) < 5:
-            time.sleep(0.05)
-        scheduler.kill()
-        _, said = run.communicate(timeout=60)
-    assert run.returncode == 1 and said.startswith("error: the workers ended") and said.count("\n") == 1
-    assert len(data_of(folder)) >= 5
+    with distributed.Client(cluster) as client, pytest.raises(LostWorkersError, match="the workers ended") as lost:
+        sweep(TINY | {"samples": 400}, tmp_path / "sweep", executor=client, on_progress=close)
+    assert "\n" not in str(lost.value) and data_of(tmp_path / "sweep")
