@@ -26,15 +26,15 @@ from warpchain.pictures.chain import (
     circle_radii,
     draw_chain,
     draw_ground,
+    draw_release,
     draw_sprocket,
     floor_height,
     floor_line,
     sprocket_centers,
-    sprocket_circle,
     stretches,
     walk_box,
 )
-from warpchain.pictures.style import BLUE, DASHES, FAINT, GROUND, INK, tidy
+from warpchain.pictures.style import BLUE, GROUND, INK, tidy
 from warpchain.pictures.walk_shape import center_in_room, checked_joints, headline
 
 if TYPE_CHECKING:
@@ -245,6 +245,7 @@ class Film:
         self._canvas: Any = FigureCanvasAgg(self.figure)
         share = _PADDING / size
         self._axes = self.figure.add_axes((*share[0], *(1 - share.sum(axis=0))), xlim=box[0], ylim=box[1])
+        draw_release(self._axes, walk, self._view)
         if not self._tilts:
             draw_ground(self._axes, walk, floor_line(walk, *box[0]), box[1, 0])
             self._axes.set(yticks=[], xticks=floor_marks(*box[0]))
@@ -256,12 +257,6 @@ class Film:
         else:
             self._axes.set_axis_off()
             self._draw_floor(low, high)
-        circle = sprocket_circle(walk)
-        if circle is not None:
-            center = circle[:-1].mean(axis=0)
-            foot = np.array([center[0], floor_height(walk, center[0]), center[2]])
-            for path in (circle, np.stack([center, foot])):
-                self._axes.plot(*self._project(path), color=FAINT, linewidth=0.8, linestyle=DASHES)
         self.figure.text(0.015, 0.975, headline(walk), va="top", fontsize=11, color=INK)
         self._moving: list[Any] = []
 

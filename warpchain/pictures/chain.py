@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from warpchain.inputs.floor import distances, heights
 from warpchain.inputs.scene import floor_laws, floor_points, link_values
 from warpchain.inputs.sprocket_motion import sprocket_places
-from warpchain.pictures.style import FAINT, GROUND, INK
+from warpchain.pictures.style import DASHES, FAINT, GROUND, INK
 
 if TYPE_CHECKING:
     from warpchain.walks.walk_result import WalkResult
@@ -99,6 +99,20 @@ def sprocket_circle(walk: "WalkResult") -> Array | None:
     angle = np.linspace(0.0, 2 * np.pi, 100)
     circle = walk.sprocket_radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     return np.asarray(circle + np.array([*walk.sprocket_center, 0.0]))
+
+
+def draw_release(axes: Axes, walk: "WalkResult", view: Array) -> None:
+    """Dashed, where the sprocket was at the release, if there was one, and how high above the floor."""
+    circle = sprocket_circle(walk)
+    if circle is None:
+        return
+    middle = circle[:-1].mean(axis=0)
+    upright = np.stack([middle, [middle[0], floor_height(walk, middle[0]), middle[2]]])
+    if view is ABOVE:  # from its edge the circle is a line
+        circle = np.stack([circle.min(axis=0), circle.max(axis=0)])
+    title = "sprocket until release" if walk.setup.scene.release is None else "sprocket at the release"
+    for part, label in ((circle, title), (upright, "_")):
+        axes.plot(*(view @ part.T)[:2], color=FAINT, linewidth=1.0, linestyle=DASHES, zorder=1.5, label=label)
 
 
 def sprocket_centers(walk: "WalkResult", times: Array) -> Array:

@@ -20,15 +20,15 @@ from warpchain.pictures.chain import (
     circle_radii,
     draw_chain,
     draw_ground,
+    draw_release,
     draw_sprocket,
     floor_height,
     floor_line,
     from_floor,
-    sprocket_circle,
     walk_box,
 )
 from warpchain.pictures.inline import InlineFigure
-from warpchain.pictures.style import DASHES, DOTS, FAINT, GROUND, INK, tidy
+from warpchain.pictures.style import DOTS, GROUND, INK, tidy
 from warpchain.pictures.walk_shape import center_in_room, checked_joints, setting
 from warpchain.status import Status
 
@@ -158,15 +158,7 @@ def _write_times(axes: Axes, times: Array, joints: Array, colors: Array, gap: fl
 
 def _draw_way(axes: Axes, walk: "WalkResult", center: Array, view: Array) -> None:
     """The sprocket, its height above the floor, and the path of the centre of mass."""
-    circle = sprocket_circle(walk)
-    if circle is not None:
-        style: dict[str, Any] = {"color": FAINT, "linewidth": 1.0, "linestyle": DASHES, "zorder": 1.5}
-        middle = circle[:-1].mean(axis=0)
-        upright = np.stack([middle, [middle[0], floor_height(walk, middle[0]), middle[2]]])
-        ends = np.stack([circle.min(axis=0), circle.max(axis=0)])  # from its edge the circle is a line
-        title = "sprocket until release" if walk.setup.scene.release is None else "sprocket at the release"
-        for part, label in ((circle if view is SIDE else ends, title), (upright, "_")):
-            axes.plot(*(view @ part.T)[:2], label=label, **style)
+    draw_release(axes, walk, view)
     axes.plot(*(view @ center.T)[:2], color=INK, linewidth=1.4, linestyle=DOTS, label="centre of mass", zorder=4)
 
 
