@@ -159,3 +159,18 @@ def test_a_dask_cluster_may_be_closed_midway(tmp_path):
     with distributed.Client(cluster) as client, pytest.raises(LostWorkersError, match="the workers ended") as lost:
         sweep(TINY | {"samples": 400}, tmp_path / "sweep", executor=client, on_progress=close)
     assert "\n" not in str(lost.value) and data_of(tmp_path / "sweep")
+
+
+def test_the_first_walks_are_of_all_cells(tmp_path):
+    """So the rate, and the time left, are soon those of the whole sweep."""
+    cells = []
+
+    class InOrder(concurrent.futures.ThreadPoolExecutor):
+        def submit(self, call, planned, directory, stamp, shards, pulse):
+            cells.append([int(cell) for shard in shards for cell in shard.keys["cell"]])
+            return super().submit(call, planned, directory, stamp, shards, pulse)
+
+    with InOrder(1) as executor:
+        sweep(TINY, tmp_path / "sweep", executor=executor, workers=1)
+    assert sorted(cell for task in cells for cell in task) == sorted(list(range(4)) * 20)
+    assert {cell for task in cells[: len(cells) // 6] for cell in task} == {0, 1, 2, 3}

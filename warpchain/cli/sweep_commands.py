@@ -4,7 +4,7 @@ import contextlib
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
@@ -35,9 +35,6 @@ def sweep(
     ] = None,
     seed: Annotated[int | None, option("S", "Seed instead of the file's.", min=0)] = None,
     samples: Annotated[int | None, option("N", "Samples of each cell instead of the file's.", min=1)] = None,
-    estimate: Annotated[
-        bool, typer.Option("--estimate", help="Try a few walks; say how long all take, and their size.")
-    ] = False,
     fresh: Annotated[bool, typer.Option("--fresh", help="Discard what another sweep left in the folder.")] = False,
     new: Annotated[
         Path | None,
@@ -57,11 +54,6 @@ def sweep(
         return
     if source is None:
         raise InputError("FILE.yaml: missing; give a sweep file, or --new FILE.yaml to have one written")
-    if estimate:
-        if gpus is not None:
-            raise InputError("--estimate: tries walks in this process; leave out --gpus")
-        _print_estimate(source, device=device, workers=workers, part=part, seed=seed, samples=samples)
-        return
     if folder is None:
         raise InputError("--output: missing; give a folder for the results with -o DIR")
     from warpchain.cli.terminal import print_sweep
@@ -193,18 +185,6 @@ def merge(
 
     merge_shards(directories, path)
     print(printable(str(path)))
-
-
-def _print_estimate(source: Path, **given: Any) -> None:
-    """Say how long a sweep would take on this machine, and how much of the disk."""
-    from warpchain.run.estimate import estimate_sweep
-    from warpchain.run.progress_bar import duration_text
-
-    found = estimate_sweep(source, **given)
-    print(
-        f"{found.walks:,} walks: about {duration_text(found.seconds)} with {found.workers} at once on this machine, "
-        f"{found.bytes / 1e6:,.1f} MB on disk ({found.pilots} walks tried)"
-    )
 
 
 def _checked_gpus(wanted: int) -> None:

@@ -48,6 +48,8 @@ GPU_TASK_WALKS = 262144
 """Upper bound on the walks of a GPU's task, about; the GPU idles while the last walks finish."""
 POLL = 1.0
 """Time [s] between two checks for shards that tasks under way have written."""
+PASSES = 8
+"""Times that a sweep on a CPU is gone through."""
 SHARDS = 32
 """Least number of shards of a sweep, about, if it has as many walks: the grain of a restart.
 
@@ -358,12 +360,13 @@ def _follow(
 def _tasks(planned: Sweep, missing: Sequence[Shard], gpus: int) -> Iterator[list[Shard]]:
     """The shards of each task: one on a CPU; on a GPU enough to fill it, if there are enough.
 
-    Neighbouring shards are alike, and a GPU has few tasks. So each task takes every n-th shard, and all take equally
-    long.
+    Neighbouring shards are alike. So on a GPU, which has few tasks, each takes every n-th shard, and all take equally
+    long; on a CPU every `PASSES`-th shard comes first, and the rate is soon that of the whole sweep.
     """
     for_gpus: list[Shard] = []
-    firsts = planned.undrawn(int(shard.walks[0]) for shard in missing)
-    for shard, first in zip(missing, firsts, strict=True):
+    spread = [shard for number in range(PASSES) for shard in missing[number::PASSES]]
+    firsts = planned.undrawn(int(shard.walks[0]) for shard in spread)
+    for shard, first in zip(spread, firsts, strict=True):
         if on_gpu(first.setup.options.device):
             for_gpus.append(shard)
         else:
