@@ -31,6 +31,7 @@ from warpchain.pictures.chain import (
     floor_height,
     floor_line,
     sprocket_centers,
+    sprocket_circle,
     stretches,
     walk_box,
 )
@@ -236,7 +237,9 @@ class Film:
             broad = max(0.0, high[1] - (high[2] - low[2])) / 2
             low[2], high[2] = low[2] - broad, high[2] + broad
             corners = np.array([[x, 0.0, z] for z in (low[2], high[2]) for x in (low[0], high[0])])
-            seen = np.concatenate([corners, self._joints.reshape(-1, 3)]) @ self._view[:2].T
+            circle = sprocket_circle(walk)
+            shown = [corners, self._joints.reshape(-1, 3), *([] if circle is None else [circle])]
+            seen = np.concatenate(shown) @ self._view[:2].T
             box = np.array([seen.min(axis=0), seen.max(axis=0)]).T
         space = np.array([WIDTH, TALLEST]) - _PADDING.sum(axis=0)
         scale = float((space / np.diff(box)[:, 0]).min())

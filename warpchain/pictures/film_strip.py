@@ -57,8 +57,9 @@ def film_strip(walk: "WalkResult", figure: Figure | None = None) -> Figure:
 
     In the strip the centre of mass moves equally far from each instant to the next. Above each chain stands its time;
     outer links are darker than inner ones. The close-ups show the first touch of the floor, the first self-contact, the
-    collapse and the end, if they happen. A chain whose plane tilts is seen from above instead, to the same scale:
-    z grows downwards.
+    collapse and the end, if they happen. A sprocket that goes on after the release is a circle in the chain's colour;
+    stretches of the floor with coefficients of their own are thick and have labels. A chain whose plane tilts is seen
+    from above instead, to the same scale: z grows downwards.
 
     Args:
         walk: a walk with frames.
