@@ -4,14 +4,10 @@ A refusal reads `path.of.field: what is wrong; what to do`. Validators raise an 
 of a field, or a `ValueError` about their own field; `refusals` makes lines of these and of pydantic's own errors.
 """
 
-import ast
 import difflib
 import functools
-import inspect
-import itertools
 import math
 import reprlib
-import sys
 import textwrap
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -139,30 +135,17 @@ def spelled(symbol: str) -> str:
 class Section(BaseModel):
     """A section of a user's values: parameters, scene or options; its fields have their names from then on."""
 
-    model_config = STRICT
+    model_config = STRICT | ConfigDict(use_attribute_docstrings=True)
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
         """Tell the names of the fields; those without a description have the text that stands below them."""
-        undescribed = [field for field in cls.model_fields.values() if field.description is None]
-        texts = _texts_below(cls) if undescribed else {}
         for name, field in cls.model_fields.items():
             FIELDS[name], SECTION_OF[name] = field, cls.__name__.lower()
-            field.description = texts.get(name, field.description)
+            field.description = " ".join((field.description or "").split())
             if isinstance(field.json_schema_extra, dict) and "symbol" in field.json_schema_extra:
                 SYMBOL_OF[name] = spelled(str(field.json_schema_extra["symbol"]))
                 NAME_OF_SYMBOL[SYMBOL_OF[name]] = name
-
-
-def _texts_below(model: type) -> dict[str, str]:
-    """Field of a class → the text below it; pydantic's way (`use_attribute_docstrings`) takes three times as long."""
-    found, texts = ast.parse(inspect.getsource(sys.modules[model.__module__])).body, dict[str, str]()
-    own = next(each for each in found if isinstance(each, ast.ClassDef) and each.name == model.__name__)
-    for pair in itertools.pairwise(own.body):
-        match pair:
-            case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(text))):
-                texts[name] = " ".join(text.split())
-    return texts
 
 
 def full_name(written: Any) -> Any:
