@@ -68,7 +68,9 @@ def test_a_stored_sweep_keeps_its_method_unless_it_is_given_a_word_again() -> No
     planned = load_sweep(content(options={}))
     stored = planned.canonical()
     assert load_sweep(stored).digest() == planned.digest()
-    with pytest.raises(InputError, match=r"^options\.method: 'hybrid' runs on a CPU only; give explicit"):
+    with pytest.raises(
+        InputError, match=r"^sweep\.blocks\[0\]\.options\.method: 'hybrid' runs on a CPU only; give explicit"
+    ):
         on_device(load_sweep(stored), "cuda")
     for block in stored["blocks"]:
         block["options"]["method"] = "standard"

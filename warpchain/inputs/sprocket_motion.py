@@ -40,10 +40,10 @@ def sprocket_places(motion: Motion | None, times: ArrayLike) -> NDArray[np.float
         motion: its rows; None: it vanishes at once.
         times: since the release [s], shape (t,).
     """
-    from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
-
     if motion is None:
         return np.full((np.size(times), 2), np.nan)
+    from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
+
     knots, places = np.split(np.array([(0.0, 0.0, 0.0), *(row[:3] for row in motion)]), [1], axis=1)
     speeds = PchipInterpolator(knots[:, 0], places).derivative()(knots[:, 0])
     speeds[0] = 0.0  # it starts at rest

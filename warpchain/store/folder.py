@@ -308,7 +308,7 @@ def _locked(folder: Path) -> int:
             raise InputError(
                 f"{folder}: in use by {holder or 'another process'}; wait for it to end, or give another folder"
             ) from None
-        if os.fstat(descriptor).st_nlink == 0:  # by a process that was refused the folder
+        if not path.exists():  # by a process that was refused the folder
             raise InputError(f"{path}: was deleted at this moment; try again")
         os.ftruncate(descriptor, 0)
         os.pwrite(descriptor, f"process {os.getpid()} on {socket.gethostname()}\n".encode(), 0)
