@@ -189,7 +189,7 @@ def _saved(path: Path, index: str | None) -> tuple["Setup", int | None]:
     if index is None:
         raise InputError(f"--like: {path} has many walks; give --index, the number of one, as well")
     block, place = found.located(parse_yaml(index, "--index"))
-    return block.setup_at(place), block.origin.sweep.seed
+    return block.setup_at(place), block.origin.seed
 
 
 def _frame_interval(folder: Path | None, text: str | None, records_loads: bool) -> Any:

@@ -152,7 +152,7 @@ def _walk(result: SweepResult, index: int, device: str | None) -> str:
     from warpchain.walks.one_walk import run_walk
 
     block, place = result.located(index)
-    sweep = result.origin.sweep
+    sweep = result.origin
     planned = (sweep if device is None else on_device(sweep, device)).planned(index)
     cell = cell_values(block.axes, place[:-1])
     names = [f"block {block.name}"] * (len(result.blocks) > 1) + [cell_text(cell)] * bool(cell)

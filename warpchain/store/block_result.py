@@ -41,19 +41,6 @@ _Variables = dict[str, tuple[tuple[str, ...], Array, dict[str, Any]]]
 """Name → axes, values and attributes, as xarray takes them."""
 
 
-@dataclass(frozen=True, eq=False)
-class Origin:
-    """What a result was computed from.
-
-    Attributes:
-        sweep: the sweep.
-        provenance: digest of the sweep, version of the numerics, and versions of the software that began it.
-    """
-
-    sweep: Sweep
-    provenance: dict[str, Any]
-
-
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class BlockResult:
     """A block of a sweep. Every column is an attribute, an array of shape `shape`: `block.dx`, `block.status`.
@@ -67,7 +54,8 @@ class BlockResult:
         axes: name of each axis of the grid → its values, in order; null is None. The samples are one more axis.
         drawn: names of the quantities that samples draw; the values are in the columns NAME_drawn.
         columns: name → values.
-        origin: what it was computed from.
+        origin: the sweep.
+        versions: of the software that began it.
         motions: of each walk what opens the file with its kept motion, and the group in there; None if there is none.
     """
 
@@ -76,13 +64,14 @@ class BlockResult:
     axes: dict[str, Array]
     drawn: tuple[str, ...]
     columns: dict[str, Array]
-    origin: Origin
+    origin: Sweep
+    versions: dict[str, str]
     motions: Array
 
     @property
     def planned(self) -> Block:
         """The block of the sweep that it is of."""
-        return self.origin.sweep.blocks[self.number]
+        return self.origin.blocks[self.number]
 
     @property
     def dims(self) -> tuple[str, ...]:
@@ -184,7 +173,7 @@ class BlockResult:
 
     def setup_at(self, place: tuple[int, ...]) -> Setup:
         """Everything that says what the walk at a place is, its draws included."""
-        return self.origin.sweep.planned(int(self.columns["index"][place])).setup
+        return self.origin.planned(int(self.columns["index"][place])).setup
 
     def walk(
         self,
@@ -224,7 +213,7 @@ class BlockResult:
         from warpchain.walks.one_walk import run_walk
 
         recording = {"frame_interval": frame_interval, "record_before": record_before, "record_loads": record_loads}
-        walk = run_walk(self.setup_at(place), seed=self.origin.sweep.seed, **recording)  # type: ignore[arg-type]
+        walk = run_walk(self.setup_at(place), seed=self.origin.seed, **recording)  # type: ignore[arg-type]
         dx, number = self.columns["dx"][place], self.columns["index"][place]
         if self.is_there[place] and not self.has_same(walk, place):
             warnings.warn(
@@ -257,8 +246,8 @@ class BlockResult:
             **motion,
             wall_time=math.nan,
             setup=setup,
-            seed=self.origin.sweep.seed,
-            versions=self.origin.provenance["versions"],
+            seed=self.origin.seed,
+            versions=self.versions,
         )
 
     def summary(self) -> dict[str, int]:

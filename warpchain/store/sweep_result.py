@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 
 from warpchain.hdf5_files import reading_hdf5
 from warpchain.inputs.validation import InputError, shown, suggestion
-from warpchain.store.block_result import BlockResult, Origin, counted, located, status_counts
+from warpchain.store.block_result import BlockResult, counted, located, status_counts
 from warpchain.store.cell_statistics import CellStatistics
 from warpchain.store.folder import read_rows
 from warpchain.store.manifest import Folder, read_manifest, stored_sweep
 from warpchain.store.shards import stamp
+from warpchain.sweeps.plan import Sweep
 from warpchain.walks.rows import COLUMNS, STORED_COLUMNS, derived_columns, drawn_column, quantity_of
 from warpchain.walks.walk_result import WalkResult
 
@@ -42,16 +43,18 @@ class SweepResult:
 
     Attributes:
         blocks: name → block.
-        origin: what it was computed from.
+        origin: the sweep.
+        provenance: its digest, version of the numerics, and versions of the software that began it.
     """
 
     blocks: dict[str, BlockResult]
-    origin: Origin
+    origin: Sweep
+    provenance: dict[str, Any]
 
     @cached_property
     def sweep(self) -> dict[str, Any]:
         """The resolved sweep, as in sweep.yaml."""
-        return self.origin.sweep.canonical()
+        return self.origin.canonical()
 
     @property
     def name(self) -> str:
@@ -62,11 +65,6 @@ class SweepResult:
     def seed(self) -> int:
         """Its seed."""
         return int(self.sweep["seed"])
-
-    @property
-    def provenance(self) -> dict[str, Any]:
-        """Digest of the sweep, version of the numerics, and versions of the software that began it."""
-        return self.origin.provenance
 
     def __getattr__(self, name: str) -> Any:
         """An attribute of the only block."""
@@ -235,8 +233,8 @@ def _load_folder(directory: Folder) -> SweepResult:
         return np.ascontiguousarray(values).reshape(blocks[number].shape)
 
     provenance = {"digest": manifest.sweep.digest(), "numerics_version": manifest.numerics_version}
-    origin = Origin(manifest.sweep, provenance | {"versions": manifest.versions})
-    return _result(origin, column, lambda number: motions[number].reshape(blocks[number].shape))
+    provenance["versions"] = manifest.versions
+    return _result(manifest.sweep, provenance, column, lambda number: motions[number].reshape(blocks[number].shape))
 
 
 def _load_merged(path: Folder) -> SweepResult:
@@ -244,7 +242,7 @@ def _load_merged(path: Folder) -> SweepResult:
     with reading_hdf5(path, KIND, REMEDY, WANTED) as file:
         sweep = stored_sweep(path, json.loads(file.attrs["sweep"]))
         provenance = {"digest": file.attrs["digest"], "numerics_version": int(file.attrs["numerics_version"])}
-        origin = Origin(sweep, provenance | {"versions": json.loads(file.attrs["versions"])})
+        provenance["versions"] = json.loads(file.attrs["versions"])
         groups = [file[block.name] if len(sweep.blocks) > 1 else file for block in sweep.blocks]
 
         def motions(number: int) -> Array:
@@ -254,13 +252,18 @@ def _load_merged(path: Folder) -> SweepResult:
                 found.flat[int(place)] = opened, f"{group.name}/motion/{place}"
             return found
 
-        return _result(origin, lambda number, name: groups[number][name][()], motions)
+        return _result(sweep, provenance, lambda number, name: groups[number][name][()], motions)
 
 
-def _result(origin: Origin, column: Callable[[int, str], Array], motions: Callable[[int], Array]) -> SweepResult:
+def _result(
+    sweep: Sweep,
+    provenance: dict[str, Any],
+    column: Callable[[int, str], Array],
+    motions: Callable[[int], Array],
+) -> SweepResult:
     """A result, given what returns a stored column of a block by its number, and the motions of a block."""
     blocks = {}
-    for number, block in enumerate(origin.sweep.blocks):
+    for number, block in enumerate(sweep.blocks):
         drawn = [*map(drawn_column, block.drawn)]
         columns = {name: column(number, name) for name in ("index", "status", *STORED_COLUMNS, *drawn)}
         columns |= derived_columns(columns)
@@ -270,7 +273,8 @@ def _result(origin: Origin, column: Callable[[int, str], Array], motions: Callab
             axes={name: np.array(values) for name, values in block.axes.items()},
             drawn=block.drawn,
             columns={name: columns[name] for name in (*COLUMNS, *drawn)},
-            origin=origin,
+            origin=sweep,
+            versions=provenance["versions"],
             motions=motions(number),
         )
-    return SweepResult(blocks=blocks, origin=origin)
+    return SweepResult(blocks=blocks, origin=sweep, provenance=provenance)
