@@ -29,16 +29,8 @@ __all__ = ["DEFAULT_PRESET", "Setup", "combined", "continued", "options_beside",
 
 OF_THE_WALK: Final = (
     *("walk_limit", "walk_until", "distance_limit", "floor", "slope"),
-    *(
-        *OF_LINKS,
-        "mass_gradient",
-        "charm_mass",
-        "charm_inertia",
-        "charm_radius",
-        "charm_link",
-        "stiff_joint",
-        "stiff_joint_factor",
-    ),
+    *("charm_mass", "charm_inertia", "charm_radius", "charm_link", "stiff_joint", "stiff_joint_factor"),
+    *("mass_gradient", *OF_LINKS),
 )
 """Fields of the scene that matter after the release, and may change there."""
 

@@ -143,10 +143,8 @@ def _distribution(given: Any, info: ValidationInfo) -> Distribution | None:
     bounds = field_bounds(FIELDS[name])
     law: Distribution
     if given.gaussian is not None:
-        law, numbers = (
-            Gaussian(given.gaussian.mean, given.gaussian.sigma, bounds),
-            {"gaussian.mean": given.gaussian.mean},
-        )
+        law = Gaussian(given.gaussian.mean, given.gaussian.sigma, bounds)
+        numbers = {"gaussian.mean": law.mean}
     else:
         lower, upper = given.uniform
         if lower >= upper:
