@@ -29,6 +29,14 @@ def quick_walk(tmp_path_factory: pytest.TempPathFactory) -> tuple[Answer, Path]:
     return process("walk", *QUICK, "--json", "-o", "new/deep", folder=folder), folder
 
 
+def test_help_names_every_option(tmp_path: Path) -> None:
+    """Help comes from the real entry point."""
+    answer = process("walk", "--help", folder=tmp_path)
+    assert answer.status == 0 and answer.err == ""
+    options = "links frequency preset method tol device start set seed json output config frame-interval"
+    assert [option for option in options.split() if f"--{option} " not in answer.out] == []
+
+
 @pytest.mark.parametrize("words", [["walk", "--help"], ["walk", *QUICK, "--set", "walk_limit=0.01"]])
 def test_a_walk_loads_only_what_it_needs(words: list[str]) -> None:
     """Help waits for no numerics; a walk without a file for no grammar of sweeps, no files and no figures."""

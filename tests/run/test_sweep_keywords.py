@@ -1,5 +1,6 @@
 """A sweep by keywords is that of a file; everything that is wrong is told at once; a bar where somebody looks."""
 
+import inspect
 import io
 import re
 import sys
@@ -77,6 +78,17 @@ def test_settings_of_a_walk_are_those_of_a_sweep(tmp_path):
         "links: given twice, also in grid; leave one out"
     ]
     assert refused(samples=1, linsk=60, out=tmp_path) == ["'linsk': unknown name; did you mean scene.links?"]
+
+
+def test_notebooks_complete_the_names():
+    """The signatures of walk, sweep and simulate name every field that they take."""
+    for function, name, missing in (
+        (warpchain.walk, "floor_friction", "soften"),
+        (warpchain.sweep, "walk_until", "soften"),
+        (warpchain.simulate, "skin", "links"),
+    ):
+        names = inspect.signature(function).parameters
+        assert name in names and missing not in names
 
 
 def test_parameter_sets(tmp_path):

@@ -1,7 +1,8 @@
-"""Sections of a user's values, and the fields in them by name or symbol."""
+"""Sections of a user's values, by name in signatures of functions, and by name or symbol in what a user gives."""
 
-from collections.abc import Mapping
-from typing import Final
+import inspect
+from collections.abc import Callable, Container, Iterable, Mapping
+from typing import Any, Final, TypeVar
 
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
@@ -18,10 +19,38 @@ from warpchain.inputs.validation import (
     suggested_name,
 )
 
-__all__ = ["NAME_OF_SYMBOL", "SECTIONS", "SECTION_OF", "SYMBOL_OF", "by_section", "dotted_name"]
+__all__ = ["NAME_OF_SYMBOL", "SECTIONS", "SECTION_OF", "SYMBOL_OF", "by_section", "dotted_name", "takes_fields"]
+
+F = TypeVar("F", bound=Callable[..., object])
 
 SECTIONS: Final[Mapping[str, type[Section]]] = {"scene": Scene, "options": Options, "parameters": Parameters}
 """Sections of a user's values, and the models that hold their fields."""
+
+
+def takes_fields(*sections: str, without: Container[str] = (), beside: Iterable[str] = ()) -> Callable[[F], F]:
+    """Let the signature of a function name the fields that its ``**settings`` take, for notebooks to complete.
+
+    Args:
+        sections: keys of `SECTIONS`.
+        without: fields that it does not take; its own arguments are named anyhow.
+        beside: what it takes beside fields.
+    """
+
+    def named(function: F) -> F:
+        signature = inspect.signature(function)
+        *own, settings = signature.parameters.values()
+        types: dict[str, Any] = dict.fromkeys(beside, Any)
+        for section in sections:
+            types |= {name: field.annotation for name, field in SECTIONS[section].model_fields.items()}
+        fields = [
+            inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=..., annotation=kind)
+            for name, kind in types.items()
+            if name not in signature.parameters and name not in without
+        ]
+        function.__signature__ = signature.replace(parameters=[*own, *fields, settings])  # type: ignore[attr-defined]
+        return function
+
+    return named
 
 
 def by_section(settings: Mapping[str, object]) -> dict[str, dict[str, object]]:

@@ -15,6 +15,7 @@ from warpchain.inputs.floor import check_above
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene, check_links_on_gpu, floor_body, floor_laws, floor_points, link_values
+from warpchain.inputs.sections import takes_fields
 from warpchain.inputs.state import State, checked_array
 from warpchain.inputs.validation import InputError, checked, plain, shown, validated
 from warpchain.status import Status
@@ -62,6 +63,7 @@ class Trajectory:
         return f"<Trajectory of {self.position.shape[1]} links, {len(self.time)} instants: {self.status.label}>"
 
 
+@takes_fields("options", without=("soften_pile", "soften_drive"))
 def simulate(
     parameters: State | Parameters | str,
     position: Array | None = None,

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any, Literal
 
 from warpchain.inputs.distributions import Seed
-from warpchain.inputs.sections import by_section
+from warpchain.inputs.sections import by_section, takes_fields
 from warpchain.inputs.setup import DEFAULT_PRESET, Setup, continued, resolve
 from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError, by_name, checked, shown
@@ -13,6 +13,7 @@ from warpchain.walks.one_walk import OnProgress, run_walk
 from warpchain.walks.walk_result import WalkResult
 
 
+@takes_fields("parameters", "scene", "options")
 def walk(
     *,
     links: int | None = None,

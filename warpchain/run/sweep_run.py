@@ -22,7 +22,7 @@ from warpchain.engine.devices import gpu_turn, has_gpu_turn, start_device
 from warpchain.engine.processors import processors
 from warpchain.inputs.options import Options, on_gpu
 from warpchain.inputs.scene import LISTS
-from warpchain.inputs.sections import SECTION_OF, by_section
+from warpchain.inputs.sections import SECTION_OF, by_section, takes_fields
 from warpchain.inputs.setup import DEFAULT_PRESET, Setup
 from warpchain.inputs.validation import InputError, Whole, by_name, checked, checked_path, plain, shown, validated
 from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text, progress_bar
@@ -57,6 +57,7 @@ With 128 the 504 walks of Figure 6 took 5.7 s on an H200, with 20 4.9 s: files o
 """
 
 
+@takes_fields("scene", "parameters", "options", beside=KEYS)
 def sweep(
     source: str | os.PathLike[str] | Mapping[str, Any] | Sweep | None = None,
     out: str | os.PathLike[str] | None = None,
