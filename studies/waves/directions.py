@@ -9,7 +9,7 @@ Links turn by δθ cos(2πmj/n + φ), which bends the loop alike for both direct
 runs: a slow one stands in the room, against the motion of the links; a fast one runs with them. φ is drawn.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -18,13 +18,22 @@ import typer
 from numpy.typing import NDArray
 
 import warpchain
-from studies.common import minus, over_cells, publish, read_rows, run_study, table, write_rows
+from studies.common import (
+    Array,
+    Columns,
+    OverCells,
+    minus,
+    over_cells,
+    publish,
+    read_columns,
+    run_study,
+    table,
+    write_rows,
+)
 from studies.waves import wave_drag
 from studies.waves.drag import END, NEAR, released
 from studies.waves.fields import normal_velocities
 from studies.waves.wave_drag import RIGID, RUNNING, inertia_of, loop_motions, wave_motion
-
-Array = NDArray[np.float64]
 
 FOLDER: Final = Path(__file__).parent
 RESULTS: Final = FOLDER / "results" / "directions.csv"
@@ -150,26 +159,27 @@ def run() -> None:
     write_rows(RESULTS, rows)
 
 
-def changes(rows: Sequence[Mapping[str, str]], way: str, size: float) -> Array:
-    """Change of Δx and its error in per cent, its part that follows the phase, and F of that, (4, cells)."""
-    chosen = [row for row in rows if (row["wave"], float(row["size"])) == (way, size)]
-    return np.array([[float(row[name]) for name in ("change", "error", "by_phase", "f")] for row in chosen]).T
+def rows_of(way: str, size: float) -> Columns:
+    """The rows of a wave in the file: change of Δx, its error, its part that follows the phase, F of that."""
+    columns = read_columns(RESULTS)
+    chosen = (columns["wave"] == way) & (columns["size"] == size)
+    return {name: values[chosen] for name, values in columns.items()}
 
 
-def mean_of_cells(change: Array, error: Array) -> str:
-    """Mean over the cells ± its standard error."""
-    over = over_cells(change, error)
-    return minus(f"{over.mean:+.1f} ± {over.error:.1f} %")
+def change(way: str, size: float) -> OverCells:
+    """What a wave changes of Δx, in per cent."""
+    rows = rows_of(way, size)
+    return over_cells(rows["change"], rows["error"])
 
 
-def summary(rows: Sequence[Mapping[str, str]]) -> str:
+def summary() -> str:
     """Each wave over the cells, in Markdown."""
     lines = []
     for way, size in VARIANTS[1:]:
-        change, error, by_phase, f = changes(rows, way, size)
-        over, ends = over_cells(change, error), minus(f"{change.min():+.0f} to {change.max():+.0f} %")
-        texts = mean_of_cells(change, error), ends, f"{over.typical:.1f} %", f"{over.chi2:.0f} of {len(over)}"
-        lines.append([way, f"{size:g}", *texts, f"{by_phase.mean():.1f} %", f"{f.mean():.1f}"])
+        over, rows = change(way, size), rows_of(way, size)
+        ends = f"{over.values.min():+.0f} to {over.values.max():+.0f} %"
+        texts = minus(over.text()), minus(ends), f"{over.typical:.1f} %", f"{over.chi2:.0f} of {len(over)}"
+        lines.append([way, f"{size:g}", *texts, f"{rows['by_phase'].mean():.1f} %", f"{rows['f'].mean():.1f}"])
     head = "wave | amplitude / rad | Δx, mean of cells | cells | typical | χ² of none | ∝ cos φ | F of that"
     return table(head, lines)
 
@@ -228,7 +238,7 @@ def main(command: Annotated[str, typer.Argument()] = "") -> None:
         return
     if command == "run":
         run()
-    publish(FOLDER, {"directions": summary(read_rows(RESULTS))}, {})
+    publish(FOLDER, {"directions": summary()})
 
 
 if __name__ == "__main__":
