@@ -37,10 +37,16 @@ DISTANCE: Final = "distance walked $Δx$ / m"
 FREQUENCY: Final = "frequency of the sprocket $ν$ / Hz"
 
 
-def run_study(main: Callable[..., None]) -> None:
-    """Run a study's command, whose arguments are those of the function; what is refused is one line."""
+def run_study(*commands: Callable[..., None]) -> None:
+    """Run a study's command, or one of several, whose arguments are those of its function; what is refused is one line.
+
+    A command of several is given by its name.
+    """
+    app = typer.Typer(pretty_exceptions_enable=False)
+    for command in commands:
+        app.command()(command)
     try:
-        typer.run(main)
+        app()
     except (InputError, OSError) as error:
         sys.exit(str(error))
 
@@ -55,7 +61,7 @@ def at_rest(block: Block, quantity: str = "dx") -> xarray.DataArray:
 def of_cells(block: Block) -> Iterator[tuple[tuple[int, ...], list[float]]]:
     """Place of each cell of a block, and the values of its axes there."""
     for place in np.ndindex(*map(len, block.axes.values())):
-        yield place, [values[number] for number, values in zip(block.axes.values(), place, strict=True)]
+        yield place, [values[number] for values, number in zip(block.axes.values(), place, strict=True)]
 
 
 def mean(values: ArrayLike) -> Any:

@@ -15,7 +15,7 @@ from typing import Annotated, Final
 import typer
 
 import warpchain
-from studies.common import publish, read_rows, run_study, write_rows
+from studies.common import publish, read_columns, run_study, write_rows
 from studies.phase_diagram import candidates, cells, drawing, scales, strands
 from studies.phase_diagram.tables import TABLES
 
@@ -30,22 +30,17 @@ def make(
     """Reduce the sweeps that are given into the committed files; then draw and write all that is in them."""
     if parts:
         walks = cells.walks_by_cell([warpchain.load(path) for path in parts])
-        write_rows(cells.CSV, [cells.reduced(*cell, columns) for cell, columns in walks.items()])
+        write_rows(cells.CSV, (cells.reduced(*cell, columns) for cell, columns in walks.items()))
     if scaling is not None:
         write_rows(scales.CSV, scales.reduced(warpchain.load(scaling)))
     if meetings:
-        write_rows(strands.CSV, list(strands.reduced([warpchain.load(path) for path in meetings])))
-    found = cells.read_csv()
-    varied, curve = scales.Cells(read_rows(scales.CSV)), scales.Curve(found)
-    tables = (
-        {name: render(found) for name, render in TABLES.items()}
-        | {
-            "scales": scales.table(varied, curve),
-            "candidates": candidates.table(found, varied),
-            "walking time": candidates.walking_time(found),
-        }
-        | strands.tables(cells.read_csv(strands.CSV), found)
-    )
+        write_rows(strands.CSV, strands.reduced([warpchain.load(path) for path in meetings]))
+    found, varied = read_columns(cells.CSV), scales.Cells()
+    curve = scales.Curve(found)
+    tables = {name: render(found) for name, render in TABLES.items()}
+    tables |= {"scales": scales.table(varied, curve), "candidates": candidates.table(found, varied)}
+    tables |= {"walking time": candidates.walking_time(found)}
+    tables |= strands.tables(read_columns(strands.CSV), found)
     figures = {"maps": drawing.draw_maps(found), "laws": drawing.draw_laws(found), "scales": scales.draw(varied, curve)}
     publish(FOLDER, tables, figures)
 

@@ -15,7 +15,6 @@ from typing import Annotated, Final
 
 import numpy as np
 import typer
-from numpy.typing import NDArray
 
 import warpchain
 from studies.common import (
@@ -72,15 +71,14 @@ def with_wave(
     before = position[:, 2]
     turn = _closing(lambda turn: np.exp(1j * (before + turn)) - np.exp(1j * before), wave.real, before)
     angle = before + turn
-    rate = _closing(
-        lambda rate: 1j * ((velocity[:, 2] + rate) * np.exp(1j * angle) - velocity[:, 2] * np.exp(1j * before)),
-        back * speed / length * np.sin(2 * np.pi * number / links) * (1j * wave).real,
-        angle,
-    )
+
+    def ends_of(rate: Array) -> Array:
+        return 1j * ((velocity[:, 2] + rate) * np.exp(1j * angle) - velocity[:, 2] * np.exp(1j * before))
+
+    wanted = back * speed / length * np.sin(2 * np.pi * number / links) * (1j * wave).real
+    rate = _closing(ends_of, wanted, angle)
     places = _centers(length * (np.exp(1j * angle) - np.exp(1j * before)))
-    speeds = _centers(
-        length * 1j * ((velocity[:, 2] + rate) * np.exp(1j * angle) - velocity[:, 2] * np.exp(1j * before))
-    )
+    speeds = _centers(length * ends_of(rate))
     moved = position + np.column_stack([places.real, places.imag, turn])
     moved[:, :2] += np.average(position[:, :2] - moved[:, :2], axis=0, weights=inertia[:, 0])
     change = np.column_stack([speeds.real, speeds.imag, rate])
@@ -101,7 +99,7 @@ def lowest(position: Array, parameters: warpchain.Parameters) -> float:
     return float((position[:, 1] - half).min())
 
 
-def _closing(ends: Callable[[Array], NDArray[np.complex128]], values: Array, angle: Array) -> Array:
+def _closing(ends: Callable[[Array], Array], values: Array, angle: Array) -> Array:
     """Values changed as little as may be so that the ends of all links add up to nothing, by Newton's method."""
     basis = np.stack([-np.sin(angle), np.cos(angle)], axis=1)
     for _ in range(20):
@@ -110,7 +108,7 @@ def _closing(ends: Callable[[Array], NDArray[np.complex128]], values: Array, ang
     return values
 
 
-def _centers(ends: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def _centers(ends: Array) -> Array:
     """Middles of links, from what their ends are moved."""
     joints = np.cumsum(ends)
     return joints - ends / 2
@@ -227,18 +225,17 @@ def main(command: Annotated[str, typer.Argument()] = "") -> None:
         for links, frequency in CELLS:
             before, after = about_impact(links, frequency)
             print(f"{links} links, {frequency:g} Hz: {before:.4f} rad before the first impact, {after:.4f} after it")
-        return
-    if command == "given":
+    elif command == "given":
         cells = [given(links, frequency) for links, frequency in CELLS]
         for way, size in VARIANTS[1:]:
             every = np.concatenate([cell[way, size] for cell in cells])
             names = ("energy / %", "angular momentum / %", "run / %", "lowest joint / mm")
             for name, values in zip(names, every.T, strict=True):
                 print(f"{way} {size:g}: {name} {values.mean():+.2f} ({values.min():+.1f} to {values.max():+.1f})")
-        return
-    if command == "run":
-        run()
-    publish(FOLDER, {"directions": summary()})
+    else:
+        if command == "run":
+            run()
+        publish(FOLDER, {"directions": summary()})
 
 
 if __name__ == "__main__":

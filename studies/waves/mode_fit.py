@@ -3,13 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from studies.common import Array
 
 
-def mode_amplitudes(angles: Array, number: int) -> Complex:
+def mode_amplitudes(angles: Array, number: int) -> Array:
     """Fourier components of links' angles [rad], shape (t, n), of inner and outer links apart.
 
     Returns:
@@ -20,7 +18,7 @@ def mode_amplitudes(angles: Array, number: int) -> Complex:
     return np.stack([angles[:, part::2] @ wave[part::2] for part in (0, 1)], axis=1)
 
 
-def fit_rates(signals: Complex, interval: float, count: int) -> Complex:
+def fit_rates(signals: Array, interval: float, count: int) -> Array:
     """Rates λ of the sum of `count` exponentials Σ a exp(λt) that signals, shape (t, s), have in common.
 
     ESPRIT (Roy and Kailath, IEEE Trans. ASSP 37 (1989) 984): stretches of the signals span a space that is the same one
@@ -36,9 +34,7 @@ def fit_rates(signals: Complex, interval: float, count: int) -> Complex:
     stretch = 2 * instants // 3
     if instants < 3 * count:
         raise ValueError(f"{instants} instants do not tell {count} exponentials apart; give at least {3 * count}")
-    rows = np.concatenate(
-        [np.lib.stride_tricks.sliding_window_view(column, stretch) for column in signals.T]
-    )  # (s × starts, stretch)
+    rows = np.concatenate([np.lib.stride_tricks.sliding_window_view(column, stretch) for column in signals.T])
     space = np.linalg.svd(rows, full_matrices=False)[2][:count].T
     shift = np.linalg.lstsq(space[:-1], space[1:], rcond=None)[0]
     rates = np.log(np.linalg.eigvals(shift).astype(np.complex128)) / interval

@@ -1,11 +1,9 @@
 """A ring of links that turns like a rigid body, tapped: the state from which `warpchain.simulate` moves it on."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studies.common import Array
 from warpchain import Parameters
-
-Array = NDArray[np.float64]
 
 
 def tapped_ring(links: int, parameters: Parameters, speed: float, spins: Array) -> tuple[Array, Array]:
