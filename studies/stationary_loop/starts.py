@@ -10,23 +10,24 @@ from typing import Annotated, Any, Final
 
 import numpy as np
 import typer
-from numpy.typing import NDArray
 
 import warpchain
 from studies.common import (
     DRAWN,
+    Array,
     drawn_terms,
+    mean,
     minus,
     of_cells,
     over_cells,
     publish,
-    read_rows,
+    read_columns,
     run_study,
+    standard_error,
     table,
     write_rows,
 )
 
-Array = NDArray[np.float64]
 Key = tuple[str, int, float, float]
 """Block, links, frequency [Hz], time for which the loop was held on [s], 0 where that is no axis."""
 
@@ -77,7 +78,7 @@ def reduced(paths: list[str]) -> list[dict[str, Any]]:
         row: dict[str, Any] = dict(zip(("block", "links", "frequency", "held_on"), key, strict=True))
         row["walks"] = len(walks["dx"])
         for quantity, each in ({name: walks[name] for name in QUANTITIES} | {"held": held[key]}).items():
-            row |= {quantity: float(each.mean()), f"{quantity}_se": float(each.std(ddof=1) / len(each) ** 0.5)}
+            row |= {quantity: float(mean(each)), f"{quantity}_se": float(standard_error(each))}
         rows.append(row)
     return rows
 
@@ -101,18 +102,19 @@ def with_draws_held(cells: Mapping[Key, Mapping[str, Array]]) -> dict[Key, Array
 
 def read() -> dict[Key, dict[str, float]]:
     """The rows of the file by cell."""
-    return {
-        (row.pop("block"), int(row.pop("links")), float(row.pop("frequency")), float(row.pop("held_on"))): {
-            name: float(text) for name, text in row.items()
-        }
-        for row in read_rows(CSV)
-    }
+    names, columns = zip(*read_columns(CSV).items(), strict=True)
+    found = {}
+    for block, links, *numbers in zip(*columns, strict=True):
+        row = dict(zip(names[2:], map(float, numbers), strict=True))
+        found[str(block), int(links), row["frequency"], row["held_on"]] = row
+    return found
 
 
 def _ratio(one: dict[str, float], other: dict[str, float]) -> tuple[float, float]:
-    """Δx of one cell over that of the other, less 1, with its standard error; what is drawn is held."""
+    """Δx of one cell over that of the other, less 1, in per cent, with its standard error; what is drawn is held."""
     size = one["held"] / other["held"]
-    return size - 1, size * float(np.hypot(one["held_se"] / one["held"], other["held_se"] / other["held"]))
+    error = size * float(np.hypot(one["held_se"] / one["held"], other["held_se"] / other["held"]))
+    return 100 * (size - 1), 100 * error
 
 
 def _together(cells: dict[Key, dict[str, float]], loops: str, cell: tuple[int, float]) -> dict[str, float]:
@@ -130,7 +132,7 @@ def _together(cells: dict[Key, dict[str, float]], loops: str, cell: tuple[int, f
 def _mean(ratios: list[tuple[float, float]]) -> str:
     """Mean over cells ± standard error, with χ² of none in any."""
     found = over_cells(*zip(*ratios, strict=True))
-    return f"{100 * found.mean:+.2f} ± {100 * found.error:.2f} % (χ² {found.chi2:.1f} of {len(found)})"
+    return f"{found.text(2)} (χ² {found.chi2:.1f} of {len(found)})"
 
 
 def _with_error(cell: dict[str, float], quantity: str, scale: float = 1.0, digits: int = 4) -> str:
@@ -146,7 +148,7 @@ def starts(cells: dict[Key, dict[str, float]]) -> str:
         for start in OURS:
             pair = (_together(cells, name, (links, frequency)) for name in (start, "held 30 s"))
             size, error = _ratio(*pair)
-            texts.append(f"{100 * size:+.2f} ± {100 * error:.2f}")
+            texts.append(f"{size:+.2f} ± {error:.2f}")
         for quantity in ("release_center_x", "release_width"):
             each = (f"{1e3 * (own[start][quantity] - held[quantity]):+.2f}" for start in STARTS[:2])
             error = np.hypot(own["rest"][f"{quantity}_se"], held[f"{quantity}_se"])
@@ -180,12 +182,9 @@ def over_time(cells: dict[Key, dict[str, float]], block: str, quantity: str, sca
         own = [cells[block, links, frequency, time] for time in times]
         values = np.array([scale * cell[quantity] for cell in own])
         errors = np.array([scale * cell[f"{quantity}_se"] for cell in own])
-        weights = errors**-2
-        chi2 = float(np.sum(weights * (values - np.sum(weights * values) / weights.sum()) ** 2))
-        texts = (f"{value:.{digits}f}" for value in values)
-        rows.append(
-            (links, f"{frequency:g}", *texts, f"{errors.mean():.{digits}f}", f"{chi2:.1f}")[: None if tests else -1]
-        )
+        texts = [f"{value:.{digits}f}" for value in (*values, errors.mean())]
+        chi2 = [f"{over_cells(values, errors).chi2_of_one:.1f}"] if tests else []
+        rows.append((links, f"{frequency:g}", *texts, *chi2))
     return table(("links", "Hz", *(f"{time:g} s" for time in times), "s.e.", *["χ²"] * tests), rows)
 
 
@@ -206,7 +205,7 @@ def make(folders: Annotated[list[str] | None, typer.Argument()] = None) -> None:
     """Reduce the sweeps that are given into the committed file; then write all tables that are in it."""
     if folders:
         write_rows(CSV, reduced(folders))
-    publish(PAGE.parent, tables(read()), {})
+    publish(PAGE.parent, tables(read()))
 
 
 if __name__ == "__main__":
