@@ -7,7 +7,7 @@ The three loops of the figure are walked anew, in some seconds of a CPU.
 """
 
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,6 +18,8 @@ from studies.common import (
     DISTANCE,
     LINE_COLORS,
     RED,
+    Array,
+    Block,
     error_line,
     mean_where,
     of_cells,
@@ -26,9 +28,6 @@ from studies.common import (
     table,
     tidy,
 )
-
-Block = Any
-"""A block of `warpchain.SweepResult.blocks` with the axes links, perhaps frequency, and charm_mass."""
 
 FOLDER: Final = Path(__file__).parent
 TIMES: Final = (0.0, 0.04, 0.08, 0.16, 0.32)
@@ -58,14 +57,12 @@ def draw_distances(panel: Axes, block: Block) -> None:
         values = [block.axes[name][index] for name, index in zip(("links", "frequency"), place, strict=True)]
         label = "$n$ = {:g}, {:g} Hz".format(*values)
         error_line(panel, masses, cells, place, color=LINE_COLORS[number], label=label)
-    panel.set_xlabel("mass of the charm / g")
-    panel.set_ylabel(DISTANCE)
-    panel.set_ylim(0, 1.3 * panel.get_ylim()[1])
     panel.legend(frameon=False, fontsize="small")
-    tidy(panel, grid="both")
+    top = 1.3 * panel.get_ylim()[1]
+    tidy(panel, grid="both", xlabel="mass of the charm / g", ylabel=DISTANCE, ylim=(0, top))
 
 
-def draw_loops(panels: np.ndarray, links: int = 60, frequency: float = 15.0) -> None:
+def draw_loops(panels: Array, links: int = 60, frequency: float = 15.0) -> None:
     """The loop with three charms at the same moments, a panel for each charm, which is a dot."""
     for panel, mass in zip(panels, DRAWN, strict=True):
         scene = {"start": "ellipse", "links": links, "frequency": frequency, "charm_mass": mass}
@@ -78,26 +75,19 @@ def draw_loops(panels: np.ndarray, links: int = 60, frequency: float = 15.0) -> 
             panel.plot(*closed[:2].mean(axis=0), "o", color=RED, markersize=4 if mass else 2)
             panel.annotate(f"{moment:g} s", (0.3 * number, -0.06), ha="center", fontsize="x-small")
         panel.axhline(0.0, color="black", linewidth=0.8)
-        panel.set_title(f"charm of {1e3 * mass:g} g", loc="left", fontsize="medium")
-        panel.set_aspect("equal")
-        panel.set_xlim(-0.2, 0.3 * len(TIMES) - 0.1)
-        panel.set_ylim(-0.07, 0.5)
+        limits = {"xlim": (-0.2, 0.3 * len(TIMES) - 0.1), "ylim": (-0.07, 0.5)}
+        tidy(panel, f"charm of {1e3 * mass:g} g", aspect="equal", **limits)
         panel.set_axis_off()
 
 
-def draw(blocks: dict[str, Block]) -> Figure:
-    """Distances on the left, loops on the right."""
+def main(folder: str) -> None:
+    """Write the tables into the page and draw the figure: distances on the left, loops on the right."""
+    blocks = warpchain.load(folder).blocks
     figure = Figure(figsize=(9.2, 4.2), layout="constrained")
     left, right = figure.subfigures(1, 2, width_ratios=(1, 1.25))
     draw_distances(left.subplots(), blocks["ellipse"])
     draw_loops(right.subplots(len(DRAWN), 1))
-    return figure
-
-
-def main(folder: str) -> None:
-    """Write the tables into the page and draw the figure."""
-    blocks = warpchain.load(folder).blocks
-    publish(FOLDER, {name: distances(block) for name, block in blocks.items()}, {"charm": draw(blocks)})
+    publish(FOLDER, {name: distances(block) for name, block in blocks.items()}, {"charm": figure})
 
 
 if __name__ == "__main__":

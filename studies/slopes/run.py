@@ -5,18 +5,25 @@ python -m studies.slopes.run slopes
 """
 
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 import warpchain
-from studies.common import DISTANCE, LINE_COLORS, error_line, mean_where, of_cells, publish, run_study, table, tidy
-
-Array = NDArray[np.float64]
-Block = Any
-"""A block of `warpchain.SweepResult.blocks`."""
+from studies.common import (
+    DISTANCE,
+    LINE_COLORS,
+    Array,
+    Block,
+    error_line,
+    mean_where,
+    of_cells,
+    publish,
+    run_study,
+    table,
+    tidy,
+)
 
 FOLDER: Final = Path(__file__).parent
 LIMIT: Final = 20.0
