@@ -28,8 +28,8 @@ def _unit(value: float) -> tuple[float, str]:
     return (1.0, "") if power >= -1 else (10.0**power, f" / $10^{{{power}}}$")
 
 
-def corner(answer: films.Posterior, truth: Mapping[str, float] | None = None) -> Figure:
-    """Ellipses of 68 and 95 % for each pair of parameters, and the Gaussians on the diagonal; the truth in red."""
+def corner(answer: films.Posterior) -> Figure:
+    """Ellipses of 68 and 95 % for each pair of parameters, and the Gaussians on the diagonal."""
     count, mean, sigma = len(answer.names), answer.mean, answer.sigma
     figure = Figure(figsize=(1.5 * count, 1.5 * count), layout="constrained")
     panels = figure.subplots(count, count, squeeze=False)
@@ -52,10 +52,6 @@ def corner(answer: films.Posterior, truth: Mapping[str, float] | None = None) ->
                 panel.plot(x / unit, y / other, color=BLUE, linewidth=1)
             panel.set_ylim((mean[row] - 3 * sigma[row]) / other, (mean[row] + 3 * sigma[row]) / other)
         panel.set_xlim(values[0] / unit, values[-1] / unit)
-        if truth is not None:
-            panel.axvline(truth[answer.names[column]] / unit, color=RED, linewidth=0.8)
-            if row != column:
-                panel.axhline(truth[answer.names[row]] / other, color=RED, linewidth=0.8)
         below = f"{SYMBOLS[answer.names[column]]}{across}" if row == count - 1 else ""
         beside = f"{SYMBOLS[answer.names[row]]}{up}" if column == 0 and row else ""
         panel.locator_params(axis="x", nbins=3)

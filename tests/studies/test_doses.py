@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import warpchain
-from studies.common import read_rows, with_tables
+from studies.common import with_tables
 from studies.waves import directions, doses, drag, sprocket_tap
 from studies.waves.wave_drag import inertia_of
 
@@ -36,7 +36,7 @@ def test_a_drag_acts_when_it_should(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_page_has_the_tables_of_the_files() -> None:
     """They are rendered from the committed rows."""
     page = (doses.FOLDER / "README.md").read_text(encoding="utf-8")
-    tables = doses.tables(read_rows(doses.RESULTS)) | {"directions": directions.summary(read_rows(directions.RESULTS))}
+    tables = doses.tables() | {"directions": directions.summary()}
     assert with_tables(page, tables) == page, "out of date; run python -m studies.waves.doses, and directions"
 
 
