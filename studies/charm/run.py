@@ -14,20 +14,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import warpchain
-from studies.common import (
-    DISTANCE,
-    LINE_COLORS,
-    RED,
-    Array,
-    Block,
-    error_line,
-    mean_where,
-    of_cells,
-    publish,
-    run_study,
-    table,
-    tidy,
-)
+from studies import common
+from studies.common import DISTANCE, LINE_COLORS, RED, Array, Block
 
 FOLDER: Final = Path(__file__).parent
 TIMES: Final = (0.0, 0.04, 0.08, 0.16, 0.32)
@@ -39,15 +27,15 @@ DRAWN: Final = (0.0, 0.02, 0.1)
 def distances(block: Block) -> str:
     """Δx with its errors, duration, bounces and share at rest of each cell, in Markdown."""
     cells, rest = block.statistics(), block.columns["status"] == warpchain.Status.AT_REST
-    time, bounces = (mean_where(rest, block.columns[name]) for name in ("walk_time", "bounces"))
+    time, bounces = (common.mean_where(rest, block.columns[name]) for name in ("walk_time", "bounces"))
     rows = []
-    for place, values in of_cells(block):
+    for place, values in common.of_cells(block):
         numbers = f"{cells.mean[place]:.3f} ± {cells.standard_error[place]:.3f}", f"{cells.sd[place]:.3f}"
         shown = (*numbers, f"{time[place]:.2f}", f"{bounces[place]:.1f}") if rest[place].any() else ("–",) * 4
         cell = *(f"{value:g}" for value in values[:-1]), f"{1e3 * values[-1]:g}"
         rows.append((*cell, *shown, f"{rest[place].mean():.0%}"))
     names = [name.replace("frequency", "ν / Hz") for name in block.axes][:-1]
-    return table((*names, "charm / g", "Δx / m", "σ / m", "t / s", "bounces", "at rest"), rows)
+    return common.table((*names, "charm / g", "Δx / m", "σ / m", "t / s", "bounces", "at rest"), rows)
 
 
 def draw_distances(panel: Axes, block: Block) -> None:
@@ -56,10 +44,10 @@ def draw_distances(panel: Axes, block: Block) -> None:
     for number, place in enumerate(np.ndindex(cells.mean.shape[:-1])):
         values = [block.axes[name][index] for name, index in zip(("links", "frequency"), place, strict=True)]
         label = "$n$ = {:g}, {:g} Hz".format(*values)
-        error_line(panel, masses, cells, place, color=LINE_COLORS[number], label=label)
+        common.error_line(panel, masses, cells, place, color=LINE_COLORS[number], label=label)
     panel.legend(frameon=False, fontsize="small")
     top = 1.3 * panel.get_ylim()[1]
-    tidy(panel, grid="both", xlabel="mass of the charm / g", ylabel=DISTANCE, ylim=(0, top))
+    common.tidy(panel, grid="both", xlabel="mass of the charm / g", ylabel=DISTANCE, ylim=(0, top))
 
 
 def draw_loops(panels: Array, links: int = 60, frequency: float = 15.0) -> None:
@@ -76,7 +64,7 @@ def draw_loops(panels: Array, links: int = 60, frequency: float = 15.0) -> None:
             panel.annotate(f"{moment:g} s", (0.3 * number, -0.06), ha="center", fontsize="x-small")
         panel.axhline(0.0, color="black", linewidth=0.8)
         limits = {"xlim": (-0.2, 0.3 * len(TIMES) - 0.1), "ylim": (-0.07, 0.5)}
-        tidy(panel, f"charm of {1e3 * mass:g} g", aspect="equal", **limits)
+        common.tidy(panel, f"charm of {1e3 * mass:g} g", aspect="equal", **limits)
         panel.set_axis_off()
 
 
@@ -87,8 +75,8 @@ def main(folder: str) -> None:
     left, right = figure.subfigures(1, 2, width_ratios=(1, 1.25))
     draw_distances(left.subplots(), blocks["ellipse"])
     draw_loops(right.subplots(len(DRAWN), 1))
-    publish(FOLDER, {name: distances(block) for name, block in blocks.items()}, {"charm": figure})
+    common.publish(FOLDER, {name: distances(block) for name, block in blocks.items()}, {"charm": figure})
 
 
 if __name__ == "__main__":
-    run_study(main)
+    common.run_study(main)

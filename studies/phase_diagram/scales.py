@@ -12,18 +12,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.optimize import least_squares
 
-from studies.common import (
-    FAINT,
-    INK,
-    LINE_COLORS,
-    Array,
-    Columns,
-    mean,
-    of_cells,
-    read_columns,
-    standard_error,
-    tidy,
-)
+from studies import common
+from studies.common import FAINT, INK, LINE_COLORS, Array, Columns
 from studies.common import table as markdown
 from studies.phase_diagram import laws
 from warpchain import InputError, Status, SweepResult, preset
@@ -65,7 +55,7 @@ def reduced(result: SweepResult) -> list[dict[str, float | str]]:
             raise InputError(f"block {name}: no axes links and frequency; give a folder of the sweep scaling")
         if np.any(block.columns["status"] < 0):
             raise InputError(f"block {name}: walks are missing; run the sweep to its end")
-        for place, values in of_cells(block):
+        for place, values in common.of_cells(block):
             at = dict(zip(block.axes, map(float, values), strict=True))
             known = content["parameters"] | at
             varied = {each: known[each] for each in ("gravity", "sprocket_radius", "link_length") if each in known}
@@ -75,7 +65,7 @@ def reduced(result: SweepResult) -> list[dict[str, float | str]]:
             cell = {"block": name, "links": int(at["links"]), "frequency": at["frequency"]}
             cell |= {"gravity": parameters.gravity, "radius": parameters.sprocket_radius + parameters.circle_radius}
             cell |= {"link_length": parameters.link_length, "walks": len(status), "at_rest": len(dx)}
-            rows.append(cell | {"dx_mean": float(mean(dx)), "dx_se": float(standard_error(dx))})
+            rows.append(cell | {"dx_mean": float(common.mean(dx)), "dx_se": float(common.standard_error(dx))})
     return rows
 
 
@@ -92,7 +82,7 @@ class Cells:
 
     def __init__(self, path: Path = CSV) -> None:
         """Read the file."""
-        rows = read_columns(path)
+        rows = common.read_columns(path)
         used = rows["at_rest"] >= (1 - laws.MOST_FAILED) * rows["walks"]
         rows = {name: values[used] for name, values in rows.items()}
         self.names, self.links, self.frequency = rows["block"], rows["links"], rows["frequency"]
@@ -181,7 +171,7 @@ def draw(cells: Cells, curve: Curve) -> Figure:
             axes.scatter(x, cells.lengths[chosen], s=16, color=color, label=name)
         axes.plot(fine * unit, curve(fine), color=INK, linewidth=1)
         title = f"residual of the coloured cells {laws.root_mean_square(curve.left(cells, exponents)):.0f} %"
-        tidy(axes, title, grid="both", xscale="log", yscale="log", xlabel=label)
+        common.tidy(axes, title, grid="both", xscale="log", yscale="log", xlabel=label)
     figure.axes[0].set_ylabel("Δx/(nℓ)")
     figure.axes[0].legend(frameon=False, title="varied")
     return figure

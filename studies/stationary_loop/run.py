@@ -6,7 +6,6 @@
 Numbers are printed.
 """
 
-import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
@@ -17,15 +16,7 @@ from matplotlib.figure import Figure
 
 import warpchain
 from studies.common import DASHES, FREQUENCY, GREEN, LINE_COLORS, RED, publish, run_study, tidy
-from studies.stationary_loop.theory import (
-    LoopParameters,
-    MeanLoop,
-    NoSolutionError,
-    TheoreticalLoop,
-    catenary_of,
-    imbalances,
-    predict,
-)
+from studies.stationary_loop import theory
 
 FOLDER = Path(__file__).parent
 SHOWN = (120, 20.0)
@@ -49,7 +40,7 @@ def held(links: int, frequency: float, values: Mapping[str, float]) -> warpchain
     return warpchain.walk(links=links, frequency=frequency, preset="soft", start="spinning", **settings)
 
 
-def compare(name: str, ours: MeanLoop, theirs: MeanLoop) -> None:
+def compare(name: str, ours: theory.MeanLoop, theirs: theory.MeanLoop) -> None:
     """Prints how far two loops are apart."""
     middle = np.abs(ours.s) < 0.45 * (ours.free[1] - ours.free[0])
     s = ours.s[middle]
@@ -66,7 +57,7 @@ def compare(name: str, ours: MeanLoop, theirs: MeanLoop) -> None:
     )
 
 
-def row(name: str, loop: MeanLoop, theory: TheoreticalLoop) -> str:
+def row(name: str, loop: theory.MeanLoop, theory: theory.TheoreticalLoop) -> str:
     """Bottom curvature, peak and dip of a predicted curve, and how far it is from the simulated one."""
     near = np.abs(theory.s) < 0.35 * (loop.free[1] - loop.free[0])
     peak = int(np.argmax(np.where(near, theory.curvature, -np.inf)))
@@ -106,12 +97,12 @@ def show(name: str, walk: warpchain.WalkResult) -> None:
     ):
         chain |= {less: 0.0} if less else {}
         try:
-            print(row(which, loop, predict(loop, dataclasses.replace(LoopParameters.of(loop), **chain))))
-        except NoSolutionError as error:
+            print(row(which, loop, theory.predict(loop, chain)))
+        except theory.NoSolutionError as error:
             print(f"  {which:22} {error}")
-    print(row("catenary", loop, catenary_of(loop)))
+    print(row("catenary", loop, theory.catenary_of(loop)))
     balances = (
-        f"{key} {100 * rms:.1f} % ({100 * greatest:.1f} %)" for key, (rms, greatest) in imbalances(loop).items()
+        f"{key} {100 * rms:.1f} % ({100 * greatest:.1f} %)" for key, (rms, greatest) in theory.imbalances(loop).items()
     )
     print("  balances, rms (greatest):", ", ".join(balances))
 
@@ -121,8 +112,8 @@ def draw(walk: warpchain.WalkResult) -> Figure:
     figure, loop = walk.plot("loop"), walk.mean_loop()
     shape, bend, pull = figure.axes
     for name, curve, style in (
-        ("theory", predict(loop), {"color": RED, "linewidth": 1.3, "linestyle": DASHES, "zorder": 4}),
-        ("catenary, as long", catenary_of(loop), {"color": GREEN, "linewidth": 1.2}),
+        ("theory", theory.predict(loop), {"color": RED, "linewidth": 1.3, "linestyle": DASHES, "zorder": 4}),
+        ("catenary, as long", theory.catenary_of(loop), {"color": GREEN, "linewidth": 1.2}),
     ):
         shape.plot(*(curve.position - loop.center).T, **style)
         bend.plot(curve.s, curve.curvature, label=name, **style)

@@ -17,7 +17,9 @@ with large ω_c and ends at `LEAST_SMOOTHING`. Joints turn at 60 rad/s where the
 loops of 60 to 180 links at 10 to 30 Hz change by at most 0.1 mm and 0.05 1/m.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -25,6 +27,7 @@ from scipy.integrate import solve_bvp
 from scipy.optimize import brentq
 
 from studies.common import Array
+from warpchain import Parameters
 
 MeanLoop = Any
 """What `walk.mean_loop()` returns."""
@@ -50,43 +53,15 @@ class NoSolutionError(ValueError):
     """The boundary value problem was not solved."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class LoopParameters:
-    """The quantities of a chain of two kinds of links in the balances of its loop.
+def bending_inertia(loop: MeanLoop) -> float:
+    """j = (Ī − m̄ ℓ²/6)/ℓ of the chain of a loop [kg m]; may be negative."""
+    p, length = loop.parameters, loop.parameters.link_length
+    return float((p.inner_inertia + p.outer_inertia) / 2 / length - loop.density * length**2 / 6)
 
-    Attributes:
-        link_length: ℓ [m].
-        density: ρ = m̄/ℓ, mass per length [kg/m].
-        inertia: j = (Ī − m̄ ℓ²/6)/ℓ [kg m]; may be negative.
-        gravity: g [m/s²].
-        viscous_friction: β of a joint [N m s].
-        coulomb_friction: τ_c of a joint [N m].
-        friction_smoothing: ω_c of a joint on the sprocket [rad/s].
-    """
 
-    link_length: float
-    density: float
-    inertia: float
-    gravity: float
-    viscous_friction: float
-    coulomb_friction: float
-    friction_smoothing: float
-
-    def moment(self, spin: Array) -> Array:
-        """Friction moment f(w) = β w + τ_c tanh(w / ω_c) [N m] of a joint that turns at w [rad/s]."""
-        return self.viscous_friction * spin + self.coulomb_friction * np.tanh(spin / self.friction_smoothing)
-
-    @classmethod
-    def of(cls, loop: MeanLoop) -> "LoopParameters":
-        """Those of the chain of a mean loop."""
-        given, length = loop.parameters, loop.parameters.link_length
-        inertia = (given.inner_inertia + given.outer_inertia) / 2
-        alike = ("link_length", "gravity", "viscous_friction", "coulomb_friction", "friction_smoothing")
-        return cls(
-            density=loop.density,
-            inertia=inertia / length - loop.density * length**2 / 6,
-            **{name: getattr(given, name) for name in alike},
-        )
+def moment(p: Parameters, spin: Array, smoothing: float) -> Array:
+    """Friction moment f(w) = β w + τ_c tanh(w / ω_c) [N m] of a joint that turns at w [rad/s]."""
+    return p.viscous_friction * spin + p.coulomb_friction * np.tanh(spin / smoothing)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -112,17 +87,17 @@ class TheoreticalLoop:
     moment: Array
 
 
-def predict(loop: MeanLoop, parameters: LoopParameters | None = None) -> TheoreticalLoop:
+def predict(loop: MeanLoop, values: Mapping[str, float] | None = None) -> TheoreticalLoop:
     """The free part in theory, with the ends and the speed of a mean loop.
 
     Args:
         loop: the mean loop, which is also the first guess.
-        parameters: parameters of the chain; by default those of the loop.
+        values: of parameters that are others than those of the loop's chain.
 
     Raises:
         NoSolutionError: the solver has found no solution.
     """
-    p = parameters or LoopParameters.of(loop)
+    p = loop.parameters.with_values(values or {})
     inset = IN_LINKS * loop.parameters.link_length
     first, last = loop.free[0] + inset, loop.free[1] - inset
     s = np.linspace(first, last, 401)
@@ -133,16 +108,16 @@ def predict(loop: MeanLoop, parameters: LoopParameters | None = None) -> Theoret
     given = 3 if rubs else 2  # of x, y, φ at the touch-down
     if not rubs:
         values = np.delete(values, 4, axis=0)
-    length, spin, weight = last - first, p.link_length * loop.speed, p.density * p.gravity
-    turning = p.inertia * loop.speed**2
+    length, spin, weight = last - first, p.link_length * loop.speed, loop.density * p.gravity
+    turning = bending_inertia(loop) * loop.speed**2
 
-    def slope(share: Array, values: Array) -> Array:
+    def slope(smoothing: float, share: Array, values: Array) -> Array:
         _, _, angle, curvature, *bending, tension, shear = values
         cosine, sine, bend = np.cos(angle), np.sin(angle), bending[0] if rubs else shear / turning
         rates = [-cosine, sine, curvature, bend]
         if rubs:
-            tanh = np.tanh(spin * bend / p.friction_smoothing)
-            friction = p.viscous_friction + p.coulomb_friction / p.friction_smoothing * (1 - tanh**2)
+            tanh = np.tanh(spin * bend / smoothing)
+            friction = p.viscous_friction + p.coulomb_friction / smoothing * (1 - tanh**2)
             rates.append((turning * bend - shear) / (spin * friction))
         return length * np.stack([*rates, shear * curvature + weight * sine, weight * cosine - tension * curvature])
 
@@ -151,8 +126,7 @@ def predict(loop: MeanLoop, parameters: LoopParameters | None = None) -> Theoret
 
     least = max(p.friction_smoothing, LEAST_SMOOTHING)
     for smoothing in (*(each for each in SMOOTHINGS if each > least and p.coulomb_friction > 0), least):
-        p = replace(p, friction_smoothing=smoothing)
-        found = solve_bvp(slope, conditions, share, values, tol=TOLERANCE, max_nodes=MOST_NODES)
+        found = solve_bvp(partial(slope, smoothing), conditions, share, values, tol=TOLERANCE, max_nodes=MOST_NODES)
         if not found.success:
             reason = found.message.lower().rstrip(".")
             raise NoSolutionError(f"the boundary value problem was not solved ({reason})")
@@ -167,7 +141,7 @@ def predict(loop: MeanLoop, parameters: LoopParameters | None = None) -> Theoret
         curvature=curvature,
         effective_tension=tension,
         shear=shear,
-        moment=p.moment(spin * (bending[0] if rubs else shear / turning)),
+        moment=moment(p, spin * (bending[0] if rubs else shear / turning), smoothing),
     )
 
 
@@ -224,22 +198,23 @@ def imbalances(loop: MeanLoop) -> dict[str, tuple[float, float]]:
         `moment`: M' + N − j v² κ'.
         `friction`: M − f(ℓ v κ'), where f is the moment of joints that turn like the mean curve.
     """
-    p, edge = LoopParameters.of(loop), EDGE * loop.parameters.link_length
+    p, edge = loop.parameters, EDGE * loop.parameters.link_length
+    weight_of_length = loop.density * p.gravity
     inside = (loop.s > loop.free[0] + edge) & (loop.s < loop.free[1] - edge)
     step = loop.length / len(loop.s)
     tangent = np.stack([-np.cos(loop.angle), np.sin(loop.angle)], axis=1)
     normal = np.stack([np.sin(loop.angle), np.cos(loop.angle)], axis=1)
     force = loop.effective_tension[:, None] * tangent + loop.shear[:, None] * normal
     bottom = np.array([np.interp(0.0, loop.s, force[:, axis]) for axis in (0, 1)])
-    weight = np.stack([np.zeros_like(loop.s), p.density * p.gravity * loop.s], axis=1)
+    weight = np.stack([np.zeros_like(loop.s), weight_of_length * loop.s], axis=1)
     waves = 2j * np.pi * np.fft.rfftfreq(len(loop.s), step)
     waves[-1] *= len(loop.s) % 2
     shear_slope, moment_slope = (
         np.fft.irfft(waves * np.fft.rfft(values), len(loop.s)) for values in (loop.shear, loop.moment)
     )
-    bend, across = loop.effective_tension * loop.curvature, p.density * p.gravity * np.cos(loop.angle)
-    turned = p.inertia * loop.speed**2 * loop.bending
-    expected = p.moment(p.link_length * loop.speed * loop.bending)
+    bend, across = loop.effective_tension * loop.curvature, weight_of_length * np.cos(loop.angle)
+    turned = bending_inertia(loop) * loop.speed**2 * loop.bending
+    expected = moment(p, p.link_length * loop.speed * loop.bending, p.friction_smoothing)
     terms = {
         "force": (np.hypot(*(force - bottom - weight).T), [np.hypot(*force.T)]),
         "normal": (shear_slope + bend - across, [shear_slope, bend, across]),

@@ -17,18 +17,8 @@ import numpy as np
 import typer
 
 import warpchain
-from studies.common import (
-    Array,
-    Columns,
-    OverCells,
-    minus,
-    over_cells,
-    publish,
-    read_columns,
-    run_study,
-    table,
-    write_rows,
-)
+from studies import common
+from studies.common import Array, Columns, OverCells
 from studies.waves import wave_drag
 from studies.waves.drag import END, NEAR, released
 from studies.waves.fields import normal_velocities
@@ -154,12 +144,12 @@ def run() -> None:
         found = reduced(*distances(links, frequency))
         rows += [{"links": str(links), "frequency": f"{frequency:g}", **row} for row in found]
         print(links, frequency, found, flush=True)
-    write_rows(RESULTS, rows)
+    common.write_rows(RESULTS, rows)
 
 
 def rows_of(way: str, size: float) -> Columns:
     """The rows of a wave in the file: change of Δx, its error, its part that follows the phase, F of that."""
-    columns = read_columns(RESULTS)
+    columns = common.read_columns(RESULTS)
     chosen = (columns["wave"] == way) & (columns["size"] == size)
     return {name: values[chosen] for name, values in columns.items()}
 
@@ -167,7 +157,7 @@ def rows_of(way: str, size: float) -> Columns:
 def change(way: str, size: float) -> OverCells:
     """What a wave changes of Δx, in per cent."""
     rows = rows_of(way, size)
-    return over_cells(rows["change"], rows["error"])
+    return common.over_cells(rows["change"], rows["error"])
 
 
 def summary() -> str:
@@ -176,10 +166,15 @@ def summary() -> str:
     for way, size in VARIANTS[1:]:
         over, rows = change(way, size), rows_of(way, size)
         ends = f"{over.values.min():+.0f} to {over.values.max():+.0f} %"
-        texts = minus(over.text()), minus(ends), f"{over.typical:.1f} %", f"{over.chi2:.0f} of {len(over)}"
+        texts = (
+            common.minus(over.text()),
+            common.minus(ends),
+            f"{over.typical:.1f} %",
+            f"{over.chi2:.0f} of {len(over)}",
+        )
         lines.append([way, f"{size:g}", *texts, f"{rows['by_phase'].mean():.1f} %", f"{rows['f'].mean():.1f}"])
     head = "wave | amplitude / rad | Δx, mean of cells | cells | typical | χ² of none | ∝ cos φ | F of that"
-    return table(head, lines)
+    return common.table(head, lines)
 
 
 def about_impact(links: int, frequency: float) -> tuple[float, float]:
@@ -235,8 +230,8 @@ def main(command: Annotated[str, typer.Argument()] = "") -> None:
     else:
         if command == "run":
             run()
-        publish(FOLDER, {"directions": summary()})
+        common.publish(FOLDER, {"directions": summary()})
 
 
 if __name__ == "__main__":
-    run_study(main)
+    common.run_study(main)

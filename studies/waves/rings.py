@@ -13,20 +13,8 @@ from matplotlib.figure import Figure
 
 import warpchain
 from studies.common import BLUE, FAINT, GREEN, GROUND, INK, RED, Array, publish, table, tidy
-from studies.waves.dispersion import (
-    LOWER_BACKWARD,
-    LOWER_FORWARD,
-    UPPER_BACKWARD,
-    UPPER_FORWARD,
-    Waves,
-    band_gap,
-    continuous_ring,
-    equivalent_friction,
-    long_wave_speed,
-    ring_spin,
-    ring_waves,
-    straight_waves,
-)
+from studies.waves import dispersion
+from studies.waves.dispersion import LOWER_BACKWARD, LOWER_FORWARD, UPPER_BACKWARD, UPPER_FORWARD, Waves
 from warpchain import Parameters, preset
 
 CHAIN = preset("soft").with_values({"coulomb_friction": 0.0})
@@ -91,7 +79,7 @@ def tapped(links: int, speed: float, spins: Array, times: Array, chain: Paramete
     motion = warpchain.simulate(chain, position, velocity, float(times[-1]), times=times, **scene)
     if motion.status != warpchain.Status.FINISHED:
         raise RuntimeError(f"the tapped ring ended as {motion.status.label}")
-    return motion.position[:, :, 2] - position[:, 2] - ring_spin(chain, links, speed) * times[:, None]
+    return motion.position[:, :, 2] - position[:, 2] - dispersion.ring_spin(chain, links, speed) * times[:, None]
 
 
 def from_tap(links: int) -> Array:
@@ -186,8 +174,8 @@ def show_bands() -> None:
     for frequency in FREQUENCIES:
         speed = speed_at(frequency)
         tension = DENSITY * speed**2
-        low, high = band_gap(CHAIN, tension)
-        waves = straight_waves(CHAIN, tension, phases)
+        low, high = dispersion.band_gap(CHAIN, tension)
+        waves = dispersion.straight_waves(CHAIN, tension, phases)
         edge = waves.damping[-1, FORWARD]
         swings = np.abs(waves.frequency[:, FORWARD]) > 1e-6
         swinging = np.concatenate([phases, np.pi - phases[::-1]])[np.concatenate([swings[:, 0], swings[::-1, 1]])]
@@ -204,7 +192,7 @@ def show_reach() -> None:
     rows = []
     for frequency in FREQUENCIES:
         speed = speed_at(frequency)
-        waves = straight_waves(CHAIN, DENSITY * speed**2, 2 * np.pi / WAVELENGTHS)
+        waves = dispersion.straight_waves(CHAIN, DENSITY * speed**2, 2 * np.pi / WAVELENGTHS)
         for k, wavelength in enumerate(WAVELENGTHS):
             packets, crests = (speed + LENGTH * speeds[k, BOTH] for speeds in (waves.group_speed, waves.phase_speed))
             rate = f"{waves.frequency[k, LOWER_FORWARD]:.1f}", f"{waves.damping[k, LOWER_FORWARD]:.3f}"
@@ -213,7 +201,7 @@ def show_reach() -> None:
             both = (f"{packet:.2f} ({crest:.2f})" for packet, crest in zip(packets, crests, strict=True))
             rows.append((f"{frequency:g}", f"{wavelength:.0f}", *rate, *loops, *both))
         for pull in (1.0, 2.0):
-            c = long_wave_speed(CHAIN, DENSITY * speed**2 + pull)
+            c = dispersion.long_wave_speed(CHAIN, DENSITY * speed**2 + pull)
             rows.append(
                 (f"{frequency:g}", f"long, T = ρv² + {pull} N", *[""] * 5, *(f"{speed + v:.2f}" for v in (-c, c)))
             )
@@ -226,22 +214,24 @@ def show_coulomb() -> None:
     rows = []
     for name in ("soft", "paper"):
         chain = preset(name)
-        rows.append([name, *(f"{equivalent_friction(chain, spin) / chain.viscous_friction:.2f}" for spin in SPINS)])
+        rows.append(
+            [name, *(f"{dispersion.equivalent_friction(chain, spin) / chain.viscous_friction:.2f}" for spin in SPINS)]
+        )
     print("Joint friction in units of β where joints swing about rest")
     print(table(["", *(f"{spin:g} rad/s" for spin in SPINS)], rows))
 
 
 def show_ring(speed: float, angles: Array, numbers: Array) -> None:
     """Modes of the ring: exact, simulation, straight chain, continuous ring, string."""
-    waves = ring_waves(CHAIN, LINKS, speed, numbers)
-    spin = ring_spin(CHAIN, LINKS, speed)
+    waves = dispersion.ring_waves(CHAIN, LINKS, speed, numbers)
+    spin = dispersion.ring_spin(CHAIN, LINKS, speed)
     exact, found = waves.rate[:, BOTH], measured(angles, waves, numbers, BOTH)
     string = 1j * spin * np.stack([numbers, -numbers * (numbers**2 - 3.0) / (numbers**2 + 1)], axis=1)
     known = {
         "exact": exact,
         "simulated": found,
-        "straight": straight_waves(CHAIN, DENSITY * speed**2, waves.phase).rate[:, BOTH],
-        "continuous": continuous_ring(CHAIN, LINKS, speed, numbers),
+        "straight": dispersion.straight_waves(CHAIN, DENSITY * speed**2, waves.phase).rate[:, BOTH],
+        "continuous": dispersion.continuous_ring(CHAIN, LINKS, speed, numbers),
         "string": string,
     }
     rows = []
@@ -261,7 +251,7 @@ def show_ring(speed: float, angles: Array, numbers: Array) -> None:
 
 def packets(links: int, number: int, width: float, speed: float) -> list[tuple[float, float]]:
     """Prints speeds and damping of two packets; returns their mean phases and speeds in the room in units of v."""
-    waves = ring_waves(CHAIN, links, speed, np.arange(2, links // 4 + 1))
+    waves = dispersion.ring_waves(CHAIN, links, speed, np.arange(2, links // 4 + 1))
     place, quickest = from_tap(links), waves.group_speed[number - 2, LOWER_FORWARD]
     times = np.linspace(0.17, 0.3, 41) * links / quickest
     envelope = np.exp(-(place**2) / (2 * width**2))
@@ -296,8 +286,8 @@ def draw(speed: float, angles: Array, numbers: Array, room: list[tuple[float, fl
     """Frequency, damping and speed in the room against the phase per link."""
     tension = DENSITY * speed**2
     phases = np.linspace(0.02, np.pi / 2, 300)
-    rubbing, smooth = (straight_waves(chain, tension, phases) for chain in (CHAIN, SMOOTH))
-    gap = [edge / 2 / np.pi for edge in band_gap(CHAIN, tension)]
+    rubbing, smooth = (dispersion.straight_waves(chain, tension, phases) for chain in (CHAIN, SMOOTH))
+    gap = [edge / 2 / np.pi for edge in dispersion.band_gap(CHAIN, tension)]
     figure = Figure(figsize=(11.0, 4.0), layout="constrained")
     left, middle, right = figure.subplots(1, 3)
     left.axhspan(*gap, color=GROUND, linewidth=0.0)
@@ -314,7 +304,7 @@ def draw(speed: float, angles: Array, numbers: Array, room: list[tuple[float, fl
         (CHAIN, angles, numbers, BOTH, "", None),
         (SMOOTH, rung, np.arange(2, LINKS // 4 + 1), list(range(4)), ", β/100", "none"),
     ):
-        waves = ring_waves(chain, LINKS, speed, shown)
+        waves = dispersion.ring_waves(chain, LINKS, speed, shown)
         for rates, column in zip(measured(motion, waves, shown, columns).T, columns, strict=True):
             slow, lower = column in (LOWER_BACKWARD, UPPER_BACKWARD), column in BOTH
             place = waves.phase if lower else np.pi - waves.phase
@@ -328,11 +318,11 @@ def draw(speed: float, angles: Array, numbers: Array, room: list[tuple[float, fl
     left.legend(frameon=False, fontsize="small", loc="upper left", **title)
     for wavelength in WAVELENGTHS:
         phase = 2 * np.pi / wavelength
-        one = straight_waves(CHAIN, tension, [phase])
+        one = dispersion.straight_waves(CHAIN, tension, [phase])
         text = f"{wavelength:.0f} links:\nreach {one.reach[0, LOWER_FORWARD]:.0f}"
         way = {"xytext": (26, -6), "textcoords": "offset points", "arrowprops": {"arrowstyle": "-", "color": FAINT}}
         middle.annotate(text, (phase, one.damping[0, LOWER_FORWARD]), fontsize="small", **way)
-    ring = ring_waves(CHAIN, 180, speed, np.arange(2, 46))
+    ring = dispersion.ring_waves(CHAIN, 180, speed, np.arange(2, 46))
     for waves, dashes, label in ((ring, "-", "ring of 180 links"), (rubbing, ":", "straight chain")):
         for column, colour in zip(BOTH, (BLUE, RED), strict=True):
             value = 1 + waves.group_speed[:, column] * LENGTH / speed
