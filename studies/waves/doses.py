@@ -12,7 +12,7 @@ import numpy as np
 import typer
 
 from studies.common import Array, minus, over_cells, publish, read_columns, run_study, table, write_rows
-from studies.waves.drag import CELLS, HALVES, RATES, SAMPLES, SEEDS, VARIANTS
+from studies.waves.drag import CELLS, RATES, SAMPLES, SEEDS, VARIANTS
 
 FOLDER: Final = Path(__file__).parent
 RESULTS: Final = FOLDER / "results" / "doses.csv"
@@ -25,7 +25,7 @@ def reduced(files: Sequence[Path]) -> Iterator[dict[str, object]]:
         if f"dx{cell}" not in arrays:
             continue
         dx = arrays[f"dx{cell}"]
-        for k, variant in enumerate(VARIANTS):
+        for k, (when, rate) in enumerate(VARIANTS):
             for number, seed in enumerate(("both", *SEEDS)):
                 chosen = slice(None) if number == 0 else slice((number - 1) * SAMPLES, number * SAMPLES)
                 walks, plain = dx[k, chosen], dx[0, chosen]
@@ -34,8 +34,8 @@ def reduced(files: Sequence[Path]) -> Iterator[dict[str, object]]:
                 yield {
                     "links": links,
                     "frequency": frequency,
-                    "when": variant.when,
-                    "rate": f"{variant.rate:g}",
+                    "when": when,
+                    "rate": f"{rate:g}",
                     "seeds": seed,
                     "pairs": int(both.sum()),
                     "dx": f"{walks[both].mean():.5g}",
@@ -60,14 +60,13 @@ def _changes_table(drags: Sequence[tuple[str, float]]) -> str:
     return table(["links, Hz", *(f"{rate:g}/s {when}" for when, rate in drags)], lines)
 
 
-ALWAYS: Final = [("always", rate) for rate in RATES]
-PARTLY: Final = [(when, rate) for when in ("in flight", "in impacts") for rate in HALVES]
+ALWAYS, PARTLY = VARIANTS[2 : 2 + len(RATES)], VARIANTS[2 + len(RATES) :]
 
 
 def summary_table() -> str:
     """Each drag over the cells: mean, root mean square less errors, significant cells, agreement of the two seeds."""
     lines = []
-    for when, rate in [("always", 1e-9), *ALWAYS, *PARTLY]:
+    for when, rate in VARIANTS[1:]:
         values, errors = changes(when, rate)
         (one, one_error), (two, two_error) = (changes(when, rate, str(seed)) for seed in SEEDS)
         chi2 = over_cells(one - two, np.hypot(one_error, two_error)).chi2

@@ -8,7 +8,6 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -34,32 +33,15 @@ NEAR: Final = 1e-3
 """A chain whose lowest circle is nearer to the floor than this [m] is in an impact."""
 
 
-@dataclass(frozen=True)
-class Variant:
-    """A drag: at which rate [1/s] fast waves die of it, and whether it acts in flight and in impacts."""
-
-    rate: float
-    in_flight: bool = True
-    in_impacts: bool = True
-
-    @property
-    def when(self) -> str:
-        """In words."""
-        if self.in_flight and self.in_impacts:
-            return "always"
-        return "in flight" if self.in_flight else "in impacts"
-
-
+WHEN: Final = {"always": (True, True), "in flight": (True, False), "in impacts": (False, True)}
+"""Whether a drag acts in flight, and in impacts."""
 RATES: Final = (10.0, 25.0, 50.0, 100.0, 250.0, 1000.0)
 HALVES: Final = (10.0, 50.0, 250.0)
 VARIANTS: Final = (
-    Variant(0.0),
-    Variant(1e-9),
-    *(Variant(rate) for rate in RATES),
-    *(Variant(rate, in_impacts=False) for rate in HALVES),
-    *(Variant(rate, in_flight=False) for rate in HALVES),
+    *(("always", rate) for rate in (0.0, 1e-9, *RATES)),
+    *((when, rate) for when in ("in flight", "in impacts") for rate in HALVES),
 )
-"""The first is none at all, the second changes the bits and nothing else."""
+"""Drags: when they act, and at which rate [1/s] fast waves die; the second changes the bits and nothing else."""
 
 NAMES: Final = ("position", "velocity", "numbers")
 """Arrays of a release."""
@@ -115,8 +97,8 @@ class Loops:
         self._length = np.array([each.link_length for each in parameters] * copies)
         self._radius = np.array([each.circle_radius for each in parameters] * copies)
         self._inertia = np.tile([inertia_of(position.shape[1], each) for each in parameters], (copies, 1, 1))
-        self._rate = np.array([each.rate for each in VARIANTS])[self._variant]
-        self._acts = np.array([(each.in_flight, each.in_impacts) for each in VARIANTS])[self._variant]
+        self._rate = np.array([rate for _, rate in VARIANTS])[self._variant]
+        self._acts = np.array([WHEN[when] for when, _ in VARIANTS])[self._variant]
         self._least = np.full(len(self._variant), position.shape[1] / LONGEST)
 
     def walk(self) -> dict[str, Array]:
