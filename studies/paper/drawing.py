@@ -107,8 +107,8 @@ def _draw_effects(axes: Axes, known: Mapping[str, Sequence[tuple[float, Effect]]
             height = y + rng.uniform(-0.25, 0.25, len(relative))
             for chosen, color in ((sign == 0, PALE), (sign > 0, BLUE), (sign < 0, RED)):
                 axes.plot(relative[chosen], height[chosen], ".", color=color, markersize=4, alpha=0.6, linewidth=0)
-            mean = float(np.clip(effect.mean, -REACH, REACH))
-            axes.errorbar(mean, y, xerr=effect.width, fmt="|", color=INK, markersize=9)
+            mean = float(np.clip(effect.cells.mean, -REACH, REACH))
+            axes.errorbar(mean, y, xerr=1.96 * effect.cells.error, fmt="|", color=INK, markersize=9)
             places.append(y)
             shortest = re.sub(r"e\+?(-?)0*(?=\d)", r"e\1", f"{value:.6g}")  # 1e-6 and not 1e-06
             texts.append(f"{symbol_of(name)} = {shortest}")

@@ -48,7 +48,7 @@ def plain(value: float) -> str:
 
 def over(effect: Effect) -> str:
     """Mean effect over the cells with its interval."""
-    return percent(effect.mean, effect.width)
+    return percent(effect.cells.mean, 1.96 * effect.cells.error)
 
 
 def of_start(numbers: Numbers, start: str, name: str) -> Any:
@@ -132,7 +132,7 @@ def moderate(numbers: Numbers) -> Found:
 
 def underestimate(numbers: Numbers) -> Found:
     """From rest, long chains walk less far than as an ellipse."""
-    return rising(ellipse(numbers), {"ratio": 1 + ellipse(numbers).mean})
+    return rising(ellipse(numbers), {"ratio": 1 + ellipse(numbers).cells.mean})
 
 
 def self_collision(numbers: Numbers) -> Found:
@@ -156,9 +156,16 @@ def cause(numbers: Numbers) -> Found:
         for links, each in zip(content["cells"]["links"], content["strands"]["starts"]["rest"], strict=True)
         if "early_over_late" in each and links >= LONG - 30
     ]
-    words = {"rest": over(rest), "control": over(control), "further": plain(further.mean), "early": ", ".join(early)}
+    words = {
+        "rest": over(rest),
+        "control": over(control),
+        "further": plain(further.cells.mean),
+        "early": ", ".join(early),
+    }
     words |= {"band": f"{tried[0]:g} to {tried[-1]:g} Hz", "there": plain(there.mean())}
-    closes = Verdict.AGREES if rest.mean - control.mean >= bounds().most * further.mean else Verdict.PART
+    closes = (
+        Verdict.AGREES if rest.cells.mean - control.cells.mean >= bounds().most * further.cells.mean else Verdict.PART
+    )
     verdict, words = rising(rest, words)
     return together([verdict, closes]), words
 
@@ -222,7 +229,7 @@ def floor_friction(numbers: Numbers) -> Found:
 def collapse(numbers: Numbers) -> Found:
     """Longer links lose their loop after fewer bounces."""
     verdict, words = monotonic(numbers, "link_length", steps(numbers["paper_claims"]["collapse"]), -1)
-    lengths = (f"{value:g}: {percent(effect.mean)}" for value, effect in steps(effects(numbers)["link_length"]))
+    lengths = (f"{value:g}: {percent(effect.cells.mean)}" for value, effect in steps(effects(numbers)["link_length"]))
     return verdict, {**words, "distances": ", ".join(lengths)}
 
 
@@ -254,7 +261,7 @@ def small(kind_and_names: str) -> Check:
 
     def check(numbers: Numbers) -> Found:
         known = {name: [effect for _, effect in steps(effects(numbers)[name])] for name in names}
-        greatest = {name: max(found, key=lambda each: abs(each.mean)) for name, found in known.items()}
+        greatest = {name: max(found, key=lambda each: abs(each.cells.mean)) for name, found in known.items()}
         worst, bound = (f"{SYMBOLS[name]} {over(effect)}" for name, effect in greatest.items()), getattr(bounds(), kind)
         every = [effect for found in known.values() for effect in found]
         sizes, widths = (

@@ -68,16 +68,6 @@ class Effect:
         return len(self.cells)
 
     @property
-    def mean(self) -> float:
-        """Mean of the relative effects of the cells."""
-        return self.cells.mean
-
-    @property
-    def width(self) -> float:
-        """Half of its 95 % interval, from the errors of the cells."""
-        return 1.96 * self.cells.error
-
-    @property
     def rises(self) -> int:
         """Number of cells with a significant rise."""
         return int((self.sign[self.known] > 0).sum())
