@@ -11,12 +11,9 @@ cells their mean and χ², scatter and bounces; and how exact either is.
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 import warpchain
-from studies.common import of_cells, over_cells, run_study
-
-Array = NDArray[np.float64]
+from studies.common import Array, of_cells, over_cells, run_study
 
 LENGTHS: Final = ("penetration_floor", "penetration_self", "penetration_sprocket", "greatest_opening")
 

@@ -7,28 +7,15 @@ The three loops of the figure are walked anew, in some seconds of a CPU.
 """
 
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import warpchain
-from studies.common import (
-    DISTANCE,
-    LINE_COLORS,
-    RED,
-    error_line,
-    mean_where,
-    of_cells,
-    publish,
-    run_study,
-    table,
-    tidy,
-)
-
-Block = Any
-"""A block of `warpchain.SweepResult.blocks` with the axes links, perhaps frequency, and charm_mass."""
+from studies import common
+from studies.common import DISTANCE, LINE_COLORS, RED, Array, Block
 
 FOLDER: Final = Path(__file__).parent
 TIMES: Final = (0.0, 0.04, 0.08, 0.16, 0.32)
@@ -40,15 +27,15 @@ DRAWN: Final = (0.0, 0.02, 0.1)
 def distances(block: Block) -> str:
     """Δx with its errors, duration, bounces and share at rest of each cell, in Markdown."""
     cells, rest = block.statistics(), block.columns["status"] == warpchain.Status.AT_REST
-    time, bounces = (mean_where(rest, block.columns[name]) for name in ("walk_time", "bounces"))
+    time, bounces = (common.mean_where(rest, block.columns[name]) for name in ("walk_time", "bounces"))
     rows = []
-    for place, values in of_cells(block):
+    for place, values in common.of_cells(block):
         numbers = f"{cells.mean[place]:.3f} ± {cells.standard_error[place]:.3f}", f"{cells.sd[place]:.3f}"
         shown = (*numbers, f"{time[place]:.2f}", f"{bounces[place]:.1f}") if rest[place].any() else ("–",) * 4
         cell = *(f"{value:g}" for value in values[:-1]), f"{1e3 * values[-1]:g}"
         rows.append((*cell, *shown, f"{rest[place].mean():.0%}"))
     names = [name.replace("frequency", "ν / Hz") for name in block.axes][:-1]
-    return table((*names, "charm / g", "Δx / m", "σ / m", "t / s", "bounces", "at rest"), rows)
+    return common.table((*names, "charm / g", "Δx / m", "σ / m", "t / s", "bounces", "at rest"), rows)
 
 
 def draw_distances(panel: Axes, block: Block) -> None:
@@ -57,15 +44,13 @@ def draw_distances(panel: Axes, block: Block) -> None:
     for number, place in enumerate(np.ndindex(cells.mean.shape[:-1])):
         values = [block.axes[name][index] for name, index in zip(("links", "frequency"), place, strict=True)]
         label = "$n$ = {:g}, {:g} Hz".format(*values)
-        error_line(panel, masses, cells, place, color=LINE_COLORS[number], label=label)
-    panel.set_xlabel("mass of the charm / g")
-    panel.set_ylabel(DISTANCE)
-    panel.set_ylim(0, 1.3 * panel.get_ylim()[1])
+        common.error_line(panel, masses, cells, place, color=LINE_COLORS[number], label=label)
     panel.legend(frameon=False, fontsize="small")
-    tidy(panel, grid="both")
+    top = 1.3 * panel.get_ylim()[1]
+    common.tidy(panel, grid="both", xlabel="mass of the charm / g", ylabel=DISTANCE, ylim=(0, top))
 
 
-def draw_loops(panels: np.ndarray, links: int = 60, frequency: float = 15.0) -> None:
+def draw_loops(panels: Array, links: int = 60, frequency: float = 15.0) -> None:
     """The loop with three charms at the same moments, a panel for each charm, which is a dot."""
     for panel, mass in zip(panels, DRAWN, strict=True):
         scene = {"start": "ellipse", "links": links, "frequency": frequency, "charm_mass": mass}
@@ -78,27 +63,20 @@ def draw_loops(panels: np.ndarray, links: int = 60, frequency: float = 15.0) -> 
             panel.plot(*closed[:2].mean(axis=0), "o", color=RED, markersize=4 if mass else 2)
             panel.annotate(f"{moment:g} s", (0.3 * number, -0.06), ha="center", fontsize="x-small")
         panel.axhline(0.0, color="black", linewidth=0.8)
-        panel.set_title(f"charm of {1e3 * mass:g} g", loc="left", fontsize="medium")
-        panel.set_aspect("equal")
-        panel.set_xlim(-0.2, 0.3 * len(TIMES) - 0.1)
-        panel.set_ylim(-0.07, 0.5)
+        limits = {"xlim": (-0.2, 0.3 * len(TIMES) - 0.1), "ylim": (-0.07, 0.5)}
+        common.tidy(panel, f"charm of {1e3 * mass:g} g", aspect="equal", **limits)
         panel.set_axis_off()
 
 
-def draw(blocks: dict[str, Block]) -> Figure:
-    """Distances on the left, loops on the right."""
+def main(folder: str) -> None:
+    """Write the tables into the page and draw the figure: distances on the left, loops on the right."""
+    blocks = warpchain.load(folder).blocks
     figure = Figure(figsize=(9.2, 4.2), layout="constrained")
     left, right = figure.subfigures(1, 2, width_ratios=(1, 1.25))
     draw_distances(left.subplots(), blocks["ellipse"])
     draw_loops(right.subplots(len(DRAWN), 1))
-    return figure
-
-
-def main(folder: str) -> None:
-    """Write the tables into the page and draw the figure."""
-    blocks = warpchain.load(folder).blocks
-    publish(FOLDER, {name: distances(block) for name, block in blocks.items()}, {"charm": draw(blocks)})
+    common.publish(FOLDER, {name: distances(block) for name, block in blocks.items()}, {"charm": figure})
 
 
 if __name__ == "__main__":
-    run_study(main)
+    common.run_study(main)

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from studies.common import publish, run_study, table
 from studies.films.calibration import CAMERA, Calibration, Wanted, calibrate, set_of_films
@@ -80,16 +79,12 @@ def calibration_rows(found: Calibration) -> Iterator[str]:
 
 def pitfalls_table(bank: films.Bank, truths: films.Bank) -> str:
     """Coverage of 95 % intervals with one error of the camera at twice its σ, allowed for or not."""
-
-    def one(place: int, size: float) -> NDArray[np.float64]:
-        return np.eye(8)[place] * size
-
     errors = {
         "none": (np.zeros(8), 0.0),
-        "floor 1 mm too low": (one(1, 1e-3), 0.0),
-        "scale 0.5 %": (one(0, 5e-3), 0.0),
-        "axis of the sprocket 1 mm off": (one(2, 1e-3), 0.0),
-        "camera rolled by 0.3°": (one(3, 5.2e-3), 0.0),
+        "floor 1 mm too low": (1e-3 * np.eye(8)[1], 0.0),
+        "scale 0.5 %": (5e-3 * np.eye(8)[0], 0.0),
+        "axis of the sprocket 1 mm off": (1e-3 * np.eye(8)[2], 0.0),
+        "camera rolled by 0.3°": (5.2e-3 * np.eye(8)[3], 0.0),
         "release 4 ms off": (np.zeros(8), 4e-3),
     }
     rows = []
@@ -132,21 +127,12 @@ def main(banks: Path) -> None:
         for kind, hidden in truths.items()
         for name, wanted in SETS.items()
     }
-    head = ("films", *SYMBOLS.values(), "refused")
+    rows = {key: (*calibration_rows(each), percent(each.refused)) for key, each in found.items()}
+    head, others = ("films", *SYMBOLS.values(), "refused"), {key: row for key, row in rows.items() if key[0] != "same"}
     tables = {
         "experiments": experiments_table(beside(bank, long)),
-        "calibration": table(
-            head,
-            [(name, *calibration_rows(found["same", name]), percent(found["same", name].refused)) for name in SETS],
-        ),
-        "other chains": table(
-            ("truth", *head),
-            [
-                (kind, name, *calibration_rows(each), percent(each.refused))
-                for (kind, name), each in found.items()
-                if kind != "same"
-            ],
-        ),
+        "calibration": table(head, ((name, *rows["same", name]) for name in SETS)),
+        "other chains": table(("truth", *head), ((*key, *row) for key, row in others.items())),
         "pitfalls": pitfalls_table(bank, truths["same"]),
         "lines": lines_table(
             {"film_bank": bank, "film_bank_90": long} | {kind: each for kind, each in truths.items() if kind != "same"}

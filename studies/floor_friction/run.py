@@ -7,18 +7,13 @@ The numbers are printed, the figure is written beside the page.
 """
 
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 import warpchain
-from studies.common import DISTANCE, LINE_COLORS, error_line, mean_where, publish, run_study, table, tidy
-
-Array = NDArray[np.float64]
-Block = Any
-"""A block of `warpchain.SweepResult.blocks` with the axes links, frequency and floor_friction."""
+from studies.common import DISTANCE, LINE_COLORS, Array, Block, error_line, mean_where, publish, run_study, table, tidy
 
 FOLDER: Final = Path(__file__).parent
 
@@ -54,9 +49,8 @@ def draw(blocks: dict[str, Block]) -> Figure:
                 error_line(panel, friction, cells, (row, column), color=color, linestyle=style, label=label)
             if column == len(panels) - 1:
                 panel.plot([], [], style, color="black", linewidth=1, label=name)
-        panel.set_title(f"$ν$ = {axes_of['frequency'][column]:g} Hz", loc="left", fontsize="medium")
         panel.set_ylim(bottom=0)
-        tidy(panel, grid="both")
+        tidy(panel, f"$ν$ = {axes_of['frequency'][column]:g} Hz", grid="both")
     panels[0].set_ylabel(DISTANCE)
     figure.supxlabel("friction of the floor $μ_\\mathrm{fc}$", fontsize="medium")
     figure.legend(*panels[-1].get_legend_handles_labels(), loc="outside right upper", frameon=False, fontsize="small")

@@ -9,10 +9,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from studies.common import read_rows
+from studies.common import minus, read_columns
 from studies.paper.figure5 import RESULTS as FIGURE5
-from studies.paper.statistics import Effect, exceeding, within
-from studies.paper.verdicts import Verdict, bounds, direction, share, smallness, together
+from studies.paper.statistics import Effect
+from studies.paper.verdicts import Verdict, bounds, direction, share, together
 from studies.waves import directions, doses
 
 Numbers = Mapping[str, Any]
@@ -38,8 +38,7 @@ def percent(value: float, half_width: float | None = None, *, sign: bool = True)
         digits, end = 0 if width >= 2 else 1 if width >= 0.2 else 2, " ± {:.{}f}"
     else:
         digits, end = 0 if abs(number) >= 10 else 1, ""
-    text = f"{number:+.{digits}f}" if sign else f"{number:.{digits}f}"
-    return f"{text.replace('-', '−')}{end.format(width, digits)} %"
+    return minus(f"{number:{'+' if sign else ''}.{digits}f}") + f"{end.format(width, digits)} %"
 
 
 def plain(value: float) -> str:
@@ -49,12 +48,12 @@ def plain(value: float) -> str:
 
 def over(effect: Effect) -> str:
     """Mean effect over the cells with its interval."""
-    return percent(effect.mean, effect.width)
+    return percent(effect.cells.mean, 1.96 * effect.cells.error)
 
 
 def of_start(numbers: Numbers, start: str, name: str) -> Any:
     """A table (links, frequencies) of chains that began so."""
-    return np.array(numbers["paper_claims"]["starts"][start][name], np.float64)
+    return np.array(numbers["paper_claims"]["starts"][start][name], float)
 
 
 def long_chains(numbers: Numbers) -> slice:
@@ -78,6 +77,11 @@ def ellipse(numbers: Numbers) -> Effect:
     return dict(steps(effects(numbers)["start"]))["ellipse"][long_chains(numbers)]
 
 
+def rising(effect: Effect, words: Mapping[str, object]) -> Found:
+    """A claim that an effect is a rise; its words, and the effect as `found`."""
+    return direction(effect.rises, effect.falls, effect.count), {**words, "found": effect}
+
+
 def bounces(numbers: Numbers) -> Found:
     """Chains bounce."""
     table = of_start(numbers, "rest", "bounces")
@@ -89,10 +93,9 @@ def bounces(numbers: Numbers) -> Found:
 def shape(numbers: Numbers) -> Found:
     """A loop that rises again keeps its shape in its first impact."""
     found = numbers["paper_shapes"]["impacts"]
-    names = ("area", "height", "width")
-    kept = [found[f"{name}_of_walks"] for name in names]
-    inside, count, without = [each["within_a_tenth"] for each in kept], found["walks"], found["without"]
-    medians = (f"{name} {percent(each['quantiles'][1])}" for name, each in zip(names, kept, strict=True))
+    kept = {name: found[f"{name}_of_walks"] for name in ("area", "height", "width")}
+    inside, count, without = [each["within_a_tenth"] for each in kept.values()], found["walks"], found["without"]
+    medians = (f"{name} {percent(each['quantiles'][1])}" for name, each in kept.items())
     words = {"walks": count, "medians": ", ".join(medians), "inside": ", ".join(map(str, inside)), "without": without}
     words |= {"every": count + without, "of_all": ", ".join(plain(each / (count + without)) for each in inside)}
     return together([share(each, total) for each in inside for total in (count, count + without)]), words
@@ -103,16 +106,15 @@ def speed(numbers: Numbers) -> Found:
     found = numbers["paper_shapes"]["impacts"]
     of_walks, count, without = found["speed_of_walks"], found["walks"], found["without"]
     slightly = of_walks["falls_by_less_than_a_fifth"]
-    low, median, high = map(percent, of_walks["quantiles"])
-    words = {"low": low, "median": median, "high": high, "slightly": slightly, "walks": count, "without": without}
+    words = dict(zip(("low", "median", "high"), map(percent, of_walks["quantiles"]), strict=True))
+    words |= {"slightly": slightly, "walks": count, "without": without}
     words |= {"rises": count - of_walks["falls"], "of_all": plain(slightly / (count + without))}
     return together([share(slightly, total) for total in (count, count + without)]), words
 
 
 def faster(numbers: Numbers) -> Found:
     """Δx rises with the frequency."""
-    found = Effect.of(numbers["paper_claims"]["starts"]["rest"]["faster"])
-    return direction(found.rises, found.falls, found.count), {"found": found}
+    return rising(Effect.of(numbers["paper_claims"]["starts"]["rest"]["faster"]), {})
 
 
 def longer(numbers: Numbers) -> Found:
@@ -130,8 +132,7 @@ def moderate(numbers: Numbers) -> Found:
 
 def underestimate(numbers: Numbers) -> Found:
     """From rest, long chains walk less far than as an ellipse."""
-    found = ellipse(numbers)
-    return direction(found.rises, found.falls, found.count), {"ratio": 1 + found.mean, "found": found}
+    return rising(ellipse(numbers), {"ratio": 1 + ellipse(numbers).cells.mean})
 
 
 def self_collision(numbers: Numbers) -> Found:
@@ -151,39 +152,45 @@ def cause(numbers: Numbers) -> Found:
     there = further.relative[:, np.isin(numbers["paper_claims"]["cells"]["frequency"], tried)]
     content = numbers["paper_strands"]
     early = [
-        f"{links} links {percent(float(effect.relative), float(effect.half_width))}"
+        f"{links} links {percent(each['early_over_late']['relative'], each['early_over_late']['half_width'])}"
         for links, each in zip(content["cells"]["links"], content["strands"]["starts"]["rest"], strict=True)
         if "early_over_late" in each and links >= LONG - 30
-        for effect in (Effect.of(each["early_over_late"]),)
     ]
-    words = {"rest": over(rest), "found": rest, "control": over(control), "further": plain(further.mean)}
-    words |= {"band": f"{tried[0]:g} to {tried[-1]:g} Hz", "there": plain(there.mean()), "early": ", ".join(early)}
-    closes = Verdict.AGREES if rest.mean - control.mean >= bounds().most * further.mean else Verdict.PART
-    return together([direction(rest.rises, rest.falls, rest.count), closes]), words
+    words = {
+        "rest": over(rest),
+        "control": over(control),
+        "further": plain(further.cells.mean),
+        "early": ", ".join(early),
+    }
+    words |= {"band": f"{tried[0]:g} to {tried[-1]:g} Hz", "there": plain(there.mean())}
+    closes = (
+        Verdict.AGREES if rest.cells.mean - control.cells.mean >= bounds().most * further.cells.mean else Verdict.PART
+    )
+    verdict, words = rising(rest, words)
+    return together([verdict, closes]), words
 
 
 def losses(numbers: Numbers) -> Found:
     """A chain loses most of its energy in collisions."""
     found, as_ellipse = (
-        {name: np.array(each, np.float64) for name, each in numbers["paper_claims"]["starts"][start]["losses"].items()}
+        {name: np.array(each, float) for name, each in numbers["paper_claims"]["starts"][start]["losses"].items()}
         for start in ("rest", "ellipse")
     )
-    collisions = found["floor"] + found["self_contact"]
+    most = int((found["floor"] + found["self_contact"] > 0.5).sum())
     damped = [
         int((each["floor"] + each["self_contact"] + each["joint_damping"] > each["joint_friction"]).sum())
         for each in (found, as_ellipse)
     ]
     words = {name: plain(np.nanmean(each)) for name, each in found.items()}
-    words |= {"most": int((collisions > 0.5).sum()), "cells": collisions.size, "damped": damped}
-    return share(int((collisions > 0.5).sum()), collisions.size), words
+    words |= {"most": most, "cells": found["floor"].size, "damped": damped}
+    return share(most, found["floor"].size), words
 
 
 def delay(numbers: Numbers) -> Found:
     """Starting as an ellipse delays the meeting of the loop's strands."""
     found = Effect.of(numbers["paper_strands"]["strands"]["delay"])[long_chains(numbers)]
     slower = found.relative[:, np.array(numbers["paper_claims"]["cells"]["frequency"]) <= 20]
-    words = {"mean": over(found), "found": found, "least": percent(slower.min()), "most": percent(slower.max())}
-    return direction(found.rises, found.falls, found.count), words
+    return rising(found, {"mean": over(found), "least": percent(slower.min()), "most": percent(slower.max())})
 
 
 def single_walks(numbers: Numbers) -> Found:
@@ -211,19 +218,18 @@ def floor_friction(numbers: Numbers) -> Found:
     """Δx falls as the friction of the floor grows: for all values, and for those beside Table 1's."""
     content = effects(numbers)["floor_friction"]
     every, reference = steps(content), content["reference"]
-    beside = [end(v for v, _ in every if (v > reference) is above) for end, above in ((max, False), (min, True))]
-    (first, words), (second, near) = (
-        monotonic(numbers, "floor_friction", chosen, -1)
-        for chosen in (every, [(value, effect) for value, effect in every if value in beside])
-    )
-    words = {**words, "verdict": first, "below": beside[0], "above": beside[1], "near": near["counts"]}
+    below = max(value for value, _ in every if value < reference)
+    above = min(value for value, _ in every if value > reference)
+    near = [(value, effect) for value, effect in every if value in (below, above)]
+    (first, words), (second, beside) = (monotonic(numbers, "floor_friction", each, -1) for each in (every, near))
+    words = {**words, "verdict": first, "below": below, "above": above, "near": beside["counts"]}
     return together([first, second]), words
 
 
 def collapse(numbers: Numbers) -> Found:
     """Longer links lose their loop after fewer bounces."""
     verdict, words = monotonic(numbers, "link_length", steps(numbers["paper_claims"]["collapse"]), -1)
-    lengths = (f"{value:g}: {percent(effect.mean)}" for value, effect in steps(effects(numbers)["link_length"]))
+    lengths = (f"{value:g}: {percent(effect.cells.mean)}" for value, effect in steps(effects(numbers)["link_length"]))
     return verdict, {**words, "distances": ", ".join(lengths)}
 
 
@@ -255,22 +261,23 @@ def small(kind_and_names: str) -> Check:
 
     def check(numbers: Numbers) -> Found:
         known = {name: [effect for _, effect in steps(effects(numbers)[name])] for name in names}
-        every = [effect for found in known.values() for effect in found]
-        greatest = {name: max(found, key=lambda each: abs(each.mean)) for name, found in known.items()}
+        greatest = {name: max(found, key=lambda each: abs(each.cells.mean)) for name, found in known.items()}
         worst, bound = (f"{SYMBOLS[name]} {over(effect)}" for name, effect in greatest.items()), getattr(bounds(), kind)
-        above, inside, total = (
-            sum(count(effect, bound) for effect in every)
-            for count in (exceeding, within, lambda effect, bound: effect.count)
+        every = [effect for found in known.values() for effect in found]
+        sizes, widths = (
+            np.concatenate([getattr(effect, each)[effect.known] for effect in every])
+            for each in ("relative", "half_width")
         )
-        words = {"worst": ", ".join(worst), "bound": 100 * bound, "above": above, "inside": inside, "total": total}
-        return smallness(above, total), words
+        above, inside = (int(np.sum(each)) for each in (abs(sizes) - widths > bound, abs(sizes) + widths <= bound))
+        words = {"worst": ", ".join(worst), "bound": 100 * bound, "above": above, "inside": inside, "total": len(sizes)}
+        return share(len(sizes) - above, len(sizes)), words
 
     return check
 
 
 def spread(numbers: Numbers) -> Found:
     """Drawing the release as well spreads Δx further."""
-    found = {name: np.array(table, np.float64) for name, table in numbers["paper_claims"]["spread"].items()}
+    found = {name: np.array(table, float) for name, table in numbers["paper_claims"]["spread"].items()}
     greater = int((found["both"] > found["parameters"]).sum())
     words = {name: plain(np.nanmedian(table)) for name, table in found.items()}
     return share(greater, found["both"].size), words | {"greater": greater, "cells": found["both"].size}
@@ -281,15 +288,14 @@ def waves(numbers: Numbers) -> Found:
 
     Its verdict is set by hand: a drag shows an effect, a small one.
     """
-    rows, given = read_rows(doses.RESULTS), read_rows(directions.RESULTS)
-    drags = [doses.changes(rows, *drag) for drag in (("in flight", 50.0), ("in flight", 250.0), ("always", 50.0))]
-    (values, errors), (nothing, scatter) = drags[0], doses.changes(rows, "always", 1e-9)
+    drags = [doses.changes(*drag) for drag in (("in flight", 50.0), ("in flight", 250.0), ("always", 50.0))]
+    (values, errors), (nothing, scatter) = drags[0], doses.changes("always", 1e-9)
     words: dict[str, object] = {"cells": len(values)}
     words["known"] = [int(np.sum(np.abs(each) > 1.96 * error)) for each, error in drags]
     words["ends"] = [f"{percent(each.min() / 100)} to {percent(each.max() / 100)}" for each, _ in drags]
     words["beyond"] = int(np.sum(np.abs(values - nothing) > 1.96 * np.hypot(errors, scatter)))
     for way in ("fast", "slow"):
-        words[way] = directions.mean_of_cells(*directions.changes(given, way, 0.05)[:2])
+        words[way] = minus(directions.change(way, 0.05).text())
     return Verdict.PART, words
 
 
@@ -297,7 +303,7 @@ def gradual(numbers: Numbers) -> Found:
     """A loop loses its shape gradually: nine of ten take longer than an impact lasts."""
     found = numbers["paper_strands"]["strands"]["loss_of_shape"]["rest"]
     low, median, high = found["seconds"]
-    impact = float(np.nanmedian(np.array(numbers["paper_shapes"]["impacts"]["duration"], np.float64)))
+    impact = float(np.nanmedian(np.array(numbers["paper_shapes"]["impacts"]["duration"], float)))
     words = {"low": low, "median": median, "high": high, "of_walk": plain(found["of_the_walk"][1]), "impact": impact}
     return Verdict.AGREES if low > impact else Verdict.PART if median > impact else Verdict.DIFFERS, words
 
@@ -306,7 +312,7 @@ def nonlinear(numbers: Numbers) -> Found:
     """Linear propagation of the uncertainties fails: linear terms explain less than half of the variance in a cell."""
     texts, fails = [], []
     for start, found in numbers["paper_footnote"]["nonlinear"].items():
-        shares = {name: np.maximum(np.array(each, np.float64), 0.0) for name, each in found.items()}
+        shares = {name: np.maximum(np.array(each, float), 0.0) for name, each in found.items()}
         linear, squares, products, repeated = (plain(np.median(each)) for each in shares.values())
         least = shares["linear"]
         texts.append(
@@ -320,13 +326,12 @@ def nonlinear(numbers: Numbers) -> Found:
 
 def figure5_shape(numbers: Numbers) -> Found:
     """Curves of other cells bounce, change v_x in impacts only, and do not turn back."""
-    found = read_rows(FIGURE5)
-    alike = sum(
-        int(row["rises"]) > 0 and float(row["changes_in_impacts"]) > 0.9 and float(row["backwards"]) < 0.1
-        for row in found
-    )
-    without = (f"{row['links']} × {float(row['frequency']):g} Hz" for row in found if row["rises"] == "0")
-    return share(alike, len(found)), {"alike": alike, "cells": len(found), "without": ", ".join(without)}
+    found = read_columns(FIGURE5)
+    alike = int(np.sum((found["rises"] > 0) & (found["changes_in_impacts"] > 0.9) & (found["backwards"] < 0.1)))
+    cells = zip(found["links"], found["frequency"], found["rises"], strict=True)
+    without = (f"{links:g} × {frequency:g} Hz" for links, frequency, rises in cells if rises == 0)
+    words = {"alike": alike, "cells": len(found["rises"]), "without": ", ".join(without)}
+    return share(alike, len(found["rises"])), words
 
 
 def same_distributions(numbers: Numbers) -> Found:

@@ -1,21 +1,17 @@
 """Numbers of further sweeps: strands, what the paper leaves open, rest against long holds, its last sentences."""
 
-from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
 import xarray
-from numpy.typing import NDArray
 from scipy.stats import chi2, ks_2samp
 
-from studies.common import at_rest
-from studies.paper.statistics import Effect, mean, paired, spread, standard_error, unpaired
+from studies.common import DRAWN, Array, Block, at_rest, mean
+from studies.paper.statistics import paired, spread, unpaired
 
-Array = NDArray[np.float64]
 Cells = xarray.DataArray
 """Values of walks at rest, axes links and frequency in front, samples last."""
 Numbers = dict[str, Any]
-Block = Any
 
 EVENTS: Final = {
     "crease": "bounces_before_self_contact",
@@ -26,26 +22,26 @@ EVENTS: Final = {
 CELLS: Final = ("links", "frequency")
 
 
-def plain(effect: Effect) -> Numbers:
-    """An effect as plain numbers."""
-    return {name: np.asarray(getattr(effect, name)).tolist() for name in effect.__dataclass_fields__}
-
-
 def values_of(table: Cells, axis: str, reference: Any) -> list[Numbers]:
     """What each other value on an axis does to a quantity, in pairs with a reference on it."""
     values = table[axis].values.tolist()
     before = table.isel({axis: values.index(reference)})
     return [
-        {"value": value, **plain(paired(table.isel({axis: number}), before))}
+        {"value": value, **paired(table.isel({axis: number}), before).plain}
         for number, value in enumerate(values)
         if value != reference
     ]
 
 
+def extremes(block: Block) -> list[dict[str, float]]:
+    """The greatest and the least tolerance of a block, as places on its axis."""
+    return [{"tolerance": end(block.axes["tolerance"])} for end in (np.max, np.min)]
+
+
 # --- when strands meet ---
 
 
-def endings_by_links(counts: Mapping[str, Cells], distance: Cells) -> list[Numbers]:
+def endings_by_links(counts: dict[str, Cells], distance: Cells) -> list[Numbers]:
     """Of each number of links: after how many bounces loops crease, their strands meet, they collapse; early over late.
 
     Early is a walk whose strands met before its third bounce; walks are taken relative to the means of their cells.
@@ -58,17 +54,17 @@ def endings_by_links(counts: Mapping[str, Cells], distance: Cells) -> list[Numbe
         both = [of_cells[np.isfinite(of_cells) & chosen] for chosen in (early, ~early)]
         content |= {"early": len(both[0]), "late": len(both[1])}
         if min(map(len, both)) > 1:
-            content["early_over_late"] = plain(unpaired(*both))
+            content["early_over_late"] = unpaired(*both).plain
         content["second_by_cell"] = [float((cell[np.isfinite(cell)] == 2).mean()) for cell in met]
-        content["most_frequent"] = [histogram(cell).index(max(histogram(cell))) for cell in met]
+        content["most_frequent"] = [int(np.argmax(histogram(cell))) for cell in met]
         found.append(content)
     return found
 
 
 def histogram(bounces: Array) -> list[int]:
     """Numbers of walks with 0, 1, 2, 3 and more bounces before an event, and of those without the event."""
-    known = bounces[np.isfinite(bounces)]
-    return [*(int((known == number).sum()) for number in range(4)), int((known > 3).sum()), int((known < 0).sum())]
+    known = np.where(bounces < 0, 5, np.minimum(bounces, 4))[np.isfinite(bounces)]
+    return np.bincount(known.astype(int), minlength=6).tolist()
 
 
 def strands(block: Block) -> Numbers:
@@ -84,14 +80,11 @@ def strands(block: Block) -> Numbers:
             name: np.nanquantile(values.sel(start=start), [0.1, 0.5, 0.9]).tolist()
             for name, values in (("seconds", lasts), ("of_the_walk", lasts / duration))
         }
-    delay = plain(paired(met.sel(start="ellipse"), met.sel(start="rest")))
-    return {"starts": starts, "delay": delay, "loss_of_shape": loss}
+    delay = paired(met.sel(start="ellipse"), met.sel(start="rest"))
+    return {"starts": starts, "delay": delay.plain, "loss_of_shape": loss}
 
 
 # --- linear or not ---
-
-DRAWN: Final = "_drawn"
-"""End of the names of columns with what a sample has drawn."""
 
 
 def nonlinear(block: Block) -> Numbers:
@@ -99,13 +92,12 @@ def nonlinear(block: Block) -> Numbers:
 
     Terms are fitted cell by cell. What two walks of a sample share that differ in their tolerance only, is not chaos.
     """
-    loose, tight = (end(block.axes["tolerance"]) for end in (np.max, np.min))
+    loose, tight = extremes(block)
     distance = at_rest(block)
-    names = [name for name in block.columns if name.endswith(DRAWN)]
-    drawn = {name: at_rest(block, name).sel({"tolerance": loose}) for name in names}
+    drawn = {name: at_rest(block, name).sel(loose) for name in block.columns if name.endswith(DRAWN)}
     found: Numbers = {}
     for start in block.axes["start"].tolist():
-        one, two = (distance.sel({"start": start, "tolerance": which}).values for which in (loose, tight))
+        one, two = (distance.sel({"start": start} | which).values for which in (loose, tight))
         shares = {name: np.empty(one.shape[:2]) for name in ("linear", "squares", "products", "repeated")}
         for place in np.ndindex(one.shape[:2]):
             kept = np.isfinite(one[place]) & np.isfinite(two[place])
@@ -185,10 +177,10 @@ def through(block: Block) -> Numbers:
     return {name: values for name, values in found.items() if name != "value"}
 
 
-def left_open(blocks: Mapping[str, Block]) -> Numbers:
+def left_open(*blocks: Block) -> Numbers:
     """What each other choice does to Δx, cell by cell, beside the spread of a walk."""
     found: Numbers = {}
-    for block in blocks.values():
+    for block in blocks:
         (name,) = (axis for axis in block.axes if axis not in CELLS)
         table, reference = at_rest(block), REFERENCES[name]
         here = table.isel({name: block.axes[name].tolist().index(reference)})
@@ -202,40 +194,22 @@ def left_open(blocks: Mapping[str, Block]) -> Numbers:
 
 def rest_and_hold(block: Block) -> Numbers:
     """Differences of Δx between starts, and between holds, over the cells, with χ² of no difference at all."""
-    table = at_rest(block)
-    starts, holds = (block.axes[name].tolist() for name in ("start", "further_hold"))
-    order = [name for name in block.dims if name not in CELLS][:2]
-    if order != ["start", "further_hold"]:
-        raise ValueError(f"axes are {order}; the sweep has start and further_hold")
-    rest, spinning = starts.index("rest"), starts.index("spinning")
-    least, most = int(np.argmin(holds)), int(np.argmax(holds))
+    table, holds = at_rest(block), block.axes["further_hold"]
+    least, most = holds.min(), holds.max()
     pairs = {
-        f"rest, at once, over spinning, {holds[most]:g} s later": (
-            table[:, :, rest, least],
-            table[:, :, spinning, most],
-        ),
-        "rest over spinning, released at once": (table[:, :, rest, least], table[:, :, spinning, least]),
-        f"rest over spinning, both {holds[most]:g} s later": (table[:, :, rest, most], table[:, :, spinning, most]),
-        f"{holds[most]:g} s later over at once, rest": (table[:, :, rest, most], table[:, :, rest, least]),
-        f"{holds[most]:g} s later over at once, spinning": (table[:, :, spinning, most], table[:, :, spinning, least]),
+        f"rest, at once, over spinning, {most:g} s later": (("rest", least), ("spinning", most)),
+        "rest over spinning, released at once": (("rest", least), ("spinning", least)),
+        f"rest over spinning, both {most:g} s later": (("rest", most), ("spinning", most)),
+        f"{most:g} s later over at once, rest": (("rest", most), ("rest", least)),
+        f"{most:g} s later over at once, spinning": (("spinning", most), ("spinning", least)),
     }
-    return {name: compared(paired(*each)) for name, each in pairs.items()}
-
-
-def compared(effect: Effect) -> Numbers:
-    """Mean of the relative effects over the cells with its standard error, and χ² of no effect in any cell."""
-    known = effect.known
-    error = standard_error(effect)[known]
-    relative = effect.relative[known]
-    value = float(np.sum((relative / error) ** 2))
-    return {
-        **plain(effect),
-        "mean": float(relative.mean()),
-        "error": float(np.sqrt(np.sum(error**2)) / len(error)),
-        "chi2": value,
-        "cells": len(relative),
-        "p": float(chi2.sf(value, len(relative))),
-    }
+    found = {}
+    for name, pair in pairs.items():
+        effect = paired(*(table.sel(start=start, further_hold=hold) for start, hold in pair))
+        over = effect.cells
+        summary = {"mean": over.mean, "error": over.error, "chi2": over.chi2, "cells": len(over)}
+        found[name] = {**effect.plain, **summary, "p": float(chi2.sf(over.chi2, len(over)))}
+    return found
 
 
 # --- further sentences ---
@@ -247,21 +221,22 @@ LENGTHS: Final = {"links_of_11_mm": 11.0, "links_of_15_mm": 15.0, "links_of_18_m
 """Blocks with links of other lengths [mm], with the masses and inertias of their length."""
 
 
-def more(blocks: Mapping[str, Block]) -> Numbers:
+def more(*blocks: Block) -> Numbers:
     """Longer links of their mass, sliding with less friction, undamped joints, distributions at both tolerances."""
+    known = {block.name: block for block in blocks}
     lengths = {
         f"{length:g}": {
-            quantity: plain(unpaired(of(blocks[name]), of(blocks[OWN_LENGTH])))
+            quantity: unpaired(of(known[name]), of(known[OWN_LENGTH])).plain
             for quantity, of in (("dx", at_rest), ("until_collapse", until_collapse))
         }
         for name, length in LENGTHS.items()
     }
-    block, sliding = blocks["sliding"], {}
+    block, sliding = known["sliding"], {}
     slid = at_rest(block, "walk_time") - at_rest(block, "collapsed_at")
     for name, table in (("time", slid), ("dx", at_rest(block))):
         for each in values_of(table, "floor_friction", FRICTION):
             sliding.setdefault(f"{each.pop('value'):g}", {})[name] = each
-    undamped = values_of(at_rest(blocks["undamped_joints"]), "joint_damping", DAMPING)
+    undamped = values_of(at_rest(known["undamped_joints"]), "joint_damping", DAMPING)
     return {"lengths": lengths, "sliding": sliding, "undamped": {f"{each.pop('value'):g}": each for each in undamped}}
 
 
@@ -274,11 +249,10 @@ def until_collapse(block: Block) -> Cells:
 def distributions(block: Block) -> list[Numbers]:
     """Of each cell: Δx at both tolerances, and whether it is of one distribution (Kolmogorov and Smirnov)."""
     table, found = at_rest(block), []
-    tolerances = [end(block.axes["tolerance"]) for end in (np.max, np.min)]
-    for i, links in enumerate(block.axes["links"].tolist()):
-        for j, frequency in enumerate(block.axes["frequency"].tolist()):
-            tables = (table[i, j].sel({"tolerance": each}).values for each in tolerances)
-            both = [each[np.isfinite(each)] for each in tables]
+    for links in block.axes["links"].tolist():
+        for frequency in block.axes["frequency"].tolist():
+            cell = table.sel(links=links, frequency=frequency)
+            both = [cell.sel(each).dropna("sample").values for each in extremes(block)]
             test = ks_2samp(*both)
             content = {"links": links, "frequency": frequency}
             content |= {"distance": float(test.statistic), "p": float(test.pvalue)}

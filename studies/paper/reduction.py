@@ -10,53 +10,16 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from studies.common import at_rest
-from studies.paper.further import (
-    CELLS,
-    Cells,
-    distributions,
-    left_open,
-    loops,
-    more,
-    nonlinear,
-    plain,
-    rest_and_hold,
-    same_loops,
-    strands,
-    through,
-    until_collapse,
-    values_of,
-)
-from studies.paper.impacts import Block, impacts
-from studies.paper.statistics import mean, paired, spread, unpaired
+from studies.common import Block, at_rest, deviation, mean
+from studies.paper import further
+from studies.paper.further import CELLS, Cells, Numbers, extremes, until_collapse, values_of
+from studies.paper.impacts import impacts
+from studies.paper.statistics import paired, spread, unpaired
 from warpchain import InputError, Parameters, SweepResult, preset
-
-Array = NDArray[np.float64]
-Numbers = dict[str, Any]
 
 DIGITS: Final = 4
 """Significant digits that are kept."""
-
-WHOLE: Final[dict[str, tuple[str, Callable[[Mapping[str, Block]], Any]]]] = {
-    "paper_tolerance": ("tolerance", lambda blocks: tolerance(blocks["main"])),
-    "paper_shapes": ("impacts", lambda blocks: first_impacts(blocks["main"])),
-    "paper_strands": ("strands", lambda blocks: strands(blocks["start"])),
-    "paper_through": ("through", lambda blocks: through(blocks["main"])),
-    "paper_through_ellipse": ("through", lambda blocks: through(blocks["main"])),
-    "paper_open": ("left_open", left_open),
-    "paper_rest": ("rest_and_hold", lambda blocks: rest_and_hold(blocks["main"])),
-    "paper_loops": ("loops", lambda blocks: loops(blocks["main"])),
-    "paper_held": ("loops", lambda blocks: loops(blocks["main"])),
-    "paper_starts": ("same", lambda blocks: same_loops(blocks["main"])),
-    "paper_footnote": ("nonlinear", lambda blocks: nonlinear(blocks["main"])),
-    "paper_more": ("more", more),
-    "paper_distributions": ("distributions", lambda blocks: distributions(blocks["main"])),
-}
-"""Sweeps that one function reduces: name → key of its numbers, and the function."""
-SWEEPS: Final = ("paper_claims", "paper_joints", *WHOLE)
-"""Sweeps that the page is made of."""
 
 DEFAULTS: Final = {"clearance": 0.01, "phase": 0.0}
 """Scene of a walk that is not told otherwise: height of the release [m] and part of a loop period."""
@@ -86,7 +49,7 @@ def reduced(result: SweepResult) -> Numbers:
             content.setdefault("effects", {})[further[0]] = effects_of(result, block, further[0], at_rest(block))
     if result.name in WHOLE:
         key, reduce = WHOLE[result.name]
-        content[key] = reduce(result.blocks)
+        content[key] = reduce(*result.blocks.values())
     if result.name == "paper_claims":
         block, lengths = (result.blocks[name] for name in ("floor_friction", "link_length"))
         content["starts"], content["friction"] = starts(result.blocks["start"]), friction(block)
@@ -132,10 +95,10 @@ def starts(block: Block) -> Numbers:
         content[start] = {
             "count": here.notnull().sum("sample").values.tolist(),
             "mean": mean(here).tolist(),
-            "sd": (spread(here) * mean(here)).tolist(),
+            "sd": deviation(here).tolist(),
             "bounces": mean(bounces).tolist(),
-            "faster": plain(unpaired(here.values[:, 1:], here.values[:, :-1])),
-            "longer": plain(unpaired(here.values[1:], here.values[:-1])),
+            "faster": unpaired(here.values[:, 1:], here.values[:, :-1]).plain,
+            "longer": unpaired(here.values[1:], here.values[:-1]).plain,
             "losses": {name: share.tolist() for name, share in shares.items()},
         }
     return content
@@ -159,7 +122,7 @@ def spreads(blocks: Mapping[str, Block]) -> Numbers:
 def tolerance(block: Block) -> Numbers:
     """How far walks and means differ at two tolerances."""
     values = block.axes["tolerance"]
-    loose, tight = (at_rest(block).sel({"tolerance": end(values)}).values for end in (np.max, np.min))
+    loose, tight = (at_rest(block).sel(end).values for end in extremes(block))
     single = np.abs(loose / tight - 1)
     single = single[np.isfinite(single)]
     return {
@@ -170,7 +133,7 @@ def tolerance(block: Block) -> Numbers:
         "median": float(np.median(single)),
         "nine_of_ten": float(np.quantile(single, 0.9)),
         "greatest": float(single.max()),
-        "means": plain(paired(loose, tight)),
+        "means": paired(loose, tight).plain,
     }
 
 
@@ -224,3 +187,23 @@ def text_of(content: Mapping[str, Any]) -> str:
     """The numbers as a file: JSON with each list of numbers on one line."""
     text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False)
     return re.sub(r"\[[^\[\]{}]*\]", lambda match: re.sub(r"\s+", " ", match[0]), text) + "\n"
+
+
+WHOLE: Final[dict[str, tuple[str, Callable[..., Any]]]] = {
+    "paper_tolerance": ("tolerance", tolerance),
+    "paper_shapes": ("impacts", first_impacts),
+    "paper_strands": ("strands", further.strands),
+    "paper_through": ("through", further.through),
+    "paper_through_ellipse": ("through", further.through),
+    "paper_open": ("left_open", further.left_open),
+    "paper_rest": ("rest_and_hold", further.rest_and_hold),
+    "paper_loops": ("loops", further.loops),
+    "paper_held": ("loops", further.loops),
+    "paper_starts": ("same", further.same_loops),
+    "paper_footnote": ("nonlinear", further.nonlinear),
+    "paper_more": ("more", further.more),
+    "paper_distributions": ("distributions", further.distributions),
+}
+"""Sweeps that one function reduces, of its blocks: name → key of its numbers, and the function."""
+SWEEPS: Final = ("paper_claims", "paper_joints", *WHOLE)
+"""Sweeps that the page is made of."""

@@ -4,18 +4,16 @@ A cell is a number of links and a frequency. Values have the shape (..., samples
 NaN and take no part; what they leave is counted.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.stats import t
 
-from studies.common import OverCells, over_cells
-
-Array = NDArray[np.float64]
+from studies.common import Array, OverCells, deviation, mean, over_cells, standard_error
 
 CONFIDENCE: Final = 0.95
 """Confidence level of every test and interval."""
@@ -35,45 +33,39 @@ class Effect:
 
     relative: Array
     half_width: Array
-    sign: NDArray[np.int64]
-    pairs: NDArray[np.int64]
+    sign: Array
+    pairs: Array
     lost: int
 
     @classmethod
     def of(cls, content: Mapping[str, Any]) -> "Effect":
         """The effect that `plain` wrote, with its numbers rounded; null stands for NaN."""
-        arrays = {name: np.array(content[name], np.float64) for name in ("relative", "half_width")}
-        arrays |= {name: np.array(content[name], np.int64) for name in ("sign", "pairs")}
-        return cls(**arrays, lost=int(content["lost"]))
+        kinds = {"relative": float, "half_width": float, "sign": int, "pairs": int}
+        return cls(**{name: np.array(content[name], kind) for name, kind in kinds.items()}, lost=int(content["lost"]))
+
+    @property
+    def plain(self) -> dict[str, Any]:
+        """The effect as plain numbers."""
+        return {name: np.asarray(values).tolist() for name, values in vars(self).items() if name != "cells"}
 
     def __getitem__(self, rows: Any) -> "Effect":
         """The effect in some of the cells."""
         return Effect(self.relative[rows], self.half_width[rows], self.sign[rows], self.pairs[rows], self.lost)
 
     @property
-    def known(self) -> NDArray[np.bool_]:
+    def known(self) -> Array:
         """Cells that have an interval."""
         return np.isfinite(self.relative) & np.isfinite(self.half_width)
 
     @cached_property
     def cells(self) -> OverCells:
         """All cells that could be compared together; the interval of their mean says nothing of other cells."""
-        return over_cells(self.relative, standard_error(self))
+        return over_cells(self.relative, self.half_width / _factor(self.pairs - 1))
 
     @property
     def count(self) -> int:
         """Number of cells that could be compared."""
         return len(self.cells)
-
-    @property
-    def mean(self) -> float:
-        """Mean of the relative effects of the cells."""
-        return self.cells.mean
-
-    @property
-    def width(self) -> float:
-        """Half of its 95 % interval, from the errors of the cells."""
-        return 1.96 * self.cells.error
 
     @property
     def rises(self) -> int:
@@ -92,85 +84,46 @@ def paired(values: ArrayLike, reference: ArrayLike) -> Effect:
     The sign is that of a t test of the mean difference; the interval of the ratio of the means follows from its
     linearisation.
     """
-    values, reference = np.asarray(values), np.asarray(reference)
     both = np.isfinite(values) & np.isfinite(reference)
+    after, before = (np.where(both, each, np.nan) for each in (values, reference))
     pairs = both.sum(axis=-1)
-    after, before = (mean(np.where(both, each, np.nan)) for each in (values, reference))
-    with np.errstate(invalid="ignore", divide="ignore"):
-        ratio = after / before
-        error = _standard_error(np.where(both, values - reference, np.nan))
-        left = np.where(both, values - ratio[..., np.newaxis] * reference, np.nan)
-        ratio_error = _standard_error(left) / np.abs(before)
-    return _effect(after - before, error, ratio, ratio_error, pairs - 1, pairs, int((~both).sum()))
+
+    def error_of(ratio: Any) -> Any:
+        return standard_error(after - np.expand_dims(ratio, -1) * before)
+
+    return _effect(after, before, error_of, pairs - 1, pairs, int((~both).sum()))
 
 
+@np.errstate(invalid="ignore", divide="ignore")
 def unpaired(values: ArrayLike, reference: ArrayLike) -> Effect:
     """Compare independent samples by Welch's t test."""
     both = np.asarray(values), np.asarray(reference)
-    (after, before), counts = map(mean, both), [np.isfinite(each).sum(axis=-1) for each in both]
-    (after_error, before_error), pairs = map(_standard_error, both), np.minimum(*counts)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        error = np.hypot(after_error, before_error)
-        freedom = error**4 / (after_error**4 / (counts[0] - 1) + before_error**4 / (counts[1] - 1))
-        ratio = after / before
-        ratio_error = np.hypot(after_error, ratio * before_error) / np.abs(before)
-    freedom = np.where(error == 0, pairs - 1.0, freedom)
-    lost = sum(int((~np.isfinite(each)).sum()) for each in both)
-    return _effect(after - before, error, ratio, ratio_error, freedom, pairs, lost)
+    errors, counts = [standard_error(each) for each in both], [np.isfinite(each).sum(axis=-1) for each in both]
+
+    def error_of(ratio: Any) -> Any:
+        return np.hypot(errors[0], ratio * errors[1])
+
+    pairs = np.minimum(*counts)
+    parts = (error**4 / (count - 1) for error, count in zip(errors, counts, strict=True))
+    freedom = np.where(error_of(1.0) == 0, pairs - 1.0, error_of(1.0) ** 4 / sum(parts))
+    return _effect(*both, error_of, freedom, pairs, sum(int((~np.isfinite(each)).sum()) for each in both))
 
 
+@np.errstate(invalid="ignore", divide="ignore")
 def _effect(
-    change: Array, error: Array, ratio: Array, ratio_error: Array, freedom: Any, pairs: NDArray[np.int64], lost: int
+    after: Array, before: Array, error_of: Callable[[Any], Any], freedom: Array, pairs: Array, lost: int
 ) -> Effect:
-    """An effect from a change and a ratio of means with their standard errors."""
-    factor = _factor(freedom)
-    with np.errstate(invalid="ignore"):
-        sign = np.where(np.abs(change) > factor * error, np.sign(np.nan_to_num(change)), 0).astype(np.int64)
-    return Effect(np.where(pairs > 1, ratio - 1, np.nan), factor * ratio_error, sign, pairs, lost)
-
-
-def standard_error(effect: Effect) -> Array:
-    """Standard errors of the relative effects of paired comparisons."""
-    return effect.half_width / _factor(effect.pairs - 1)
-
-
-def exceeding(effect: Effect, bound: float) -> int:
-    """Number of cells whose effect is greater than a bound, up or down, with its whole interval."""
-    known = effect.known
-    return int((np.abs(effect.relative[known]) - effect.half_width[known] > bound).sum())
-
-
-def within(effect: Effect, bound: float) -> int:
-    """Number of cells whose effect is within a bound, up and down, with its whole interval."""
-    known = effect.known
-    return int((np.abs(effect.relative[known]) + effect.half_width[known] <= bound).sum())
-
-
-def mean(values: ArrayLike) -> Array:
-    """Mean over the samples of each cell, shape (...,); NaN without a walk."""
-    values = np.asarray(values)
-    there = np.isfinite(values)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        means: Array = np.where(there, values, 0.0).sum(axis=-1) / there.sum(axis=-1)
-    return means
+    """An effect; `error_of` gives the standard error of the mean after the change less a ratio times that before it."""
+    means = mean(after), mean(before)
+    ratio, change, factor = means[0] / means[1], means[0] - means[1], _factor(freedom)
+    sign = np.where(np.abs(change) > factor * error_of(1.0), np.sign(np.nan_to_num(change)), 0).astype(np.int64)
+    half_width = factor * error_of(ratio) / np.abs(means[1])
+    return Effect(np.where(pairs > 1, ratio - 1, np.nan), half_width, sign, pairs, lost)
 
 
 def spread(values: ArrayLike) -> Array:
     """Standard deviation of a walk over the mean of its cell, shape (...,); NaN with fewer than two walks."""
-    values = np.asarray(values)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        relative: Array = _standard_error(values) * np.sqrt(np.isfinite(values).sum(axis=-1)) / mean(values)
-    return relative
-
-
-def _standard_error(values: Array) -> Array:
-    """Standard error of the mean of the values that are there; NaN with fewer than two."""
-    there = np.isfinite(values)
-    count = there.sum(axis=-1)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        deviation = np.where(there, np.where(there, values, 0.0) - mean(values)[..., np.newaxis], 0.0)
-        error: Array = np.sqrt((deviation**2).sum(axis=-1) / (count - 1) / count)
-    return np.where(count > 1, error, np.nan)
+    return np.asarray(deviation(values) / mean(values))
 
 
 def _factor(freedom: Any) -> Array:

@@ -5,18 +5,14 @@ python -m studies.slopes.run slopes
 """
 
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 import warpchain
-from studies.common import DISTANCE, LINE_COLORS, error_line, mean_where, of_cells, publish, run_study, table, tidy
-
-Array = NDArray[np.float64]
-Block = Any
-"""A block of `warpchain.SweepResult.blocks`."""
+from studies import common
+from studies.common import DISTANCE, LINE_COLORS, Array, Block
 
 FOLDER: Final = Path(__file__).parent
 LIMIT: Final = 20.0
@@ -36,16 +32,16 @@ def rows(block: Block) -> str:
     cells, share, collapse = block.statistics(), share_without_end(block), block.columns["collapsed_at"]
     endless = block.columns["status"] == warpchain.Status.DISTANCE_LIMIT
     speed, collapsed = (
-        mean_where(endless, LIMIT / block.columns["walk_time"]),
-        mean_where(~np.isnan(collapse), collapse),
+        common.mean_where(endless, LIMIT / block.columns["walk_time"]),
+        common.mean_where(~np.isnan(collapse), collapse),
     )
     names = [*block.axes, "Δx / m", "±", "without end", "their speed / (m/s)", "collapse / s"]
     lines = []
-    for place, values in of_cells(block):
+    for place, values in common.of_cells(block):
         numbers = [f"{number:.3f}" for number in (cells.mean[place], cells.standard_error[place])]
         numbers += [f"{share[place]:.0%}", f"{speed[place]:.2f}", f"{collapsed[place]:.2f}"]
         lines.append([*(f"{value:g}" for value in values), *(text.replace("nan", "–") for text in numbers)])
-    return table(names, lines)
+    return common.table(names, lines)
 
 
 def draw(block: Block) -> Figure:
@@ -57,21 +53,21 @@ def draw(block: Block) -> Figure:
         for column, frequency in enumerate(block.axes["frequency"]):
             style = {"color": LINE_COLORS[column], "linestyle": dashes, "linewidth": 1.2}
             label = f"$n$ = {links:g}, $ν$ = {frequency:g} Hz"
-            error_line(distance, slope, cells, (row, column), label=label, **style)
+            common.error_line(distance, slope, cells, (row, column), label=label, **style)
             share.plot(slope, share_without_end(block)[row, column], **style)
     distance.set(yscale="log", ylabel=DISTANCE)
     distance.legend(frameon=False, fontsize="small")
     share.set(ylabel="share\nwithout end", xlabel="slope / °, positive downhill")
     for panel in (distance, share):
-        tidy(panel, grid="both")
+        common.tidy(panel, grid="both")
     return figure
 
 
 def main(folder: str) -> None:
     """Write the tables of all blocks into the page and draw the slopes."""
     blocks = warpchain.load(folder).blocks
-    publish(FOLDER, {name: rows(block) for name, block in blocks.items()}, {"slopes": draw(blocks["slope"])})
+    common.publish(FOLDER, {name: rows(block) for name, block in blocks.items()}, {"slopes": draw(blocks["slope"])})
 
 
 if __name__ == "__main__":
-    run_study(main)
+    common.run_study(main)

@@ -6,20 +6,17 @@
 `studies.waves.doses` makes the tables of the page from drag.npz.
 """
 
-import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
+import typer
 
 import warpchain
+from studies.common import Array, run_study
 from studies.waves.wave_drag import distances, drag_waves, inertia_of
-
-Array = NDArray[np.float64]
 
 CELLS: Final = tuple((links, frequency) for links in (60, 90, 120, 180) for frequency in (15.0, 20.0, 25.0, 30.0))
 SEEDS: Final = (1000, 2000)
@@ -36,32 +33,15 @@ NEAR: Final = 1e-3
 """A chain whose lowest circle is nearer to the floor than this [m] is in an impact."""
 
 
-@dataclass(frozen=True)
-class Variant:
-    """A drag: at which rate [1/s] fast waves die of it, and whether it acts in flight and in impacts."""
-
-    rate: float
-    in_flight: bool = True
-    in_impacts: bool = True
-
-    @property
-    def when(self) -> str:
-        """In words."""
-        if self.in_flight and self.in_impacts:
-            return "always"
-        return "in flight" if self.in_flight else "in impacts"
-
-
+WHEN: Final = {"always": (True, True), "in flight": (True, False), "in impacts": (False, True)}
+"""Whether a drag acts in flight, and in impacts."""
 RATES: Final = (10.0, 25.0, 50.0, 100.0, 250.0, 1000.0)
 HALVES: Final = (10.0, 50.0, 250.0)
 VARIANTS: Final = (
-    Variant(0.0),
-    Variant(1e-9),
-    *(Variant(rate) for rate in RATES),
-    *(Variant(rate, in_impacts=False) for rate in HALVES),
-    *(Variant(rate, in_flight=False) for rate in HALVES),
+    *(("always", rate) for rate in (0.0, 1e-9, *RATES)),
+    *((when, rate) for when in ("in flight", "in impacts") for rate in HALVES),
 )
-"""The first is none at all, the second changes the bits and nothing else."""
+"""Drags: when they act, and at which rate [1/s] fast waves die; the second changes the bits and nothing else."""
 
 NAMES: Final = ("position", "velocity", "numbers")
 """Arrays of a release."""
@@ -117,8 +97,8 @@ class Loops:
         self._length = np.array([each.link_length for each in parameters] * copies)
         self._radius = np.array([each.circle_radius for each in parameters] * copies)
         self._inertia = np.tile([inertia_of(position.shape[1], each) for each in parameters], (copies, 1, 1))
-        self._rate = np.array([each.rate for each in VARIANTS])[self._variant]
-        self._acts = np.array([(each.in_flight, each.in_impacts) for each in VARIANTS])[self._variant]
+        self._rate = np.array([rate for _, rate in VARIANTS])[self._variant]
+        self._acts = np.array([WHEN[when] for when, _ in VARIANTS])[self._variant]
         self._least = np.full(len(self._variant), position.shape[1] / LONGEST)
 
     def walk(self) -> dict[str, Array]:
@@ -144,7 +124,7 @@ class Loops:
         found = {"dx": distances(chains, self._inertia), "lost_at": lost_at, "dragged_for": dragged_for}
         return {name: values.reshape(len(VARIANTS), -1) for name, values in found.items()}
 
-    def _drag(self, looping: NDArray[np.int64], position: Array, velocity: Array) -> NDArray[np.bool_]:
+    def _drag(self, looping: Array, position: Array, velocity: Array) -> Array:
         """Apply the drag to these chains, where it acts now; returns where it does."""
         half = 0.5 * self._length[looping, None] * np.abs(np.sin(position[..., 2]))
         gap = np.min(position[..., 1] - half, axis=1) - self._radius[looping]
@@ -164,7 +144,12 @@ def areas(position: Array) -> Array:
     return np.abs(0.5 * np.sum(x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1), axis=1))
 
 
-def walk(releases: Path, out: Path, device: str = "cpu", only: int | None = None) -> None:
+def walk(
+    releases: Path,
+    out: Path,
+    device: Annotated[str, typer.Argument()] = "cpu",
+    only: Annotated[int | None, typer.Argument()] = None,
+) -> None:
     """Walk on from all releases with every variant, or those of so many links; arrays (variants, releases) by cell."""
     states = np.load(releases)
     found: dict[str, Any] = {}
@@ -180,16 +165,5 @@ def walk(releases: Path, out: Path, device: str = "cpu", only: int | None = None
             print(f"{links} links at {frequency:g} Hz: {time.perf_counter() - begun:.0f} s", flush=True)
 
 
-def main(arguments: list[str]) -> None:
-    """Release, or walk."""
-    match arguments:
-        case ["release", path]:
-            release(Path(path))
-        case ["walk", releases, out, *device]:
-            walk(Path(releases), Path(out), *device[:1], *map(int, device[1:]))
-        case _:
-            sys.exit("give release FILE.npz, or walk RELEASES.npz FILE.npz [cpu|cuda [LINKS]]")
-
-
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    run_study(release, walk)

@@ -12,11 +12,9 @@ The drag is an experiment, no physics of the chain: with it one asks whether the
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studies.common import Array
 from warpchain import Chains, Parameters, Status
-
-Array = NDArray[np.float64]
 
 TWELFTH: Final = 1.0 / 12.0
 """A link is a chord: its direction is that of the path at its middle less this share of the second difference of θ."""

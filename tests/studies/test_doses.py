@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import warpchain
-from studies.common import read_rows, with_tables
+from studies.common import with_tables
 from studies.waves import directions, doses, drag, sprocket_tap
 from studies.waves.wave_drag import inertia_of
 
@@ -25,8 +25,7 @@ def test_a_drag_acts_when_it_should(monkeypatch: pytest.MonkeyPatch) -> None:
     """In flight and in impacts add up to always, but for chaos; none at all is dragged for no time."""
     monkeypatch.setattr(drag, "LATEST", 0.2)
     monkeypatch.setattr(drag, "END", 0.21)
-    whole, flight, impacts = (drag.Variant(50.0, *when) for when in ((True, True), (True, False), (False, True)))
-    monkeypatch.setattr(drag, "VARIANTS", (drag.Variant(0.0), whole, flight, impacts))
+    monkeypatch.setattr(drag, "VARIANTS", (("always", 0.0), *((when, 50.0) for when in drag.WHEN)))
     position, velocity, parameters = drag.released(60, 15.0, 7)
     found = drag.Loops(position[None], velocity[None], [parameters], "cpu").walk()["dragged_for"][:, 0]
     assert found[0] == 0 and found[1] == pytest.approx(0.2)
@@ -36,7 +35,7 @@ def test_a_drag_acts_when_it_should(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_page_has_the_tables_of_the_files() -> None:
     """They are rendered from the committed rows."""
     page = (doses.FOLDER / "README.md").read_text(encoding="utf-8")
-    tables = doses.tables(read_rows(doses.RESULTS)) | {"directions": directions.summary(read_rows(directions.RESULTS))}
+    tables = doses.tables() | {"directions": directions.summary()}
     assert with_tables(page, tables) == page, "out of date; run python -m studies.waves.doses, and directions"
 
 

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studies.common import save_figure
 from studies.films import calibration, drawing, hidden, run
 from tests.support.made_films import films_of, made_bank
 from warpchain import films
@@ -52,9 +51,9 @@ def test_tables_and_figures_are_made(banks: tuple[films.Bank, films.Bank], tmp_p
         "| made | 60/20 |",
     ]
     found = calibration.calibrate(bank, truths, run.SETS["1 film: 20 Hz"])
-    save_figure(drawing.coverage_figure({"1 film": found}), tmp_path / "coverage.png")
+    drawing.coverage_figure({"1 film": found}).savefig(tmp_path / "coverage.png")
     answer = bank.posterior(films_of(bank, 0, 1, films.Camera(), 0)[:1])
-    save_figure(drawing.corner(answer, dict(zip(answer.names, answer.mean, strict=True))), tmp_path / "corner.png")
+    drawing.corner(answer).savefig(tmp_path / "corner.png")
     assert min(path.stat().st_size for path in tmp_path.iterdir()) > 10_000
 
 

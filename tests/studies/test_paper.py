@@ -124,8 +124,8 @@ def test_the_page_is_made_of_the_committed_numbers(tmp_path: Path) -> None:
     (tmp_path / "results").mkdir()
     shutil.copy(run.FOLDER / run.RESULTS, tmp_path / run.RESULTS)
     run.make([], tmp_path)
-    page = (run.FOLDER / run.PAGE).read_text(encoding="utf-8")
-    assert (tmp_path / run.PAGE).read_text(encoding="utf-8") == page, "run python -m studies.paper.run"
+    page = (run.FOLDER / "README.md").read_text(encoding="utf-8")
+    assert (tmp_path / "README.md").read_text(encoding="utf-8") == page, "run python -m studies.paper.run"
     drawn = {path.stem for path in (tmp_path / "figures").iterdir()}
     assert drawn == {"distances", "effects", "friction", "strands"}
     with pytest.raises((InputError, OSError)):

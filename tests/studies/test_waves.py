@@ -14,8 +14,7 @@ from studies.waves.dispersion import (
     ring_waves,
     straight_waves,
 )
-from studies.waves.mode_fit import fit_rates, mode_amplitudes
-from studies.waves.tapped_ring import tapped_ring
+from studies.waves.rings import fit_rates, from_tap, mode_amplitudes, tapped_ring
 from tests.oracle_model.motion_equations import acceleration, friction_torque
 from warpchain import Status, preset
 
@@ -133,11 +132,6 @@ def tapped(links, spins, times, parameters=SOFT):
     turned = ring_spin(parameters, links, SPEED) * times[:, None]
     angles: np.ndarray = motion.position[:, :, 2] - position[:, 2] - turned
     return angles
-
-
-def from_tap(links):
-    """Number of each link, counted from link 0 in both directions, (n,)."""
-    return (np.arange(links) + links / 2) % links - links / 2
 
 
 def test_modes_of_a_tapped_ring():
