@@ -21,7 +21,6 @@ import warp as wp
 from warpchain.kernels import layout
 from warpchain.kernels.cpu.implicit import rigid_layout as at
 from warpchain.kernels.cpu.implicit.rigid_layout import BASE, COSINE, FREE, INVERSE_INERTIA, INVERSE_MASS, SINE, SPIN
-from warpchain.kernels.cpu.implicit.rigid_layout import FORCE, RATE, pad_behind, pad_joints
 from warpchain.kernels.cpu.implicit.solver import cyclic_solver, end_column, link_at, segment_places
 from warpchain.kernels.layout import STAGES, X
 from warpchain.kernels.physics.elementary import HALF, ONE, ZERO, cos_sin, order_bits
@@ -66,7 +65,7 @@ def load(S: Rows, K: Rows, chain: Chain):
             S[at.MASS + k, c] = K[layout.MASS + k, i]
         S[at.COUNTED, c] = wp.where(is_copy, ZERO, ONE)
         c += 1
-    pad_behind(S, INVERSE_MASS, 2, chain)
+    at.pad_behind(S, INVERSE_MASS, 2, chain)
 
 
 @wp.func
@@ -86,7 +85,7 @@ def store(S: Rows, K: Rows, chain: Chain):
 def factorise(S: Rows, chain: Chain):
     """Assembles and factorises the matrix S for the present directions."""
     a = chain.half_length
-    pad_behind(S, SPIN, 3, chain)
+    at.pad_behind(S, SPIN, 3, chain)
     c = int(8)
     while c < end_column(chain):
         m_left = S[INVERSE_MASS, c]
@@ -107,7 +106,7 @@ def solve_joints(S: Rows, chain: Chain):
     """Solves with the last factors; the solution replaces the right-hand side."""
     places, full = segment_places(chain.link_count)
     solve(S, places, full)
-    pad_joints(S, RIGHT, 2, chain)
+    at.pad_joints(S, RIGHT, 2, chain)
 
 
 @wp.func
@@ -140,12 +139,12 @@ def solve_forces(S: Rows, chain: Chain):
         spin = S[SPIN, c] - S[SPIN, c + 8]
         S[at.TORQUE, c] = friction_torque(S[at.VISCOUS, c], S[at.COULOMB, c], spin, S[at.INVERSE_SMOOTHING, c])
         c += 1
-    pad_joints(S, at.TORQUE, 1, chain)
+    at.pad_joints(S, at.TORQUE, 1, chain)
     c = int(8)
     while c < end_column(chain):
         S[FREE, c] = (S[at.TORQUE, c - 8] - S[at.TORQUE, c]) * S[INVERSE_INERTIA, c]
         c += 1
-    pad_behind(S, FREE, 1, chain)
+    at.pad_behind(S, FREE, 1, chain)
     c = int(8)
     while c < end_column(chain):
         rx, ry = inward_pull(S[COSINE, c], S[SINE, c], S[SPIN, c], S[FREE, c])
@@ -157,7 +156,7 @@ def solve_forces(S: Rows, chain: Chain):
     while c < end_column(chain):
         pushed = pushed_at(S, a, c)
         load_x, load_y, load_turn = link_load(chain, c, Link(), S[INVERSE_MASS, c], S[INVERSE_INERTIA, c])
-        put(S, RATE, c, wp.vec3d(pushed[0] + load_x, pushed[1] + load_y, S[FREE, c] + (pushed[2] + load_turn)))
+        put(S, at.RATE, c, wp.vec3d(pushed[0] + load_x, pushed[1] + load_y, S[FREE, c] + (pushed[2] + load_turn)))
         c += 1
 
 
@@ -170,8 +169,8 @@ def openings(S: Rows, chain: Chain):
         cosine, sine = cos_sin(S[BASE + 2, c])
         put(S, SPIN, c, wp.vec3d(S[BASE + 5, c], cosine, sine))
         c += 1
-    pad_behind(S, SPIN, 3, chain)
-    pad_behind(S, BASE, 2, chain)
+    at.pad_behind(S, SPIN, 3, chain)
+    at.pad_behind(S, BASE, 2, chain)
     greatest = wp.int64(0)
     c = int(8)
     while c < end_column(chain):
@@ -187,7 +186,7 @@ def openings(S: Rows, chain: Chain):
 def opening_rates(S: Rows, chain: Chain):
     """Sets the right-hand side to Ċ."""
     a = chain.half_length
-    pad_behind(S, BASE + 3, 3, chain)
+    at.pad_behind(S, BASE + 3, 3, chain)
     c = int(8)
     while c < end_column(chain):
         turn_x = S[SPIN, c] * S[SINE, c] + S[SPIN, c + 8] * S[SINE, c + 8]
@@ -221,8 +220,8 @@ def begin(S: Rows, chain: Chain):
     solve_forces(S, chain)
     c = int(8)
     while c < end_column(chain):
-        put(S, FORCE, c, wp.vec2d(S[RIGHT, c], S[RIGHT + 1, c]))
-        put(S, at.BASE_RATE, c, three(S, RATE, c))
+        put(S, at.FORCE, c, wp.vec2d(S[RIGHT, c], S[RIGHT + 1, c]))
+        put(S, at.BASE_RATE, c, three(S, at.RATE, c))
         c += 1
 
 
@@ -246,8 +245,8 @@ def are_stiff(S: Rows, chain: Chain):
     square = ZERO
     c = int(8)
     while c < end_column(chain):
-        fx = S[FORCE, c]
-        fy = S[FORCE + 1, c]
+        fx = S[at.FORCE, c]
+        fy = S[at.FORCE + 1, c]
         square += S[at.COUNTED, c] * (fx * fx + fy * fy)
         c += 1
     held = HALF * square / chain.joint_stiffness
@@ -282,7 +281,7 @@ def closing(columns: int, first_row: int):
         while c < end_column(chain):
             S[SPIN, c] = S[BASE + 5, c]
             c += 1
-        pad_behind(S, SPIN, 3, chain)
+        at.pad_behind(S, SPIN, 3, chain)
         return widest <= CLOSED
 
     return close

@@ -24,13 +24,12 @@ import warp as wp
 
 from warpchain.kernels.cpu.implicit import rigid_layout as at
 from warpchain.kernels.cpu.implicit.rigid import are_stiff, begin, closing, factorise, solve_forces, store
-from warpchain.kernels.cpu.implicit.rigid_layout import BASE, COUPLED, INVERSE_MASS, POWER, RATE, SINE, SLOPE, SPIN, STAGE
-from warpchain.kernels.cpu.implicit.rigid_layout import TARGET, pad_behind, pad_joints
+from warpchain.kernels.cpu.implicit.rigid_layout import BASE, COUPLED, POWER, RATE, SINE, SLOPE, SPIN, STAGE, TARGET
 from warpchain.kernels.cpu.implicit.solver import cyclic_solver, end_column, link_at, segment_places
 from warpchain.kernels.layout import LOST_FRICTION
 from warpchain.kernels.methods.controller import error_bits
 from warpchain.kernels.methods.w_tableaus import COUPLINGS, ERRORS, GAMMA, NODES, STAGES, WEIGHTS
-from warpchain.kernels.physics.elementary import ONE, TWO, ZERO, cos_sin, order_bits
+from warpchain.kernels.physics.elementary import TWO, ZERO, cos_sin, order_bits
 from warpchain.kernels.physics.geometry import put, three
 from warpchain.kernels.physics.rigid_joint import steepness, switch_smoothing
 from warpchain.kernels.types import Chain, Rows
@@ -55,8 +54,8 @@ def prepare(S: Rows, chain: Chain, h: wp.float64):
         put(S, SPIN, c, wp.vec3d(S[BASE + 5, c], cosine, sine))
         S[TARGET, c] = S[at.BASE_RATE + 2, c]
         c += 1
-    pad_behind(S, SPIN, 3, chain)
-    pad_behind(S, TARGET, 1, chain)
+    at.pad_behind(S, SPIN, 3, chain)
+    at.pad_behind(S, TARGET, 1, chain)
     c = int(8)
     while c < end_column(chain):
         inverse = switch_smoothing(chain, h, S[TARGET, c] - S[TARGET, c + 8])
@@ -64,15 +63,15 @@ def prepare(S: Rows, chain: Chain, h: wp.float64):
         S[SLOPE, c] = g * steepness(S[at.VISCOUS, c], S[at.COULOMB, c], S[SPIN, c] - S[SPIN, c + 8], inverse)
         S[POWER, c] = ZERO
         c += 1
-    pad_joints(S, SLOPE, 1, chain)
+    at.pad_joints(S, SLOPE, 1, chain)
     c = int(8)
     while c < end_column(chain):
         tx = -a * S[SINE, c]
         ty = a * S[at.COSINE, c]
         after_tx = -a * S[SINE, c + 8]
         after_ty = a * S[at.COSINE, c + 8]
-        left = S[INVERSE_MASS, c]
-        right = S[INVERSE_MASS, c + 8]
+        left = S[at.INVERSE_MASS, c]
+        right = S[at.INVERSE_MASS, c + 8]
         both = left + right
         before = S[SLOPE, c - 8]
         here = S[SLOPE, c]
@@ -119,20 +118,20 @@ def damp(S: Rows, h: wp.float64, weight: wp.float64, chain: Chain):
         coupled = S[COUPLED + 2, c]
         S[TARGET, c] = h * S[RATE + 2, c] + wp.static(wp.float64(1.0 / GAMMA)) * coupled
         c += 1
-    pad_behind(S, TARGET, 1, chain)
+    at.pad_behind(S, TARGET, 1, chain)
     c = int(8)
     while c < end_column(chain):
         S[at.DRAG, c] = S[SLOPE, c] * (S[TARGET, c] - S[TARGET, c + 8])
         S[POWER, c] = S[POWER, c] + weight * S[at.TORQUE, c] * (S[SPIN, c] - S[SPIN, c + 8])
         c += 1
-    pad_joints(S, at.DRAG, 1, chain)
+    at.pad_joints(S, at.DRAG, 1, chain)
     c = int(8)
     while c < end_column(chain):
         put(S, RIGHT, c, wp.vec3d(ZERO, ZERO, S[at.DRAG, c - 8] - S[at.DRAG, c]))
         c += 1
     places, full = segment_places(chain.link_count)
     solve(S, places, full)
-    pad_joints(S, RIGHT, 2, chain)
+    at.pad_joints(S, RIGHT, 2, chain)
 
 
 @wp.func
@@ -142,7 +141,7 @@ def keep_stage(S: Rows, stage: int, h: wp.float64, chain: Chain):
         if stage == i:
             c = int(8)
             while c < end_column(chain):
-                share = S[INVERSE_MASS, c]
+                share = S[at.INVERSE_MASS, c]
                 ku = h * S[RATE, c] + share * (S[RIGHT, c] - S[RIGHT, c - 8])
                 kv = h * S[RATE + 1, c] + share * (S[RIGHT + 1, c] - S[RIGHT + 1, c - 8])
                 k = wp.vec3d(ku, kv, h * S[RATE + 2, c] + S[RIGHT + 2, c])
