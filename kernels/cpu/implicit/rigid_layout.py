@@ -61,8 +61,10 @@ def pad_behind(S: Rows, row: int, count: int, chain: Chain):
     while s < 8:
         after = (s + 1) % 8
         source = 8 + after + wp.where(after >= full, 8, 0)
-        for k in range(count):
+        k = int(0)
+        while k < count:
             S[row + k, 8 * places + 8 + s] = S[row + k, source]
+            k += 1
         s += 1
 
 
@@ -74,6 +76,8 @@ def pad_joints(S: Rows, row: int, count: int, chain: Chain):
     while s < 8:
         # a short segment repeats the last joint of the segment before; that one's predecessor is copied
         source = 8 * places + (s + 7) % 8 - wp.where(s >= full, 8, 0)
-        for k in range(count):
+        k = int(0)
+        while k < count:
             S[row + k, s] = S[row + k, source]
+            k += 1
         s += 1

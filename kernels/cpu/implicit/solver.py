@@ -86,8 +86,8 @@ def end_column(chain: Chain):
 def link_at(column: int, link_count: int):
     """Link that lies in this column, and whether another column has it, too, and counts."""
     places, full = segment_places(link_count)
-    segment = column % 8
-    row = segment * places + column // 8 - 1 - wp.max(segment + 1 - full, 0)
+    segment = column & 7
+    row = segment * places + (column >> 3) - 1 - wp.max(segment + 1 - full, 0)
     is_copy = (column < 16 and segment >= full) or row >= link_count
     return wp.where(row >= link_count, row - link_count, row), is_copy
 
@@ -133,10 +133,9 @@ def _vectors(layout: SegmentLayout) -> str:
             lanes& operator()(int i, int j) {{ return m[{size} * i + j]; }}
             const lanes& operator()(int i, int j) const {{ return m[{size} * i + j]; }}
         }};
+        lanes* const first = reinterpret_cast<lanes*>(S.data);
         const long next_row = S.shape[1] / {LANES};
-        const auto at_place = [=](int row, int p) {{
-            return reinterpret_cast<lanes*>(S.data) + next_row * row + p;
-        }};
+        const auto at_place = [=](int row, int p) {{ return first + next_row * row + p; }};
         const auto at_separators = [=](int number) {{
             return at_place({layout.separators}, number);
         }};
@@ -271,7 +270,7 @@ def cyclic_solver(layout: SegmentLayout):
     @wp.func_native(f"""
         {vectors}
         submatrix factor;
-        column value = {{}}, first = {{}}, next;
+        column value = {{}}, own = {{}}, next;
         for (int p = 1; p < places; p++) {{
             load(next, at_place({layout.right}, p), next_row);
             if (p == 1)
@@ -282,7 +281,7 @@ def cyclic_solver(layout: SegmentLayout):
             load(factor, at_place({diagonal}, p), next_row);
             add(value, factor, next, 1.0);
             load(factor, at_place({head}, p), next_row);
-            add(first, factor, value, 1.0);
+            add(own, factor, value, 1.0);
             store(value, at_place({layout.right}, p), next_row);
         }}
         load(next, at_place({layout.right}, places), next_row);
@@ -290,7 +289,7 @@ def cyclic_solver(layout: SegmentLayout):
         add(next, factor, value, -1.0);
         value = next;
         load(factor, at_separators({coupling}), 1);
-        add(value, factor, turned(first, 1), -1.0);
+        add(value, factor, turned(own, 1), -1.0);
         #pragma unroll
         for (int r = 0; r < {ROUNDS}; r++) {{
             const column from_before = turned(value, {LANES} - (1 << r)), from_after = turned(value, 1 << r);
