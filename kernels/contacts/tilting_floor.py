@@ -50,29 +50,15 @@ class TiltingLink:
     hits: wp.int64  # impulses
 
 
-@wp.struct
-class CopyInverse:
-    """N A⁻¹, the inverse mass matrix of a copy of the plane, by rows of its upper triangle."""
-
-    b00: wp.float64
-    b01: wp.float64
-    b02: wp.float64
-    b11: wp.float64
-    b12: wp.float64
-    b22: wp.float64
-
-
 @wp.func
-def copy_inverse(P: Row, copies: wp.float64) -> CopyInverse:
-    """The inverse mass matrix of one of so many copies of the plane."""
-    B = CopyInverse()
-    B.b00 = copies * P[layout.INVERSE_00]
-    B.b01 = copies * P[INVERSE_01]
-    B.b02 = copies * P[layout.INVERSE_02]
-    B.b11 = copies * P[INVERSE_11]
-    B.b12 = copies * P[INVERSE_12]
-    B.b22 = copies * P[layout.INVERSE_22]
-    return B
+def copy_inverse(P: Row, copies: wp.float64):
+    """N A⁻¹, the inverse mass matrix of one of so many copies of the plane."""
+    b00 = copies * P[layout.INVERSE_00]
+    b01 = copies * P[INVERSE_01]
+    b02 = copies * P[layout.INVERSE_02]
+    b11 = copies * P[INVERSE_11]
+    b12 = copies * P[INVERSE_12]
+    return wp.mat33d(b00, b01, b02, b01, b11, b12, b02, b12, copies * P[layout.INVERSE_22])
 
 
 @wp.func
@@ -127,7 +113,7 @@ def approaches(
 def meet_roller(
     chain: Chain,
     slope: wp.float64,
-    B: CopyInverse,
+    B: wp.mat33d,
     link: Touching,
     before: TiltingLink,
     circle_x: wp.float64,
@@ -157,12 +143,12 @@ def meet_roller(
     v1 = before.u - before.omega * lever_y + z * before.turn_y - rise * n1
     v2 = before.v + before.omega * lever_x - z * before.turn_x - rise * n2
     v3 = before.plane_speed + before.turn_x * y - before.turn_y * x - rise * n3
-    c0 = B.b00 + B.b01 * y - B.b02 * x
-    c1 = B.b01 + B.b11 * y - B.b12 * x
-    c2 = B.b02 + B.b12 * y - B.b22 * x
-    w11 = inverse_mass + lever_y * lever_y * inverse_inertia + z * z * B.b22
-    w12 = -lever_x * lever_y * inverse_inertia - z * z * B.b12
-    w22 = inverse_mass + lever_x * lever_x * inverse_inertia + z * z * B.b11
+    c0 = B[0, 0] + B[0, 1] * y - B[0, 2] * x
+    c1 = B[0, 1] + B[1, 1] * y - B[1, 2] * x
+    c2 = B[0, 2] + B[1, 2] * y - B[2, 2] * x
+    w11 = inverse_mass + lever_y * lever_y * inverse_inertia + z * z * B[2, 2]
+    w12 = -lever_x * lever_y * inverse_inertia - z * z * B[1, 2]
+    w22 = inverse_mass + lever_x * lever_x * inverse_inertia + z * z * B[1, 1]
     w13 = z * c2
     w23 = -z * c1
     w33 = c0 + y * c1 - x * c2
@@ -206,9 +192,9 @@ def meet_roller(
     after.u = before.u + j1 * inverse_mass
     after.v = before.v + j2 * inverse_mass
     after.omega = before.omega + (lever_x * j2 - lever_y * j1) * inverse_inertia
-    after.plane_speed = before.plane_speed + B.b00 * j3 + B.b01 * q1 + B.b02 * q2
-    after.turn_x = before.turn_x + B.b01 * j3 + B.b11 * q1 + B.b12 * q2
-    after.turn_y = before.turn_y + B.b02 * j3 + B.b12 * q1 + B.b22 * q2
+    after.plane_speed = before.plane_speed + B[0, 0] * j3 + B[0, 1] * q1 + B[0, 2] * q2
+    after.turn_x = before.turn_x + B[0, 1] * j3 + B[1, 1] * q1 + B[1, 2] * q2
+    after.turn_y = before.turn_y + B[0, 2] * j3 + B[1, 2] * q1 + B[2, 2] * q2
     after.push = before.push + j3
     after.moment_x = before.moment_x + q1
     after.moment_y = before.moment_y + q2
@@ -246,7 +232,7 @@ def link_touches(chain: Chain, slope: wp.float64, link: Touching):
 
 
 @wp.func
-def meet_tilting_floor(chain: Chain, slope: wp.float64, B: CopyInverse, link: Touching) -> TiltingLink:
+def meet_tilting_floor(chain: Chain, slope: wp.float64, B: wp.mat33d, link: Touching) -> TiltingLink:
     """One link against the floor, its left roller first, together with its copy of the plane."""
     met = meet_roller(chain, slope, B, link, with_copy(chain, link), link.left_x, link.left_y)
     met = meet_roller(chain, slope, B, link, met, link.right_x, link.right_y)

@@ -22,6 +22,29 @@ from warpchain.kernels.types import Chain, Rows
 
 
 @wp.func
+def write_ends(K: Rows, i: int, x: wp.float64, y: wp.float64, arm_x: wp.float64, arm_y: wp.float64):
+    """End positions of link i."""
+    left_x, left_y, right_x, right_y = end_positions(x, y, arm_x, arm_y)
+    K[layout.LEFT_X, i] = left_x
+    K[layout.LEFT_Y, i] = left_y
+    K[layout.RIGHT_X, i] = right_x
+    K[layout.RIGHT_Y, i] = right_y
+
+
+@wp.func
+def write_motion(K: Rows, i: int, u: wp.float64, v: wp.float64, w: wp.float64, arm_x: wp.float64, arm_y: wp.float64):
+    """Arm, spin and end velocities of link i in a stage."""
+    K[layout.STAGE_ARM_X, i] = arm_x
+    K[layout.STAGE_ARM_Y, i] = arm_y
+    K[layout.STAGE_SPIN, i] = w
+    left_u, left_v, right_u, right_v = end_velocities(u, v, w, arm_x, arm_y)
+    K[layout.LEFT_U, i] = left_u
+    K[layout.LEFT_V, i] = left_v
+    K[layout.RIGHT_U, i] = right_u
+    K[layout.RIGHT_V, i] = right_v
+
+
+@wp.func
 def place_ends(K: Rows, chain: Chain):
     """Directions and end positions of the links, exactly, from the state rows."""
     n = chain.link_count
@@ -32,11 +55,7 @@ def place_ends(K: Rows, chain: Chain):
         c, s = cos_sin(K[layout.THETA, i])
         K[layout.COSINE, i] = c
         K[layout.SINE, i] = s
-        left_x, left_y, right_x, right_y = end_positions(K[X, i], K[Y, i], a * c, a * s)
-        K[layout.LEFT_X, i] = left_x
-        K[layout.LEFT_Y, i] = left_y
-        K[layout.RIGHT_X, i] = right_x
-        K[layout.RIGHT_Y, i] = right_y
+        write_ends(K, i, K[X, i], K[Y, i], a * c, a * s)
         i += 1
     K[layout.LEFT_X, n] = K[layout.LEFT_X, 0]
     K[layout.LEFT_Y, n] = K[layout.LEFT_Y, 0]
@@ -50,17 +69,7 @@ def begin_stages(K: Rows, chain: Chain):
     a = chain.half_length
     i = int(0)
     while i < lanes:
-        arm_x = a * K[layout.COSINE, i]
-        arm_y = a * K[layout.SINE, i]
-        w = K[layout.OMEGA, i]
-        K[layout.STAGE_ARM_X, i] = arm_x
-        K[layout.STAGE_ARM_Y, i] = arm_y
-        K[layout.STAGE_SPIN, i] = w
-        left_u, left_v, right_u, right_v = end_velocities(K[U, i], K[V, i], w, arm_x, arm_y)
-        K[layout.LEFT_U, i] = left_u
-        K[layout.LEFT_V, i] = left_v
-        K[layout.RIGHT_U, i] = right_u
-        K[layout.RIGHT_V, i] = right_v
+        write_motion(K, i, K[U, i], K[V, i], K[layout.OMEGA, i], a * K[layout.COSINE, i], a * K[layout.SINE, i])
         i += 1
     K[layout.LEFT_U, n] = K[layout.LEFT_U, 0]
     K[layout.LEFT_V, n] = K[layout.LEFT_V, 0]
@@ -201,19 +210,8 @@ def explicit_method(tableau: Tableau, tilts: bool = False):
                 u = K[U, i] + h * du
                 v = K[V, i] + h * dv
                 w = K[layout.OMEGA, i] + h * dw
-                K[layout.STAGE_ARM_X, i] = arm_x
-                K[layout.STAGE_ARM_Y, i] = arm_y
-                K[layout.STAGE_SPIN, i] = w
-                left_x, left_y, right_x, right_y = end_positions(x, y, arm_x, arm_y)
-                left_u, left_v, right_u, right_v = end_velocities(u, v, w, arm_x, arm_y)
-                K[layout.LEFT_X, i] = left_x
-                K[layout.LEFT_Y, i] = left_y
-                K[layout.LEFT_U, i] = left_u
-                K[layout.LEFT_V, i] = left_v
-                K[layout.RIGHT_X, i] = right_x
-                K[layout.RIGHT_Y, i] = right_y
-                K[layout.RIGHT_U, i] = right_u
-                K[layout.RIGHT_V, i] = right_v
+                write_ends(K, i, x, y, arm_x, arm_y)
+                write_motion(K, i, u, v, w, arm_x, arm_y)
                 i += 1
             K[layout.LEFT_X, n] = K[layout.LEFT_X, 0]
             K[layout.LEFT_Y, n] = K[layout.LEFT_Y, 0]
@@ -224,36 +222,18 @@ def explicit_method(tableau: Tableau, tilts: bool = False):
         # new state and error ratio
         i = int(0)
         while i < lanes:
-            du, dv, dw, dx, dy, turn = new_state(K, i)
-            eu, ev, ew, ex, ey, et = errors(K, i)
-            u = K[U, i]
-            v = K[V, i]
-            w = K[layout.OMEGA, i]
-            K[layout.NEW_X, i] = K[X, i] + (h * u + hh * dx)
-            K[layout.NEW_Y, i] = K[Y, i] + (h * v + hh * dy)
-            K[layout.NEW_THETA, i] = K[layout.THETA, i] + (h * w + hh * turn)
-            K[layout.NEW_U, i] = u + h * du
-            K[layout.NEW_V, i] = v + h * dv
-            K[layout.NEW_OMEGA, i] = w + h * dw
+            change = new_state(K, i)
+            error = errors(K, i)
             # Take the maximum over components, not the sum. Compare the floats' bits as integers, where NaN is
             # greatest.
-            worst = wp.max(
-                wp.max(
-                    error_bits(hh * ex, K[X, i], u, h),
-                    error_bits(hh * ey, K[Y, i], v, h),
-                ),
-                error_bits(hh * et, K[layout.THETA, i], w, h),
-            )
-            worst = wp.max(
-                worst,
-                wp.max(
-                    wp.max(
-                        error_bits(h * eu, u, K[wp.static(STAGES), i], h),
-                        error_bits(h * ev, v, K[wp.static(STAGES + 1), i], h),
-                    ),
-                    error_bits(h * ew, w, K[wp.static(STAGES + 2), i], h),
-                ),
-            )
+            worst = wp.int64(0)
+            for k in range(3):
+                place = K[X + k, i]
+                rate = K[U + k, i]
+                K[layout.NEW_X + k, i] = place + (h * rate + hh * change[wp.static(3 + k)])
+                K[layout.NEW_U + k, i] = rate + h * change[k]
+                worst = wp.max(worst, error_bits(hh * error[wp.static(3 + k)], place, rate, h))
+                worst = wp.max(worst, error_bits(h * error[k], rate, K[STAGES + k, i], h))
             worst = wp.where(i < n, worst, wp.int64(0))
             K[layout.ERROR, i] = wp.cast(worst, wp.float64) / tolerance  # wp.cast reads the bits back as a float
             i += 1

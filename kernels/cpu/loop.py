@@ -41,20 +41,12 @@ from warpchain.kernels.types import Chain, Control, Drive, Integers, Model, Reco
 def load_state(K: Rows, model: Model, state: State, chain: Chain, world: int):
     """Fills the rows of the state; rows of losses start at zero, columns behind the links are links without mass."""
     i = int(0)
-    while i < chain.link_count:
-        row = int(0)
-        while row < 6:
-            K[row, i] = state.links[world, row, i]
-            row += 1
-        K[layout.LOST_FRICTION, i] = ZERO
-        K[layout.LOST_DAMPING, i] = ZERO
-        K[layout.LOST_FIXED, i] = ZERO
-        i += 1
-    # columns up to whole vectors
     while i < whole_lanes(chain.link_count):
         row = int(0)
         while row < wp.static(layout.STAGES):
             K[row, i] = ZERO
+            if row < 6 and i < chain.link_count:
+                K[row, i] = state.links[world, row, i]
             row += 1
         i += 1
     write_links(K, model, world, state.load_factor[world])

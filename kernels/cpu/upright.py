@@ -6,10 +6,9 @@ from typing import Any
 
 import warp as wp
 
-from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.cpu.contacts.proximity import fixed_contacts
 from warpchain.kernels.cpu.joints import Joints
-from warpchain.kernels.types import Chain, Ground, Row, Rows, State
+from warpchain.kernels.types import Chain, Row, Rows, State
 
 
 @dataclass(frozen=True)
@@ -48,8 +47,4 @@ def upright_plane(fixed_body: str, joints: Joints) -> Plane:
     def end_step(_K: Rows, _P: Row, _chain: Chain, _h: wp.float64):
         return
 
-    @wp.func
-    def meet(K: Rows, _P: Row, chain: Chain, ground: Ground, face: Face):
-        return resolve(K, chain, ground, face)
-
-    return Plane(begin_run, at_start, begin_step, end_step, gap, meet)
+    return Plane(begin_run, at_start, begin_step, end_step, gap, resolve)

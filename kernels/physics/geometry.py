@@ -4,6 +4,8 @@ Scalar functions, one link a call. A link's arm is the vector from its centre of
 length a times its direction (cos θ, sin θ); the left end is at minus the arm.
 """
 
+from typing import Any
+
 import warp as wp
 
 from warpchain.kernels import layout
@@ -53,6 +55,19 @@ def link_is_finite(K: Rows, i: int, rates: int):
         finite = finite and wp.isfinite(K[rates + row, i])
         row += 1
     return finite
+
+
+@wp.func
+def put(rows: Rows, first: int, i: int, values: Any):
+    """Writes a vector's components into column i of consecutive rows."""
+    for k in range(len(values)):
+        rows[first + k, i] = values[k]
+
+
+@wp.func
+def three(rows: Rows, first: int, i: int):
+    """Column i of three consecutive rows."""
+    return wp.vec3d(rows[first, i], rows[first + 1, i], rows[first + 2, i])
 
 
 @wp.func

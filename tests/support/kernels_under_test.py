@@ -107,6 +107,7 @@ def _contact_pass(columns: int) -> wp.Kernel:
         chain.push_rate = push_rate
         block = scratch[world]
         row = lists[world]
+        plane = results[world]  # none of these bodies tilts
         pairs = wp.array(ptr=row.ptr, shape=(wp.static(size),), dtype=wp.int32)
         load_state(block, model, state, chain, world)
         place_ends(block, chain)
@@ -125,10 +126,10 @@ def _contact_pass(columns: int) -> wp.Kernel:
         results[world, 5] = list_slack(block, chain, skin, opening)
         if (parts & 2) != 0:
             results[world, 1] = floor_gap(block, chain, ground, face)
-            results[world, 6] = wp.float64(resolve_floor(block, chain, ground, face))
+            results[world, 6] = wp.float64(resolve_floor(block, plane, chain, ground, face))
         if (parts & 4) != 0:
             results[world, 2] = sprocket_gap(block, chain, ground, face)
-            results[world, 7] = wp.float64(resolve_sprocket(block, chain, ground, face))
+            results[world, 7] = wp.float64(resolve_sprocket(block, plane, chain, ground, face))
         if (parts & 8) != 0:
             hits, strands, lost, depth = resolve_self_contacts(block, pairs, chain, opening)
             results[world, 8] = wp.float64(hits)
@@ -137,7 +138,7 @@ def _contact_pass(columns: int) -> wp.Kernel:
             results[world, 11] = wp.float64(strands)
         if (parts & 16) != 0:
             results[world, 12] = terrain_gap(block, chain, ground, face)
-            results[world, 13] = wp.float64(resolve_terrain(block, chain, ground, face))
+            results[world, 13] = wp.float64(resolve_terrain(block, plane, chain, ground, face))
 
     return contact_pass
 

@@ -14,11 +14,12 @@ from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
+from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.cpu.explicit import place_ends
 from warpchain.kernels.cpu.loop import load_state
 from warpchain.kernels.cpu.tilting import resolve_tilting_floor, tilting_gap, write_plane_sums
 from warpchain.kernels.physics.plane import on_plane
-from warpchain.kernels.types import Model, State
+from warpchain.kernels.types import Ground, Model, State
 from warpchain.status import Status
 
 Array = NDArray[np.float64]
@@ -115,8 +116,8 @@ def _floor_pass(columns: int) -> wp.Kernel:
         load_state(block, model, state, chain, 0)
         place_ends(block, chain)
         write_plane_sums(block, row, chain)
-        results[0] = tilting_gap(block, on_plane(chain, row, 0))
-        results[1] = wp.float64(resolve_tilting_floor(block, row, chain))
+        results[0] = tilting_gap(block, on_plane(chain, row, 0), Ground(), Face())
+        results[1] = wp.float64(resolve_tilting_floor(block, row, chain, Ground(), Face()))
 
     return floor_pass
 

@@ -55,7 +55,7 @@ def body_pass(features: Features, plane: Plane):
             overlap = -sprocket_gap(K, chain, ground, moved)
             if overlap > ZERO:
                 raise_extreme(state, world, layout.SPROCKET_DEPTH, overlap)
-                on_sprocket = resolve_sprocket(K, chain, ground, moved)
+                on_sprocket = resolve_sprocket(K, P, chain, ground, moved)
                 add_count(state, world, layout.SPROCKET_IMPULSES, on_sprocket)
                 impulses += on_sprocket
             gap = wp.min(gap, ZERO)  # the sprocket may come nearer by itself: steps stay short

@@ -37,14 +37,6 @@ def neighbour_list(columns: int):
     lists = list_layout(columns)
 
     @wp.func
-    def remember_positions(K: Rows, chain: Chain):
-        i = int(0)
-        while i < chain.link_count:
-            K[LISTED_X, i] = K[RIGHT_X, i]
-            K[LISTED_Y, i] = K[RIGHT_Y, i]
-            i += 1
-
-    @wp.func
     def arrange(L: Integers, total: int):
         """Sorts the pairs found, (p, q) ascending, by (p mod 2, q mod 2); the sort is stable."""
         kept = int(0)
@@ -67,7 +59,6 @@ def neighbour_list(columns: int):
         n = chain.link_count
         reach = listing_reach(chain, skin, opening)
         square = reach * reach
-        remember_positions(K, chain)
         i = int(0)
         while i < wp.static(lists.table):
             L[wp.static(lists.bucket) + i] = -1
@@ -81,6 +72,8 @@ def neighbour_list(columns: int):
             L[wp.static(lists.cell_y) + i] = cell_y
             L[wp.static(lists.next_joint) + i] = L[wp.static(lists.bucket) + bucket]
             L[wp.static(lists.bucket) + bucket] = i
+            K[LISTED_X, i] = K[RIGHT_X, i]
+            K[LISTED_Y, i] = K[RIGHT_Y, i]
             i += 1
         total = int(0)
         fits = bool(True)

@@ -13,10 +13,11 @@ from warpchain.kernels import layout
 from warpchain.kernels.contacts.fixed_body import BODIES, link_and_body
 from warpchain.kernels.contacts.impulse import Touching
 from warpchain.kernels.contacts.terrain import Face
+from warpchain.kernels.contacts.tilting_floor import greatest_across_speed
 from warpchain.kernels.layout import LEFT_X, LEFT_Y, LOST_FIXED, OMEGA, RADIUS, RIGHT_X, RIGHT_Y, SINE, U, V, X, Y
 from warpchain.kernels.physics.elementary import ONE, TWO, ZERO, from_order_key, order_bits, order_key
 from warpchain.kernels.physics.geometry import LANES, whole_lanes
-from warpchain.kernels.types import Chain, Ground, Rows, with_circles
+from warpchain.kernels.types import Chain, Ground, Row, Rows, with_circles
 
 FURTHEST = wp.constant(wp.int64(2**63 - 1))
 GAP = layout.ERROR
@@ -38,23 +39,27 @@ def greatest_opening(K: Rows, chain: Chain):
 
 @wp.func
 def greatest_speed(K: Rows, chain: Chain):
-    """A bound on the speed [m/s] of every circle's centre: the greatest √2 √(v² + (a ω)²) ≥ |v| + a |ω|."""
+    """A bound on the speed [m/s] of every point of a roller, across the plane, too, if that tilts.
+
+    Within it √2 √(v² + (a ω)²) ≥ |v| + a |ω| bounds that of every circle's centre.
+    """
     greatest = wp.int64(0)
     i = int(0)
     while i < whole_lanes(chain.link_count):
         turn = chain.half_length * K[OMEGA, i]
-        square = TWO * (K[U, i] * K[U, i] + K[V, i] * K[V, i] + turn * turn)
+        across = greatest_across_speed(chain, K[X, i], K[Y, i])
+        square = TWO * (K[U, i] * K[U, i] + K[V, i] * K[V, i] + turn * turn) + across * across
         greatest = wp.max(greatest, wp.where(i < chain.link_count, order_bits(square), wp.int64(0)))
         i += 1
     return wp.sqrt(wp.cast(greatest, wp.float64))
 
 
 @wp.func
-def overlaps(K: Rows, first: int):
-    """Whether a link of the vector that begins at this column overlaps the body."""
+def any_negative(K: Rows, row: int, first: int):
+    """Whether a number of a row is negative in the vector that begins at this column."""
     least = ONE
     for lane in range(wp.static(LANES)):
-        least = wp.min(least, K[GAP, first + lane])
+        least = wp.min(least, K[row, first + lane])
     return least < ZERO
 
 
@@ -88,7 +93,7 @@ def endless_gap(_K: Rows, _chain: Chain, _ground: Ground, _face: Face):
 
 
 @wp.func
-def no_impulses(_K: Rows, _chain: Chain, _ground: Ground, _face: Face):
+def no_impulses(_K: Rows, _P: Row, _chain: Chain, _ground: Ground, _face: Face):
     """The number of impulses of no body."""
     return wp.int64(0)
 
@@ -98,8 +103,8 @@ def fixed_contacts(fixed_body: str):
     """Warp functions of all links and a body: (least gap, resolve).
 
     ``least_gap(K, chain, ground, face)``: the least gap [m] of the placed links, each of which goes to its row.
-    ``resolve(K, chain, ground, face)``: applies the impulses, after the gaps, and returns their number. Few links touch
-    at a time: only vectors with a link that overlaps the body go through the impulse law.
+    ``resolve(K, P, chain, ground, face)``: applies the impulses, after the gaps, and returns their number. Few links
+    touch at a time: only vectors with a link that overlaps the body go through the impulse law.
     """
     if fixed_body == "none":
         return endless_gap, no_impulses
@@ -118,11 +123,11 @@ def fixed_contacts(fixed_body: str):
         return from_order_key(least)
 
     @wp.func
-    def resolve(K: Rows, chain: Chain, ground: Ground, face: Face):
+    def resolve(K: Rows, _P: Row, chain: Chain, ground: Ground, face: Face):
         impulses = wp.int64(0)
         first = int(0)
         while first < whole_lanes(chain.link_count):
-            if overlaps(K, first):
+            if any_negative(K, GAP, first):
                 lane = int(0)
                 while lane < LANES:
                     i = first + lane

@@ -98,7 +98,7 @@ def self_contacts(columns: int):
             p = L[wp.static(lists.found_first) + first + k]
             q = L[wp.static(lists.found_second) + first + k]
             link_a, link_b = links_of(p, q, half, second, chain.link_count)
-            depth, nx, ny, a_n, a_t, b_n, b_t = circles_of_links(
+            contact = circles_of_links(
                 G[a + END_RADIUS, k],
                 G[b + END_RADIUS, k],
                 G[a + END_X, k],
@@ -110,13 +110,9 @@ def self_contacts(columns: int):
                 G[b + CENTER_X, k],
                 G[b + CENTER_Y, k],
             )
-            G[row + DEPTH, k] = wp.where(are_neighbours(link_a, link_b, chain.link_count), ZERO, depth)
-            G[row + NORMAL_X, k] = nx
-            G[row + NORMAL_Y, k] = ny
-            G[row + A_N, k] = a_n
-            G[row + A_T, k] = a_t
-            G[row + B_N, k] = b_n
-            G[row + B_T, k] = b_t
+            G[row + DEPTH, k] = wp.where(are_neighbours(link_a, link_b, chain.link_count), ZERO, contact[DEPTH])
+            for number in range(1, wp.static(B_T + 1)):
+                G[row + number, k] = contact[number]
             k += 1
 
     @wp.func

@@ -13,7 +13,6 @@ from warpchain.kernels.contacts.fixed_body import BODIES
 from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.cpu.contacts.proximity import greatest_speed
-from warpchain.kernels.cpu.tilting import greatest_tilting_speed
 from warpchain.kernels.features import Features
 from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, OMEGA, RADIUS, RIGHT_X, RIGHT_Y, SINE, U, V
 from warpchain.kernels.physics.elementary import HALF, ONE, TWO, ZERO, order_bits
@@ -103,7 +102,6 @@ def step_bound(features: Features, has_flight: bool):
     has_fixed_approach = has_fixed and not BODIES[features.fixed_body].in_cells
     if has_fixed_approach:
         approaching = fastest_approach(features.fixed_body)
-    speed_bound = greatest_tilting_speed if features.tilts else greatest_speed
 
     @wp.func
     def bound(
@@ -135,6 +133,6 @@ def step_bound(features: Features, has_flight: bool):
             distance = wp.min(distance, slack)
         if is_near:
             return longest
-        return wp.max(longest, distance / speed_bound(K, chain))
+        return wp.max(longest, distance / greatest_speed(K, chain))
 
     return bound

@@ -13,7 +13,7 @@ from warpchain.kernels.cpu.joints import Joints, springs
 from warpchain.kernels.events.tallies import book_loss
 from warpchain.kernels.methods.controller import classical_controller
 from warpchain.kernels.methods.method import find_method
-from warpchain.kernels.methods.w_tableaus import ROS34PW2
+from warpchain.kernels.methods.w_tableaus import ERROR_ORDER
 from warpchain.kernels.physics.elementary import ONE, ZERO
 from warpchain.kernels.types import Chain, Control, Rows, State
 
@@ -36,7 +36,7 @@ def rigid_in_flight(name: str, columns: int) -> Joints:
     first_row = layout.scratch_rows(find_method(name).tableau.stages)
     attempt_flight, commit_flight = flight_method(columns, first_row)
     close_joints, open_joints = joint_switch(columns, first_row)
-    growth, shrink = classical_controller(ROS34PW2.error_order)
+    growth, shrink = classical_controller(ERROR_ORDER)
     on_springs = springs(name, tilts=False)
 
     @wp.func
