@@ -12,8 +12,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
-from warpchain.inputs.floor import distances, heights
-from warpchain.inputs.scene import floor_points, link_values
+from warpchain.inputs.scene import link_values
 from warpchain.pictures.style import GROUND, INK
 
 if TYPE_CHECKING:
@@ -112,23 +111,17 @@ def walk_box(walk: "WalkResult", joints: Array) -> tuple[Array, Array]:
 
 def floor_line(walk: "WalkResult", left: float, right: float) -> Array:
     """The floor's profile from one x to another [m], shape (p, 2)."""
-    points = floor_points(walk.setup.scene)
-    inner = np.empty((0, 2)) if points is None else points[(points[:, 0] > left) & (points[:, 0] < right)]
-    ends = np.array([left, right])
-    first, last = np.column_stack([ends, floor_height(walk, ends)])
-    return np.vstack([first, inner, last])
+    return walk.setup.floor.line(left, right)
 
 
 def floor_height(walk: "WalkResult", x: Any) -> Any:
     """Height of the floor at x [m]."""
-    points = floor_points(walk.setup.scene)
-    return 0.0 * x if points is None else heights(points, x)
+    return walk.setup.floor.heights(x)
 
 
 def from_floor(walk: "WalkResult", joints: Array) -> Array:
     """Distance of joints x, y from the floor [m], shape (…, n, 2) → (…, n)."""
-    points = floor_points(walk.setup.scene)
-    return joints[..., 1] if points is None else distances(points, joints.reshape(-1, 2)).reshape(joints.shape[:-1])
+    return walk.setup.floor.distances(joints.reshape(-1, 2)).reshape(joints.shape[:-1])
 
 
 def draw_ground(axes: Axes, line: Array, bottom: float) -> None:
