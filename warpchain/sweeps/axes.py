@@ -91,7 +91,7 @@ def is_axis(name: str, given: object) -> bool:
     if not isinstance(given, dict):
         return isinstance(given, list) and name not in COMPOUND
     try:
-        checked(given, name, Annotated[FIELDS[name].annotation, *FIELDS[name].metadata])
+        checked(given, name, Annotated[FIELDS[name].annotation, Field(), *FIELDS[name].metadata])
     except InputError:
         return True
     return False
