@@ -17,7 +17,7 @@ from warpchain.inputs.distributions import TABLE, Uniform
 from warpchain.inputs.methods import METHODS, METHODS_BY_NEED
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS, Parameters
-from warpchain.inputs.scene import LISTS, Scene
+from warpchain.inputs.scene import COMPOUND, Scene
 from warpchain.inputs.validation import FIELDS, field_limits, field_unit, spelled
 from warpchain.status import Status
 from warpchain.sweeps.designs import SAMPLERS
@@ -177,7 +177,7 @@ def sweep_file_page() -> str:
         "last axis varies fastest. `null` stands for itself where a field may be null, such as `load_factor: [null, "
         "1]`; in merged files, xarray and pandas it is NaN. "
         "Where a value may be a list itself, each has a name, as in `floor: {flat: flat, ramp: [[0, 0], [1, 0.1]]}`: "
-        f"{', '.join(f'`{name}`' for name in LISTS)}.\n"
+        f"{', '.join(f'`{name}`' for name in COMPOUND)}.\n"
         "\n## Distributions\n\nThe key `all` says what is drawn of the other quantities: `table` (the default) or "
         "`fixed`, nothing. Each quantity takes one of `table`, `fixed`, `{uniform: [lower, upper]}` and "
         "`{gaussian: {mean: …, sigma: …}}`; without `mean` the Gaussian lies about the chain's value. Given values, "

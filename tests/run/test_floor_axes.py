@@ -6,12 +6,15 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
 
 import warpchain
 from tests.support.sweep_content import content
-from warpchain.inputs.validation import InputError
+from warpchain.inputs.validation import FIELDS, InputError
 from warpchain.run.sweep_run import sweep_of_keywords
 from warpchain.store.merged_file import merge
+from warpchain.sweeps.axes import is_axis
 from warpchain.sweeps.plan import load_sweep
 
 STEP = [[-1, 0], [0.1, 0], [0.1, -0.05], [1, -0.05]]
@@ -75,6 +78,17 @@ def test_a_sweep_by_keywords_takes_one_floor_or_names_with_floors() -> None:
     assert [scene.link_masses for scene in scenes] == [None, None, (0.02,) * 40, (0.02,) * 40]
     assert [scene.release for scene in scenes] == [None, ((0.1, 0.0, 0.02, 15.0),)] * 2
     assert load_sweep(both.canonical()).digest() == both.digest() != one.digest()
+
+
+def test_a_mapping_that_a_field_takes_is_its_value(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a field whose value may be a mapping, such a one is no axis; names with such mappings are one."""
+
+    class Bowl(BaseModel):
+        radius: float
+
+    monkeypatch.setitem(FIELDS, "floor", FieldInfo.from_annotation(Bowl | str))
+    assert not is_axis("floor", {"radius": 2.0})
+    assert is_axis("floor", {"deep": {"radius": 2.0}, "flat": "flat"}) and is_axis("floor", {"radius": "deep"})
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tests.support.folded_chains import folded_chain
 from tests.support.unlike_links import UnlikeLinks
 from warpchain.engine.batch import Batch
+from warpchain.inputs.floor import Floor, floor_from
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.kernels.contacts.list_layout import list_layout
@@ -27,9 +28,9 @@ HILLS = np.array([[-1.0, -0.002], [-0.02, 0.003], [0.0, -0.001], [0.015, 0.002],
 """Points of a floor with corners of both kinds, which heaps cut."""
 
 
-def common_laws(points: Array, parameters: Parameters | UnlikeLinks) -> Array:
-    """Coefficients of all faces of a profile: those of the parameters."""
-    return np.tile([parameters.floor_restitution, parameters.floor_friction], (len(points) - 1, 1))
+def floor_with(points: Array, parameters: Parameters | UnlikeLinks) -> Floor:
+    """A profile all of whose faces have the coefficients of the parameters."""
+    return floor_from(points.tolist(), 0.0, (parameters.floor_restitution, parameters.floor_friction))
 
 
 @contextmanager

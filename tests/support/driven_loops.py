@@ -10,7 +10,7 @@ from tests.support.setups import setup_walk
 from warpchain.engine.batch import Batch, Recorded
 from warpchain.inputs.link_values import LinkValues
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.scene import contact_radius, loop_speed
+from warpchain.inputs.scene import loop_speed
 from warpchain.inputs.setup import Setup
 from warpchain.kernels import layout
 from warpchain.status import Status
@@ -59,7 +59,7 @@ def hold(
     setup = loop.setup
     scene = setup.scene
     batch = Batch(1, scene.links, setup.options, keeps_samples=True, frame_every=1)
-    batch.set_chain(0, parameters, scene.links, contact_radius(scene, parameters), own)
+    batch.set_chain(0, parameters, scene.links, own, scene)
     softness = 1.0 if setup.options.soften_drive else 0.0
     batch.load(0, loop.position, loop.velocity, stop_time=duration, stop_status=Status.NOT_STEADY, softness=softness)
     batch.set_drive(

@@ -12,11 +12,11 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from tests.support.blocks_under_test import common_laws
+from tests.support.blocks_under_test import floor_with
 from tests.support.unlike_links import UnlikeLinks
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import start_device
-from warpchain.engine.ground import cells_of, faces_of
+from warpchain.inputs.floor import Floor
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
@@ -171,9 +171,9 @@ class ContactPass:
         self.skin, self.sprocket_speed, self.push_rate = skin, sprocket_speed, push_rate
         self.model = model_of([(len(chain.position), chain.parameters) for chain in chains])
         sizes = chains[0].parameters.link_length, max(self.model.chains.numpy()["circle_radius"])
-        laws = common_laws(profile, chains[0].parameters) if laws is None else laws
-        for name, rows_of in (("faces", faces_of(profile, laws)), ("cells", cells_of(profile, *sizes))):
-            same = np.repeat(rows_of[None], len(chains), axis=0)
+        floor = floor_with(profile, chains[0].parameters) if laws is None else Floor(profile, laws)
+        for name, rows in (("faces", floor.faces()), ("cells", floor.cells(*sizes))):
+            same = np.repeat(rows[None], len(chains), axis=0)
             setattr(self.model, name, wp.array(same, dtype=wp.float64, device=DEVICE))
         worlds, rows, size = len(chains), layout.scratch_rows(0), list_layout(self.columns).size
         self.state = State()

@@ -9,8 +9,8 @@ import pytest
 
 import warpchain
 from tests.kernels.contacts.test_terrain import BOX, SOFT
+from tests.support.blocks_under_test import floor_with
 from warpchain import Status
-from warpchain.inputs.floor import distances
 from warpchain.pictures.animation import player
 from warpchain.pictures.chain import floor_line
 
@@ -59,7 +59,7 @@ def test_the_release_is_at_its_clearance_from_the_profile():
             links=24, start="ellipse", preset="soft", method="explicit", clearance=0.02, distance_limit=1e-3, **scene
         )
         points = BOX if "floor" in scene else np.array([[0, 0], [np.cos(np.radians(20)), -np.sin(np.radians(20))]])
-        first = distances(points, walk.frame_joints[0]).min() - SOFT.circle_radius
+        first = floor_with(points, SOFT).distances(walk.frame_joints[0]).min() - SOFT.circle_radius
         assert first == pytest.approx(0.02, abs=1e-4)
 
 

@@ -12,13 +12,15 @@ from numpy.typing import NDArray
 from warpchain.engine.constants import constants_of, rows_of
 from warpchain.engine.control import control_of
 from warpchain.engine.devices import Gpu, start_device
-from warpchain.engine.ground import cells_of, faces_of
 from warpchain.engine.kernel_choice import block_threads, step_kernel
 from warpchain.engine.mirror import Mirror
 from warpchain.engine.tallies import COUNTS, EXTREMES, LOSSES
+from warpchain.inputs.floor import Floor
 from warpchain.inputs.link_values import LinkValues, alternating
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.scene import Scene, link_values
+from warpchain.inputs.state import Setup
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.cpu.rows import scratch_rows
@@ -135,7 +137,7 @@ class Batch:
             frame_interval: Time [s] between the frames of chains that are loaded with frame marks of their own.
             keeps_loads: Keep force and moment of every joint with each frame.
             tilts: Keep the plane of the chain with samples and frames.
-            faces: Most faces of a floor that is not flat.
+            faces: Most faces of a floor.
         """
         self.options = options
         self.device = start_device(options.device)
@@ -192,8 +194,14 @@ class Batch:
         self.lists = wp.zeros((worlds, list_layout(width).size), dtype=wp.int32, device=self.device.warp)
         self.bytes: int = self._numbers.bytes + self._recorded.bytes + self.scratch.capacity + self.lists.capacity
 
+    def set_up(self, world: int, setup: Setup) -> None:
+        """Set chain and floor of a world, which stay the same through a walk."""
+        scene, parameters = setup.scene, setup.parameters
+        self.set_chain(world, parameters, scene.links, link_values(scene, parameters), scene)
+        self.set_floor(world, setup.floor)
+
     def set_chain(
-        self, world: int, parameters: Parameters, links: int, radius: float | None = None, own: LinkValues | None = None
+        self, world: int, parameters: Parameters, links: int, own: LinkValues | None = None, scene: Scene | None = None
     ) -> None:
         """Set parameters and number of links of a world's chain.
 
@@ -201,20 +209,20 @@ class Batch:
             world: Index.
             parameters: The chain's parameters.
             links: Number of links.
-            radius: Radius [m] at which circles touch the sprocket; None: the parameter's.
             own: What each link and joint has of its own; None: inner and outer links alternate.
+            scene: Of its walk; None: there is no sprocket.
         """
         own = own or alternating(parameters, links)
         self.links[world] = links
-        self.host["model/chains"][world] = constants_of(parameters, own, radius)
+        self.host["model/chains"][world] = constants_of(parameters, own, scene)
         self.host["model/links"][world, :, :links] = rows_of(own)
 
-    def set_floor(self, world: int, points: Array, laws: Array) -> None:
-        """Set the floor of a world whose chain is set: points of a profile (p, 2), e and μ of its faces (p − 1, 2)."""
-        self.host["model/faces"][world, : len(points) - 1] = faces_of(points, laws)
-        if len(points) > 2:
-            chain = self.host["model/chains"][world]
-            self.host["model/cells"][world] = cells_of(points, 2 * chain["half_length"], chain["circle_radius"])
+    def set_floor(self, world: int, floor: Floor) -> None:
+        """Set the floor of a world whose chain is set."""
+        chain = self.host["model/chains"][world]
+        cells = floor.cells(2 * chain["half_length"], chain["circle_radius"])
+        for name, rows in (("model/faces", floor.faces()), ("model/cells", cells)):
+            self.host[name][world, : len(rows)] = rows
 
     def load(
         self,

@@ -4,9 +4,9 @@ import math
 from typing import Annotated, Final, Literal, Self
 
 import numpy as np
-from pydantic import Discriminator, Field, Strict, Tag, model_validator
+from pydantic import Field, Strict, model_validator
 
-from warpchain.inputs.floor import Array, Points, slope_points
+from warpchain.inputs.floor import FloorField
 from warpchain.inputs.link_values import LinkValues, alternating
 from warpchain.inputs.options import on_gpu
 from warpchain.inputs.parameters import Parameters
@@ -41,7 +41,9 @@ TAP: Final = ("lateral_speed", "tilt", "tilt_rate", "yaw_rate")
 upright, so that a scene with a tilting plane alone is the paper's."""
 
 
-_Numbers = Annotated[tuple[Annotated[float, Field(ge=0, le=1e12)], ...], Strict(False)] | None
+_COMPOUND: Final = "compound"
+"""Marks a field whose value may be a list or a mapping."""
+_Numbers = Annotated[Annotated[tuple[Annotated[float, Field(ge=0, le=1e12)], ...], Strict(False)] | None, _COMPOUND]
 """A number for each link or joint; null: what the parameters say."""
 
 
@@ -89,13 +91,10 @@ class Scene(Section):
     """longest time at full frequency to become steady; then the walk ends as not_steady"""
     walk_limit: float = number_field(20.0, "s", gt=0, le=LONGEST)
     """longest time from the release to rest; then the walk ends as time_limit"""
-    release: Rows | None = None
+    release: Annotated[Rows | None, _COMPOUND] = None
     """motion of the sprocket after the release: rows [time in s, x and y in m from its place, frequency in Hz]; it
     vanishes after the last, or at once (null); what sinks too deep presses the chain into the floor"""
-    floor: Annotated[
-        Annotated[Literal["flat"], Tag("(flat)")] | Annotated[Points, Tag("(points)")],
-        Discriminator(lambda given: "(flat)" if isinstance(given, str) else "(points)"),
-    ] = "flat"
+    floor: Annotated[FloorField, _COMPOUND] = "flat"
     """flat, or a profile [[x, y], …] in m, whose ends go on straight; [x, y, e, μ] gives the line from there its own e
     and μ"""
     slope: float = number_field(0.0, "°", ge=-STEEPEST, le=STEEPEST)
@@ -139,6 +138,11 @@ class Scene(Section):
     link_radii: _Numbers = number_field(None, "m")
     """radius of circles of each link; null: circle_radius"""
 
+    @property
+    def is_level(self) -> bool:
+        """Whether the floor is y = 0."""
+        return self.floor == "flat" and self.slope == 0
+
     @model_validator(mode="after")
     def _goes_together(self) -> Self:
         for name in ("charm_link", "stiff_joint"):
@@ -154,7 +158,7 @@ class Scene(Section):
                 raise InputError(f"{name}[{values.index(0)}]: 0 is too little; give more")
         if self.slope != 0 and self.floor != "flat":
             raise InputError(f"slope: {self.slope} of a floor that is a profile; give slope: 0, or floor: flat")
-        if self.plane == "tilting" and floor_points(self) is not None:
+        if self.plane == "tilting" and not self.is_level:
             raise InputError("plane: 'tilting' needs a flat floor; give plane: fixed, or floor: flat and slope: 0")
         if self.plane == "fixed" and (name := next((name for name in TAP if getattr(self, name) != 0), "")):
             raise InputError(
@@ -171,35 +175,8 @@ class Scene(Section):
         return self
 
 
-LISTS: Final = tuple(name for name, field in Scene.model_fields.items() if "tuple[" in str(field.annotation))
-"""Fields that may be lists, so that their values on an axis of a sweep have names."""
-
-
-def floor_points(scene: Scene) -> Array | None:
-    """Points of the floor's profile [m], shape (p, 2); None if it is flat."""
-    if scene.floor != "flat":
-        return np.array([point[:2] for point in scene.floor])
-    return slope_points(scene.slope) if scene.slope != 0 else None
-
-
-def floor_laws(scene: Scene, parameters: Parameters) -> Array:
-    """Coefficients of restitution and friction of each straight face of the floor, shape (faces, 2)."""
-    usual = (parameters.floor_restitution, parameters.floor_friction)
-    points = ((), ()) if scene.floor == "flat" else scene.floor
-    return np.array([point[2:] or usual for point in points[:-1]])
-
-
-def floor_body(scene: Scene) -> str:
-    """Name of the body that is the floor, see `warpchain.kernels.contacts.fixed_body`."""
-    points = floor_points(scene)
-    if points is None:
-        return "floor"
-    return "slope" if len(points) == 2 else "terrain"
-
-
-def face_count(scene: Scene) -> int:
-    """Number of straight faces of the floor; 1 if it is flat, which a drawn slope may change."""
-    return 1 if scene.floor == "flat" else len(scene.floor) - 1
+COMPOUND: Final = tuple(name for name, field in Scene.model_fields.items() if _COMPOUND in field.metadata)
+"""Fields whose values may be lists or mappings, so that on an axis of a sweep they have names."""
 
 
 def link_values(scene: Scene, parameters: Parameters) -> LinkValues:
@@ -270,16 +247,10 @@ def loop_speed(scene: Scene, parameters: Parameters) -> float:
 
 
 def contact_radius(scene: Scene, parameters: Parameters) -> float:
-    """Radius of the sprocket that the circles of the links touch, in m; an `InputError` if nothing is left to touch."""
+    """Radius of the sprocket that the circles of the links touch, in m."""
     if scene.sprocket_radius_is == "contact":
         return parameters.sprocket_radius
-    radius = link_values(scene, parameters).riding_radius
-    if parameters.sprocket_radius <= radius:
-        raise InputError(
-            f"parameters.sprocket_radius: {parameters.sprocket_radius} is not greater than the circle radius "
-            f"{radius}, as sprocket_radius_is: pitch needs; give a larger radius"
-        )
-    return parameters.sprocket_radius - radius
+    return parameters.sprocket_radius - link_values(scene, parameters).riding_radius
 
 
 def fewest_links(scene: Scene, parameters: Parameters) -> int:
@@ -312,9 +283,13 @@ def check_scene(scene: Scene, parameters: Parameters) -> None:
     check_parity(scene, parameters)
     if scene.start == "ellipse":
         return
-    contact_radius(scene, parameters)
+    if contact_radius(scene, parameters) <= 0:
+        raise InputError(
+            f"parameters.sprocket_radius: {parameters.sprocket_radius} is not greater than the circle radius "
+            f"{link_values(scene, parameters).riding_radius}, as sprocket_radius_is: pitch needs; give a larger radius"
+        )
     highest = scene.clearance + scene.links * parameters.link_length / 2  # of the sprocket's lowest point
-    if scene.release and floor_points(scene) is None and (lowest := min(row[2] for row in scene.release)) < -highest:
+    if scene.release and scene.is_level and (lowest := min(row[2] for row in scene.release)) < -highest:
         raise InputError(
             f"scene.release: y = {lowest:g} m takes the sprocket through the floor, at most {highest:g} m "
             "below it; give a higher place"

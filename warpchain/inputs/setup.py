@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Final
 
 from warpchain.inputs.distributions import random_generator, sampled
-from warpchain.inputs.floor import check_above
 from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL, Options, replaced_by
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.parameters import preset as parameter_preset
@@ -19,7 +18,6 @@ from warpchain.inputs.scene import (
     check_links_on_gpu,
     check_parity,
     check_scene,
-    floor_points,
 )
 from warpchain.inputs.state import DEFAULT_PRESET, Setup, State
 from warpchain.inputs.validation import InputError, shown, validated
@@ -121,5 +119,5 @@ def continued(state: State, sections: Mapping[str, Mapping[str, object]]) -> Set
             raise InputError(f"{name}: {end:g} s is before the state at {state.time:g} s; give a later time")
     setup = Setup(before.preset, parameters, scene, options)
     if scene.plane == "fixed" and not state.is_placed_as_in(setup):  # a moving sprocket may have left it in the floor
-        check_above(floor_points(scene), state.position, state.parameters.link_length, "start")
+        setup.floor.check_above(state.position, state.parameters.link_length, "start")
     return replace(setup, start=replace(state, setup=setup))

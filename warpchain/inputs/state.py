@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpchain.inputs.floor import circles_of
+from warpchain.inputs.floor import Floor, circles_of, floor_from
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import Scene, check_parity, check_scene
@@ -49,6 +49,12 @@ class Setup:
     def has_drive(self) -> bool:
         """Whether the walk begins on a sprocket."""
         return self.start is None and self.scene.start != "ellipse"
+
+    @property
+    def floor(self) -> Floor:
+        """The floor of the walk."""
+        usual = self.parameters.floor_restitution, self.parameters.floor_friction
+        return floor_from(self.scene.floor, self.scene.slope, usual)
 
     @property
     def described(self) -> str:

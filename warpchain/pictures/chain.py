@@ -14,8 +14,7 @@ from matplotlib.colors import to_hex
 from matplotlib.patches import Circle, Patch, Polygon
 from numpy.typing import NDArray
 
-from warpchain.inputs.floor import distances, heights
-from warpchain.inputs.scene import floor_laws, floor_points, link_values
+from warpchain.inputs.scene import link_values
 from warpchain.inputs.sprocket_motion import sprocket_places
 from warpchain.pictures.style import DASHES, FAINT, GROUND, INK
 
@@ -147,23 +146,17 @@ def walk_box(walk: "WalkResult", joints: Array) -> tuple[Array, Array]:
 
 def floor_line(walk: "WalkResult", left: float, right: float) -> Array:
     """The floor's profile from one x to another [m], shape (p, 2)."""
-    points = floor_points(walk.setup.scene)
-    inner = np.empty((0, 2)) if points is None else points[(points[:, 0] > left) & (points[:, 0] < right)]
-    ends = np.array([left, right])
-    first, last = np.column_stack([ends, floor_height(walk, ends)])
-    return np.vstack([first, inner, last])
+    return walk.setup.floor.line(left, right)
 
 
 def floor_height(walk: "WalkResult", x: Any) -> Any:
     """Height of the floor at x [m]."""
-    points = floor_points(walk.setup.scene)
-    return 0.0 * x if points is None else heights(points, x)
+    return walk.setup.floor.heights(x)
 
 
 def from_floor(walk: "WalkResult", joints: Array) -> Array:
     """Distance of joints x, y from the floor [m], shape (…, n, 2) → (…, n)."""
-    points = floor_points(walk.setup.scene)
-    return joints[..., 1] if points is None else distances(points, joints.reshape(-1, 2)).reshape(joints.shape[:-1])
+    return walk.setup.floor.distances(joints.reshape(-1, 2)).reshape(joints.shape[:-1])
 
 
 def stretches(walk: "WalkResult", left: float, right: float) -> list[tuple[str, str, Array]]:
@@ -172,14 +165,14 @@ def stretches(walk: "WalkResult", left: float, right: float) -> list[tuple[str, 
     Returns:
         For each pair of coefficients a colour, a label, and ends of the straight faces that have it [m], (f, 2, 2).
     """
-    scene, parameters = walk.setup.scene, walk.setup.parameters
-    points, laws = floor_points(scene), floor_laws(scene, parameters)
+    floor, parameters = walk.setup.floor, walk.setup.parameters
+    points, laws = floor.points.copy(), floor.laws
     usual = parameters.floor_restitution, parameters.floor_friction
     own = [law for law in dict.fromkeys(map(tuple, laws.tolist())) if law != usual]
-    if points is None or not own:
+    if not own:
         return []
     ends = np.array([min(left, points[0, 0]), max(right, points[-1, 0])])
-    points[[0, -1]] = np.column_stack([ends, heights(points, ends)])
+    points[[0, -1]] = np.column_stack([ends, floor.heights(ends)])
     faces = np.stack([points[:-1], points[1:]], axis=1)
     in_sight = (faces[:, 0, 0] < right) & (faces[:, 1, 0] > left)
     colors = colormaps["plasma"](np.linspace(0.6, 0.0, len(own)))

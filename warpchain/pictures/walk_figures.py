@@ -12,7 +12,6 @@ from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from warpchain.inputs.scene import floor_points
 from warpchain.loop.stationary_loop import StationaryLoop
 from warpchain.pictures.chain import floor_height, stretches
 from warpchain.pictures.film_strip import film_strip
@@ -68,7 +67,7 @@ def _height_and_speed(walk: "WalkResult", figure: Figure) -> None:
     speed.plot(walk.time, walk.center_velocity[:, 0], color=BLUE, linewidth=1.4)
     height.set_ylabel("height $y^\\mathrm{cm}$ / m")
     speed.set_ylabel("speed $v_x^\\mathrm{cm}$ / (m/s)")
-    if floor_points(walk.setup.scene) is None:
+    if walk.setup.scene.is_level:
         height.set_ylim(bottom=0.0)
     else:
         x, floor = walk.center[:, 0], floor_height(walk, walk.center[:, 0])

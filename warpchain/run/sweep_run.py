@@ -21,7 +21,6 @@ from pydantic import Field
 from warpchain.engine.devices import gpu_turn, has_gpu_turn, start_device
 from warpchain.engine.processors import processors
 from warpchain.inputs.options import Options, on_gpu
-from warpchain.inputs.scene import LISTS
 from warpchain.inputs.sections import SECTION_OF, by_section, takes_fields
 from warpchain.inputs.setup import DEFAULT_PRESET, Setup
 from warpchain.inputs.validation import InputError, Whole, by_name, checked, checked_path, plain, shown, validated
@@ -32,6 +31,7 @@ from warpchain.store.folder import SweepFolder
 from warpchain.store.manifest import Shard
 from warpchain.store.shards import read_shard, write_shard
 from warpchain.store.sweep_result import SweepResult, load
+from warpchain.sweeps.axes import is_axis
 from warpchain.sweeps.plan import PlannedWalk, Sweep, load_sweep
 from warpchain.sweeps.sweep_file import VERSION, BlockKeys
 from warpchain.walks.faults import LENGTHS
@@ -184,8 +184,7 @@ def sweep_of_keywords(given: Mapping[str, object], out: str | os.PathLike[str] |
     if isinstance(content.get("preset"), list):
         values = {"preset": content.pop("preset"), **values}
     for name, value in by_name(values).items():
-        is_axis = isinstance(value, dict) or (isinstance(value, list) and name not in LISTS)
-        key = "grid" if is_axis else SECTION_OF[name]
+        key = "grid" if is_axis(name, value) else SECTION_OF[name]
         others = content.setdefault(key, {})
         if isinstance(others, dict):  # the check of the content refuses anything else
             if name in by_name(others):

@@ -7,7 +7,8 @@ from typing import Annotated, Any, Final
 
 from pydantic import BaseModel, BeforeValidator, Field, ValidationError, ValidationInfo, WrapValidator
 
-from warpchain.inputs.validation import LONGEST_NAME, MOST_VALUES, STRICT, InputError, refusals, shown
+from warpchain.inputs.scene import COMPOUND
+from warpchain.inputs.validation import FIELDS, LONGEST_NAME, MOST_VALUES, STRICT, InputError, checked, refusals, shown
 
 AXIS_LIMIT: Final = 10_000
 """Most values of one axis."""
@@ -83,3 +84,14 @@ def named_axis(kind: Any) -> Any:
     """Annotation of the values of an axis whose values may be lists: name → value."""
     named = Annotated[dict[Name, kind], Field(min_length=1, max_length=AXIS_LIMIT)]
     return Annotated[named, BeforeValidator(_with_names, json_schema_input_type=named)]
+
+
+def is_axis(name: str, given: object) -> bool:
+    """Whether a list or mapping that is given for a field by its name is an axis, and no value of the field."""
+    if not isinstance(given, dict):
+        return isinstance(given, list) and name not in COMPOUND
+    try:
+        checked(given, name, Annotated[FIELDS[name].annotation, Field(), *FIELDS[name].metadata])
+    except InputError:
+        return True
+    return False

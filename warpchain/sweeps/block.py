@@ -16,7 +16,7 @@ from warpchain.inputs.parameters import preset as parameter_preset
 from warpchain.inputs.scene import Scene
 from warpchain.inputs.sections import SECTION_OF, SECTIONS
 from warpchain.inputs.setup import Setup, combined, options_beside
-from warpchain.inputs.validation import InputError, path_of, validated
+from warpchain.inputs.validation import InputError, json_value, path_of, validated
 from warpchain.sweeps.designs import walks_per_sample
 from warpchain.walks.faults import least
 
@@ -191,7 +191,7 @@ class Block:
             "distributions": {"all": "fixed"} | {name: each.canonical() for name, each in self.distributions.items()},
             **({"points": {name: list(values) for name, values in self.points.items()}} if self.points else {}),
             "grid": {
-                name: dict(self.named.get(name, {})) or list(values)
+                name: json_value(self.named.get(name)) or list(values)
                 for name, values in self.axes.items()
                 if name != POINT
             },

@@ -26,7 +26,7 @@ from pydantic import (
 
 from warpchain.inputs.distributions import DRAWABLE, LARGEST_SEED, TABLE, Distribution, Gaussian, Uniform
 from warpchain.inputs.parameters import PRESETS
-from warpchain.inputs.scene import LISTS
+from warpchain.inputs.scene import COMPOUND
 from warpchain.inputs.sections import SECTIONS
 from warpchain.inputs.validation import (
     FIELDS,
@@ -99,7 +99,7 @@ _TYPES: Final[Mapping[str, Any]] = {
     ]
     for name, field in FIELDS.items()
 }
-_AXES: Final = {name: (named_axis if name in LISTS else axis)(kind) for name, kind in _TYPES.items()}
+_AXES: Final = {name: (named_axis if name in COMPOUND else axis)(kind) for name, kind in _TYPES.items()}
 
 
 def _mapping_of(title: str, types: Mapping[str, Any]) -> Any:
@@ -211,7 +211,7 @@ class BlockKeys(WalkKeys):
     ] = Field({}, description="axes of the grid, see below; not in a file with blocks")
     points: Annotated[
         dict[str, list[Value]],
-        _mapping_of("points", {name: list_of(kind) for name, kind in _TYPES.items() if name not in LISTS}),
+        _mapping_of("points", {name: list_of(kind) for name, kind in _TYPES.items() if name not in COMPOUND}),
     ] = Field(
         {},
         description="parameter sets: quantity → its value in each; one more axis, `point`; not in a file with blocks",

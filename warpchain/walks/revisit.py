@@ -7,7 +7,6 @@ import numpy as np
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import gpu_turn
 from warpchain.engine.snapshot import restore, take_snapshot
-from warpchain.inputs.scene import face_count
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError, checked
@@ -44,7 +43,7 @@ def state_at(setup: Setup, t: object, end: float) -> State:
     if not first <= time <= end:
         raise InputError(f"t: {time:g} s is not in the walk; give a time from {first:g} to {end:.6g}")
     with gpu_turn([setup.options.device]):
-        batch = Batch(1, setup.scene.links, setup.options, faces=face_count(setup.scene))
+        batch = Batch(1, setup.scene.links, setup.options, faces=len(setup.floor.laws))
         run = WalkRun(batch, 0, setup)
         attempts = batch.attempts_of_launch
         for features in run.phases():

@@ -10,7 +10,6 @@ from warpchain.engine.batch import Batch
 from warpchain.engine.devices import Gpu, gpu_turn, start_device
 from warpchain.engine.kernel_choice import block_threads, load_kernels, resident_blocks
 from warpchain.inputs.options import Options, on_gpu
-from warpchain.inputs.scene import face_count
 from warpchain.inputs.setup import Setup
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
@@ -110,7 +109,7 @@ def _batches(setups: Sequence[Setup], keeps: Sequence[Keep], slots: int | None) 
         "frame_every": next((keep.frame_every for keep in keeps if keep.frame_every), None),
         "frame_interval": max(intervals, default=0.0),
         "tilts": any(scene.plane == "tilting" for scene in scenes),
-        "faces": max(map(face_count, scenes)),
+        "faces": max(len(setup.floor.laws) for setup in setups),
     }
     if not on_gpu(options.device):
         return [Batch(slots or 1, **kept)], slots or 1

@@ -16,16 +16,8 @@ from warpchain.engine.batch import Batch
 from warpchain.engine.snapshot import CACHES, change, restore, take_snapshot
 from warpchain.engine.sprocket_motion import motion_rows
 from warpchain.engine.tallies import CONTACTS, COUNTS, EXTREMES, LOST
-from warpchain.inputs.floor import circles_of, raised_by
-from warpchain.inputs.scene import (
-    contact_radius,
-    floor_body,
-    floor_laws,
-    floor_points,
-    joint_radius,
-    link_values,
-    settling_time,
-)
+from warpchain.inputs.floor import circles_of
+from warpchain.inputs.scene import joint_radius, link_values, settling_time
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.inputs.state import State
@@ -36,7 +28,7 @@ from warpchain.status import Status
 from warpchain.walks.drive import drive_of
 from warpchain.walks.landmarks import at_release
 from warpchain.walks.motion import NOTHING, Keep
-from warpchain.walks.moving_plane import angles, lowest_point, plane_of_state, released_plane, state_of_plane
+from warpchain.walks.moving_plane import angles, plane_of_state, released_plane, state_of_plane
 from warpchain.walks.recorder import Recorder
 
 Array = NDArray[np.float64]
@@ -56,7 +48,7 @@ def phase_features(setup: Setup) -> dict[str, Features]:
         columns = layout.padded_width(scene.links)
         return Features(options.method, columns, body, self_contact=options.self_contact, **more)
 
-    body, tilts = floor_body(scene), scene.plane == "tilting"
+    body, tilts = setup.floor.body, scene.plane == "tilting"
     found = {"free": features(body, tilts=tilts)}
     if setup.has_drive:
         found["driven"] = features("sprocket")
@@ -96,7 +88,6 @@ class WalkRun:
         self._has_sprocket = setup.has_drive
         self._settled = settling_time(scene)
         self._tilts = scene.plane == "tilting"
-        self._floor = floor_points(scene)
         self._level = math.cos(math.radians(scene.slope))  # of a distance along the floor
 
     def phases(self) -> Iterator[Features]:
@@ -111,6 +102,7 @@ class WalkRun:
 
     def _phases(self) -> Iterator[Features]:
         batch, world, setup, features = self._batch, self._world, self.setup, phase_features(self.setup)
+        batch.set_up(world, setup)
         if setup.start is not None:
             area = self._go_on(setup.start)
             if area is not None:
@@ -164,7 +156,6 @@ class WalkRun:
 
     def _start_drive(self) -> None:
         """Lay the chain on its sprocket; it is to settle there, if it starts at rest."""
-        self._set_chain(contact_radius(self.setup.scene, self.setup.parameters))
         (position, velocity), drive = drive_of(self.setup, self._links)
         self._at_full_speed, self._hold_softness = drive["hold_start"], drive["hold_softness"]
         self._batch.set_drive(self._world, **drive)
@@ -341,7 +332,6 @@ class WalkRun:
             its new ledger begins; after that `State.first_area` is to be set to this.
         """
         batch, world, memory = self._batch, self._world, start.memory
-        self._set_chain()
         self._released = True
         if not memory:
             self._load(start.position, start.velocity)
@@ -352,7 +342,7 @@ class WalkRun:
         is_kept, interval = start.is_placed_as_in(self.setup), self.recorder.keep.frame_interval
         restore(batch, world, {name: part for name, part in memory.items() if is_kept or name not in CACHES})
         batch.set_state(world, next_frame=np.floor(start.time / interval) if interval > 0 else -1)
-        self._set_floor()
+        self._set_farthest()
         if is_kept and self._is_at(start):
             batch.resume(world, self._walk_end, Status.TIME_LIMIT)
             self.recorder.go_on(memory["state/last_sample"], start.time)
@@ -374,35 +364,24 @@ class WalkRun:
     def _raise(self, position: Array) -> float:
         """How far a chain at this position must be raised to its clearance [m]."""
         clearance, length, radius = self.setup.scene.clearance, self.setup.parameters.link_length, self._links.radius
-        if self._floor is None:
-            return clearance - lowest_point(position, length, radius)
-        return raised_by(self._floor, circles_of(position, length), np.tile(radius, 2), clearance)
+        return self.setup.floor.raised_by(circles_of(position, length), np.tile(radius, 2), clearance)
 
-    def _set_floor(self) -> None:
-        """Set the floor, and how far the chain may walk on it."""
-        scene = self.setup.scene
-        self._batch.set_drive(self._world, farthest=(scene.distance_limit or 0.0) * self._level)
-        if self._floor is not None:
-            self._batch.set_floor(self._world, self._floor, floor_laws(scene, self.setup.parameters))
+    def _set_farthest(self) -> None:
+        """Set how far the chain may walk."""
+        self._batch.set_drive(self._world, farthest=(self.setup.scene.distance_limit or 0.0) * self._level)
 
     def _release(self, position: Array, velocity: Array, hanging: float = math.nan) -> None:
         """Begin the walk of a chain; ``hanging``: how far it must be raised as it hung on its sprocket at rest [m]."""
-        scene, parameters = self.setup.scene, self.setup.parameters
-        self.raised = hanging if scene.clearance_of == "hanging" else self._raise(position)
+        self.raised = hanging if self.setup.scene.clearance_of == "hanging" else self._raise(position)
         position[:, 1] += self.raised
-        self._set_chain(None if scene.release is None else contact_radius(scene, parameters))
         self._load(position, velocity)
         if self._tilts:
             self._batch.set_plane(self._world, released_plane(self.setup, position))
         self._released = True
 
-    def _set_chain(self, radius: float | None = None) -> None:
-        """Set the chain's constants, and the radius [m] at which circles touch the sprocket, if there is one."""
-        self._batch.set_chain(self._world, self.setup.parameters, self.setup.scene.links, radius, self._links)
-
     def _load(self, position: Array, velocity: Array) -> None:
-        """Begin the walk of a chain whose parameters are set."""
-        self._set_floor()
+        """Begin the walk of a chain on its floor."""
+        self._set_farthest()
         self._batch.load(
             self._world,
             position,

@@ -7,9 +7,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 import warpchain
 from tests.hard_cases.starts import dropped
 from tests.oracle_model import motion_equations, terrain
+from tests.support.blocks_under_test import floor_with
 from tests.support.folded_chains import folded_chain
 from tests.support.kernels_under_test import TERRAIN, ContactPass, Placed
-from warpchain.inputs.floor import distances
 from warpchain.inputs.parameters import preset
 
 PAPER, SOFT = preset("paper"), preset("soft")
@@ -37,7 +37,9 @@ def brute_gap(position, points):
     """Least distance of 1001 points of every link's axis from the floor, less r."""
     left, right = motion_equations.link_ends(position, PAPER)
     share = np.linspace(0, 1, 1001)[:, None, None]
-    return distances(points, (left + share * (right - left)).reshape(-1, 2)).min() - PAPER.circle_radius
+    return (
+        floor_with(points, PAPER).distances((left + share * (right - left)).reshape(-1, 2)).min() - PAPER.circle_radius
+    )
 
 
 @every_profile

@@ -17,7 +17,7 @@ import yaml
 
 from tests.kernels.methods.test_flight import FLIGHTS, exact_flight, greatest
 from tests.run.test_sweep_run import brief_setup, data_of, outcomes
-from tests.support.blocks_under_test import FIXED_STEP, HILLS, SOFT, common_laws, heap
+from tests.support.blocks_under_test import FIXED_STEP, HILLS, SOFT, floor_with, heap
 from warpchain import simulate, sweep, walk
 from warpchain.engine.batch import Batch
 from warpchain.engine.sprocket_motion import motion_rows
@@ -40,7 +40,7 @@ def fixed_steps(device: str, method: str, fixed_body: str) -> dict[str, np.ndarr
             position[:, 1] += 0.9 * SOFT.sprocket_radius
         batch.set_chain(world, SOFT, LINKS)
         points = HILLS if fixed_body == "terrain" else HILLS[[0, -1]]
-        batch.set_floor(world, points, common_laws(points, SOFT))
+        batch.set_floor(world, floor_with(points, SOFT))
         batch.load(world, position, velocity, stop_time=STEPS * FIXED_STEP, stop_status=Status.FINISHED)
         batch.set_drive(world, sprocket_speed=-50.0)
         batch.set_drive(world, motion=motion_rows(((0.01, 0.002, -0.01, 5.0),), 8.0, 0.02))

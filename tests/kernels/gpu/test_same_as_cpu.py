@@ -18,7 +18,7 @@ from tests.support.blocks_under_test import (
     SOFT,
     assert_same,
     batch_of,
-    common_laws,
+    floor_with,
     heap,
     launch_blocks,
     launch_chains,
@@ -54,7 +54,7 @@ def test_fixed_steps_equal_a_cpu_kernel(method: str, fixed_body: str, self_conta
     ours, theirs = (batch_of(chains, method=method, self_contact=self_contact) for _ in range(2))
     for batch in (ours, theirs):
         for world in range(2):
-            batch.set_floor(world, HILLS, common_laws(HILLS, SOFT))
+            batch.set_floor(world, floor_with(HILLS, SOFT))
     features = ours.features(fixed_body=fixed_body)
     launch_blocks(ours, features, 40, block_dim=block_dim)
     launch_chains(theirs, features, 40)
