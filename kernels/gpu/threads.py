@@ -22,22 +22,20 @@ def barrier():
 
 @wp.func_native("""
 #if defined(__CUDA_ARCH__)
-    return __syncthreads_or(x) != 0;
+    return __syncthreads_count(x);
 #else
     int& seen = flags.data[slot];
-    if (x) {
-        seen = 1;
-    }
+    seen += x;
     WP_TILE_SYNC();
-    const bool any = seen != 0;
+    const int count = seen;
     WP_TILE_SYNC();
     seen = 0;
     WP_TILE_SYNC();
-    return any;
+    return count;
 #endif
 """)
-def barrier_if_any(flags: Integers, slot: int, x: bool) -> bool:
-    """A barrier that returns to all threads whether x is true in any of them; one instruction on a GPU.
+def barrier_count(flags: Integers, slot: int, x: bool) -> int:
+    """A barrier that returns to all threads in how many of them x is true; one instruction on a GPU.
 
     Fibers use ``flags[slot]`` instead, which is 0 before and after.
     """
