@@ -40,13 +40,6 @@ def load_link(run: Run, state: State):
 
 
 @wp.func
-def store_link(run: Run, state: State):
-    """Stores the state of a thread's link."""
-    for k in range(6):
-        state.links[run.world, X + k, run.lane] = run.K[X + k, run.lane]
-
-
-@wp.func
 def write_attempt(run: Run, result: Attempt, h: wp.float64):
     """Writes a link's new state and the losses of its joint on the board."""
     K = run.K

@@ -169,7 +169,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         K = wp.array(ptr=board_start, shape=(wp.static(layout.BOARD_ROWS), wp.static(width)), dtype=wp.float64)
         stored_plane = state.plane[world]
         P = stored_plane
-        if wp.static(tilts and is_shared):
+        if wp.static(tilts):
             P = wp.array(ptr=board_start + wp.static(plane_offset), shape=(layout.PLANE_ROWS,), dtype=wp.float64)
         run = Run()
         run.ground = read_ground(model, world)

@@ -11,7 +11,7 @@ from warpchain.kernels.events.sample import VIEWS, next_mark, sampling
 from warpchain.kernels.events.softening import book_softening, contact_step, spring_tolerance
 from warpchain.kernels.events.tallies import add_count, of_fixed_body, raise_extreme, row_total, store_losses
 from warpchain.kernels.features import Features
-from warpchain.kernels.gpu.board import load_extremes, load_link, publish, store_extremes, store_link
+from warpchain.kernels.gpu.board import load_extremes, load_link, publish, store_extremes
 from warpchain.kernels.gpu.contacts.self_contacts import TouchLayout
 from warpchain.kernels.gpu.stage import Run, write_constants
 from warpchain.kernels.gpu.threads import barrier, clock
@@ -99,7 +99,8 @@ def block_run(features: Features, touch: TouchLayout, plane: BlockPlane):
         publish(run)
         barrier()
         if lane < run.links:
-            store_link(run, state)
+            for k in range(6):
+                state.links[world, layout.X + k, lane] = K[layout.X + k, lane]
             row = int(BOARD_LOST_SELF)
             while row < wp.static(BOARD_VALUES):
                 run.kept[row, lane] = K[row, lane]

@@ -146,9 +146,9 @@ def block_maxima(block_dim: int):
 
     @wp.func
     def write_maxima(memory: wp.uint64, lane: int, values: vec4i):
-        of_warp = vec4i(
-            warp_greatest(values[0]), warp_greatest(values[1]), warp_greatest(values[2]), warp_greatest(values[3])
-        )
+        of_warp = vec4i()
+        for k in range(4):
+            of_warp[k] = warp_greatest(values[k])
         write_four(memory, lane // warp_width(), of_warp)
 
     @wp.func
@@ -157,9 +157,7 @@ def block_maxima(block_dim: int):
         i = int(1)
         while i < wp.static(block_dim) // warp_width():
             other = read_four(memory, i)
-            top = vec4i(
-                wp.max(top[0], other[0]), wp.max(top[1], other[1]), wp.max(top[2], other[2]), wp.max(top[3], other[3])
-            )
+            top = wp.max(top, other)
             i += 1
         return top
 
