@@ -46,16 +46,15 @@ BOARD_FIRST = 25
 BOARD_VALUES = 30
 VALUE_OPENING, VALUE_FIXED_DEPTH, VALUE_LAST_IMPULSE, VALUE_STOP_TIME, VALUE_NEXT_SAMPLE = range(5)
 VALUE_DEADLINE, VALUE_CONTACT_STEP, VALUE_TOLERANCE = 5, 6, 7
-# A plane that tilts, as the links feel it: seven values, see gpu.tilting; and in the attempt before.
-VALUE_PLANE, VALUE_PLANE_BEFORE = 8, 15
-VALUES = 22
+# A plane that tilts in the middle of the attempt before: the first PLANE_VALUES of State.plane.
+VALUE_PLANE_BEFORE = 8
+VALUES = 20
 BOARD_ROWS = 31
 
-# State.watch
-WINDOW_START, WINDOW_COUNT, SUM_HEIGHT, SUM_WIDTH, SUM_X, SUM_Y, SUM_SPEED = range(7)
-STEADY_SINCE, LEAST_HEIGHT, GREATEST_HEIGHT, LEAST_WIDTH, GREATEST_WIDTH = range(7, 12)
-LEAST_X, GREATEST_X, LEAST_Y, GREATEST_Y = range(12, 16)
-LEAST_SPEED, GREATEST_SPEED = 16, 17
+# State.watch. Of each watched quantity of a loop on its sprocket, in the order of WATCHED_COLUMNS: the sum over the
+# samples of a window, and the least and the greatest mean of a window.
+WINDOW_START, WINDOW_COUNT, WINDOW_SUMS, STEADY_SINCE, RANGES = 0, 1, 2, 7, 8
+LOOP_HEIGHT, LOOP_WIDTH, LOOP_X, LOOP_Y, LOOP_ALONG = range(5)
 HOLD_LOAD, LOADED_SINCE, UNLOADED_SINCE, DRIFT = range(18, 22)
 REST_SINCE, LAST_FLOOR_IMPULSE = 22, 23
 SOFTENED_AT = 24
@@ -106,6 +105,7 @@ TIME, CENTER_X, CENTER_Y, CENTER_U, CENTER_V = range(5)
 KINETIC, GRAVITATIONAL, SPRING, LOWEST, RMS_SPEED = range(5, 10)
 HEIGHT, WIDTH, LOOP_SPEED = 10, 11, 12
 SAMPLE_COLUMNS = 13
+WATCHED_COLUMNS = (HEIGHT, WIDTH, CENTER_X, CENTER_Y, LOOP_SPEED)
 # Further columns if the plane tilts: the plane, then place and speed of the centre of mass along the room's Z axis.
 PLANE_COLUMN = 13
 CENTER_Z, CENTER_W = 25, 26

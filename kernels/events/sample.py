@@ -12,7 +12,7 @@ from warpchain.kernels.events.rest import watch_rest
 from warpchain.kernels.events.softening import watch_collapse, watch_drive, watch_stiffening
 from warpchain.kernels.events.tilting import no_fall, observe_in_room, watch_fall, write_frame_in_room
 from warpchain.kernels.features import Features
-from warpchain.kernels.layout import TIME
+from warpchain.kernels.layout import HEIGHT, TIME
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.physics.scaled_loads import drag_shape
 from warpchain.kernels.types import Chain, Control, Drive, Record, Rows, State
@@ -70,24 +70,24 @@ def sampling(features: Features):
             return RUNNING
         last_time = state.last_sample[world, TIME]
         is_first = last_time < ZERO
-        summary = write(K, chain, state, record, world, time)
+        area = write(K, chain, state, record, world, time)
         if frame_mark < wp.int64(0) and mark % control.frame_every == wp.int64(0):
             append_frame(K, chain, state, record, world, time)
         passed = wp.int64(wp.floor(time / control.sample_interval))
         state.next_sample[world] = wp.max(mark, passed) + wp.int64(1)
         if wp.static(not is_driven):
-            watch_ending(state, world, time, summary.area, touches, meetings, last_floor_impulse, is_first)
+            watch_ending(state, world, time, area, touches, meetings, last_floor_impulse, is_first)
         if wp.static(has_floor):
             watch_stiffening(state, drive, control, world, time)
-            watch_collapse(chain, state, control, world, time, summary.area, is_first)
+            watch_collapse(chain, state, control, world, time, area, is_first)
         watch_plane(state, world, time)
         if wp.static(has_floor):
-            return watch_rest(state, drive, control, world, time, summary, last_floor_impulse)
+            return watch_rest(state, drive, control, world, state.last_sample[world], last_floor_impulse)
         if wp.static(is_driven):
             if state.load_factor[world] > wp.float64(1.0):
-                rate = drag_rate(chain, state, drive, world, summary.height)
+                rate = drag_rate(chain, state, drive, world, state.last_sample[world, HEIGHT])
                 drag_shape(K, chain, wp.exp(-rate * (time - last_time)))
-            watch_steadiness(chain, state, drive, world, time, summary)
+            watch_steadiness(chain, state, drive, world, state.last_sample[world])
             state.load_factor[world] = load_at(state, drive, world, time)
             watch_drive(state, drive, control, world, time)
         return RUNNING

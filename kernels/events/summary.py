@@ -7,31 +7,12 @@ from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, MASS, OMEGA, RADIUS
 from warpchain.kernels.physics.elementary import HALF, ZERO, from_order_key, order_key
 from warpchain.kernels.physics.geometry import read_link
 from warpchain.kernels.physics.load import NOTHING, link_energy, weight_energy
-from warpchain.kernels.types import Chain, Rows
-
-
-@wp.struct
-class Summary:
-    """Sums over one chain at one moment; see ``Record.samples`` in :mod:`types`."""
-
-    center_x: wp.float64
-    center_y: wp.float64
-    center_u: wp.float64
-    center_v: wp.float64
-    kinetic: wp.float64
-    gravitational: wp.float64
-    spring: wp.float64
-    lowest: wp.float64
-    rms_speed: wp.float64
-    height: wp.float64
-    width: wp.float64
-    loop_speed: wp.float64
-    area: wp.float64
+from warpchain.kernels.types import Chain, Row, Rows
 
 
 @wp.func
-def summarise(K: Rows, chain: Chain) -> Summary:
-    """Sums over the placed links.
+def summarise(K: Rows, chain: Chain, sample: Row):
+    """Writes the sums over the placed links into a sample, all but its time; returns the area inside the loop.
 
     Loop speed: mean of v·u over links, positive from link i towards link i + 1. Area [m²] inside the loop, positive if
     it runs counter-clockwise: ½ Σ left end × right end.
@@ -77,18 +58,16 @@ def summarise(K: Rows, chain: Chain) -> Summary:
         lowest = wp.min(lowest, order_key(low - K[RADIUS, i]))
         top = wp.max(top, order_key(K[RIGHT_Y, i]))
         i += 1
-    summary = Summary()
-    summary.center_x = mx / mass
-    summary.center_y = my / mass
-    summary.center_u = mu / mass
-    summary.center_v = mv / mass
-    summary.kinetic = kinetic
-    summary.gravitational = weight_energy(chain, my) + further
-    summary.spring = spring
-    summary.lowest = from_order_key(lowest)
-    summary.rms_speed = wp.sqrt(square / wp.float64(n))
-    summary.height = from_order_key(top) - from_order_key(bottom)
-    summary.width = from_order_key(right) - from_order_key(left)
-    summary.loop_speed = along / wp.float64(n)
-    summary.area = HALF * area
-    return summary
+    sample[layout.CENTER_X] = mx / mass
+    sample[layout.CENTER_Y] = my / mass
+    sample[layout.CENTER_U] = mu / mass
+    sample[layout.CENTER_V] = mv / mass
+    sample[layout.KINETIC] = kinetic
+    sample[layout.GRAVITATIONAL] = weight_energy(chain, my) + further
+    sample[layout.SPRING] = spring
+    sample[layout.LOWEST] = from_order_key(lowest)
+    sample[layout.RMS_SPEED] = wp.sqrt(square / wp.float64(n))
+    sample[layout.HEIGHT] = from_order_key(top) - from_order_key(bottom)
+    sample[layout.WIDTH] = from_order_key(right) - from_order_key(left)
+    sample[layout.LOOP_SPEED] = along / wp.float64(n)
+    return HALF * area

@@ -9,7 +9,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpchain.engine.constants import constants_of, rows_of
+from warpchain.engine.constants import constants_of
 from warpchain.engine.control import control_of
 from warpchain.engine.devices import Gpu, start_device
 from warpchain.engine.kernel_choice import block_threads, step_kernel
@@ -215,7 +215,7 @@ class Batch:
         own = own or alternating(parameters, links)
         self.links[world] = links
         self.host["model/chains"][world] = constants_of(parameters, own, scene)
-        self.host["model/links"][world, :, :links] = rows_of(own)
+        self.host["model/links"][world, :, :links] = tuple(vars(own).values())  # in the order of the layout
 
     def set_floor(self, world: int, floor: Floor) -> None:
         """Set the floor of a world whose chain is set."""

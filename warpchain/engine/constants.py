@@ -1,7 +1,5 @@
 """Constants of a world, from the parameters of its chain, what each link has of its own, and its scene."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,8 +33,3 @@ def constants_of(parameters: Parameters, own: LinkValues, scene: Scene | None) -
         if name in values:
             numbers[name] = values[name]
     return numbers
-
-
-def rows_of(own: LinkValues) -> Sequence[NDArray[np.float64]]:
-    """The rows of :attr:`Model.links`, in the order of :mod:`warpchain.kernels.layout`."""
-    return tuple(vars(own).values())
