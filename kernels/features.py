@@ -1,6 +1,7 @@
 """What a step kernel is compiled for, and the compiler's flags."""
 
 from dataclasses import dataclass
+from typing import Any
 
 COMPILER_FLAGS = (
     "-march=native -ffp-contract=fast -mllvm=-inline-threshold=40000 -mllvm=-inline-cold-callsite-threshold=3000"
@@ -18,6 +19,7 @@ class Features:
     self_contact: bool  # contacts between a chain's own links
     # whether the plane of the chain may move, see :mod:`physics.plane`; with an explicit method only
     tilts: bool = False
+    load: str = "weight"  # a key of :data:`physics.load.LOADS`
     moving_sprocket: bool = False  # whether the sprocket is there as well, above a floor, and moves
 
     @property
@@ -26,6 +28,14 @@ class Features:
         from warpchain.kernels.contacts.fixed_body import BODIES  # only a kernel that is compiled needs its source
 
         return BODIES[self.fixed_body].is_driven
+
+    @property
+    def acceleration(self) -> Any:
+        """Warp function of what accelerates a link besides its joints, see :func:`physics.load.weight`."""
+        from warpchain.kernels.physics.load import LOADS
+        from warpchain.kernels.physics.plane import plane_load
+
+        return plane_load if self.tilts else LOADS[self.load].acceleration
 
     @property
     def has_floor(self) -> bool:

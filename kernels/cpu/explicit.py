@@ -6,6 +6,7 @@ of their own, one array of static shape, no branch and no library call inside.
 """
 
 import functools
+from typing import Any
 
 import warp as wp
 
@@ -16,8 +17,6 @@ from warpchain.kernels.methods.explicit_tableaus import Tableau
 from warpchain.kernels.physics.elementary import LARGEST_TURN, TWO, ZERO, cos_sin, order_bits
 from warpchain.kernels.physics.geometry import Link, end_positions, end_velocities, turned, whole_lanes
 from warpchain.kernels.physics.joint import friction_torque, joint_force, link_acceleration
-from warpchain.kernels.physics.load import link_load
-from warpchain.kernels.physics.plane import plane_load
 from warpchain.kernels.types import Chain, Rows
 
 
@@ -119,12 +118,13 @@ def sums_over_stages(velocity: tuple[float, ...], position: tuple[float, ...]):
 
 
 @functools.cache
-def explicit_method(tableau: Tableau, tilts: bool = False):
+def explicit_method(tableau: Tableau, acceleration: Any):
     """Warp functions of one tableau: (evaluate the first stage, attempt a step, commit it).
 
     Args:
         tableau: Its coefficients.
-        tilts: Whether the plane of the chain may move; ``chain`` is then on the plane of the middle of the step.
+        acceleration: What accelerates a link besides its joints, see :attr:`features.Features.acceleration`; on a plane
+            that may move, ``chain`` is on that of the middle of the step.
 
     Returns:
         ``first_stage(K, chain)``, ``attempt(K, chain, h, tolerance)`` → bits of the greatest error ratio (see
@@ -136,7 +136,6 @@ def explicit_method(tableau: Tableau, tilts: bool = False):
     stage_sums = [sums_over_stages(*rows) for rows in zip(tableau.velocity, tableau.position, strict=True)]
     new_state = sums_over_stages(velocity_weights, tableau.position_weights)
     errors = sums_over_stages(tableau.velocity_errors, tableau.position_errors)
-    load = plane_load if tilts else link_load
     last_row = STAGES + STAGE_ROWS * (stages - 1)
     power_needed = tuple(
         weight != 0.0 or (reuses_last and velocity_weights[0] != 0.0 and stage == stages - 1)
@@ -179,7 +178,7 @@ def explicit_method(tableau: Tableau, tilts: bool = False):
                 K[layout.TORQUE, i],
                 K[layout.TORQUE, i + 1],
             )
-            load_x, load_y, load_turn = load(
+            load_x, load_y, load_turn = acceleration(
                 chain, i, link_in_stage(K, i), K[layout.INVERSE_MASS, i], K[layout.INVERSE_INERTIA, i]
             )
             K[row, i] = ax + load_x

@@ -29,10 +29,10 @@ class Joints:
 
 
 @functools.cache
-def springs(name: str, tilts: bool) -> Joints:
-    """A method's steps on springs, for chains whose plane tilts or does not."""
+def springs(name: str, acceleration: Any) -> Joints:
+    """A method's steps on springs, under a load, see :attr:`features.Features.acceleration`."""
     tableau = find_method(name).tableau
-    evaluate, attempt_step, commit = explicit_method(tableau, tilts)
+    evaluate, attempt_step, commit = explicit_method(tableau, acceleration)
     growth, shrink = step_controller(tableau.order, tableau.error_order)
     reuses_last = tableau.first_same_as_last
 

@@ -24,7 +24,7 @@ from warpchain.kernels.cpu.tilting import tilting_plane
 from warpchain.kernels.cpu.upright import upright_plane
 from warpchain.kernels.events.present_chain import has_changed, present_chain
 from warpchain.kernels.events.record import lacks_last_sample, record_is_full
-from warpchain.kernels.events.sample import VIEWS, next_mark, sampling
+from warpchain.kernels.events.sample import next_mark, observation, sampling
 from warpchain.kernels.events.softening import book_softening, contact_step, spring_tolerance
 from warpchain.kernels.events.tallies import add_count, attempts_made, of_fixed_body, raise_extreme, store_losses
 from warpchain.kernels.features import COMPILER_FLAGS, Features
@@ -32,7 +32,7 @@ from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step
 from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.physics.elementary import ONE, ZERO
 from warpchain.kernels.physics.geometry import link_is_finite, whole_lanes
-from warpchain.kernels.physics.load import IS_UNIFORM
+from warpchain.kernels.physics.load import LOADS
 from warpchain.kernels.physics.scaled_loads import write_links
 from warpchain.kernels.types import Chain, Control, Drive, Integers, Model, Record, Rows, State, read_ground
 
@@ -92,14 +92,16 @@ def make_advance(features: Features):
     fixed_loss, _, _ = of_fixed_body(features.is_driven)
     # on the sprocket the pauses between impulses are too short for a flight
     is_held = is_driven or features.moving_sprocket
-    has_flight = find_method(features.method).has_rigid_flight and IS_UNIFORM and not is_held
-    joints = rigid_in_flight(features.method, columns) if has_flight else springs(features.method, features.tilts)
+    has_flight = find_method(features.method).has_rigid_flight and LOADS[features.load].is_uniform and not is_held
+    joints = (
+        rigid_in_flight(features.method, columns) if has_flight else springs(features.method, features.acceleration)
+    )
     plane = tilting_plane(joints) if features.tilts else upright_plane(features.fixed_body, joints)
     meet_bodies = body_pass(features, plane)
     make_list, meet_links = link_pass(features, joints)
     bound_of_step = step_bound(features, has_flight)
     sample = sampling(features)
-    write_sample, _, _ = VIEWS[features.tilts]
+    write_sample = observation(features)
 
     @wp.func
     def take_sample(

@@ -3,7 +3,6 @@
 import warp as wp
 
 from warpchain.kernels.codes import NOT_FINITE, RUNNING
-from warpchain.kernels.events.summary import summarise
 from warpchain.kernels.layout import COSINE, COULOMB, LEFT_X, LEFT_Y, OMEGA, RIGHT_X, RIGHT_Y, SINE, TIME, VISCOUS, U, V
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.physics.joint import friction_torque, joint_force
@@ -30,14 +29,6 @@ def keep_sample(state: State, record: Record, world: int, time: wp.float64):
         row = record.sample_count[world]
         copy_sample(state, world, record.samples[world], row)
         record.sample_count[world] = row + 1
-
-
-@wp.func
-def observe(K: Rows, chain: Chain, state: State, record: Record, world: int, time: wp.float64):
-    """Writes a sample of a chain whose ends are placed; returns the area inside the loop [m²]."""
-    area = summarise(K, chain, state.last_sample[world])
-    keep_sample(state, record, world, time)
-    return area
 
 
 @wp.func

@@ -6,14 +6,17 @@ import warp as wp
 
 from warpchain.kernels.codes import RUNNING
 from warpchain.kernels.events.ending import watch_ending
-from warpchain.kernels.events.record import observe, write_frame
+from warpchain.kernels.events.record import keep_sample, write_frame
 from warpchain.kernels.events.release import drag_rate, load_at, watch_steadiness
 from warpchain.kernels.events.rest import watch_rest
 from warpchain.kernels.events.softening import watch_collapse, watch_drive, watch_stiffening
-from warpchain.kernels.events.tilting import no_fall, observe_in_room, watch_fall, write_frame_in_room
+from warpchain.kernels.events.summary import summarise
+from warpchain.kernels.events.tilting import move_into_room, watch_fall, write_frame_in_room
 from warpchain.kernels.features import Features
-from warpchain.kernels.layout import HEIGHT, TIME
+from warpchain.kernels.layout import GRAVITATIONAL, HEIGHT, TIME
 from warpchain.kernels.physics.elementary import ZERO
+from warpchain.kernels.physics.geometry import read_link
+from warpchain.kernels.physics.load import LOADS, no_energy
 from warpchain.kernels.physics.scaled_loads import drag_shape
 from warpchain.kernels.types import Chain, Control, Drive, Record, Rows, State
 
@@ -27,8 +30,26 @@ def next_mark(state: State, control: Control, world: int):
     return due
 
 
-VIEWS = {False: (observe, write_frame, no_fall), True: (observe_in_room, write_frame_in_room, watch_fall)}
-"""How a sample and a frame are written, and the watch of a fall, by whether the plane of the chain may tilt."""
+@functools.cache
+def observation(features: Features):
+    """Warp function that writes a sample of a chain whose ends are placed; it returns the area inside the loop [m²]."""
+    energy = LOADS[features.load].energy
+    has_energy = energy is not no_energy
+
+    @wp.func
+    def observe(K: Rows, chain: Chain, state: State, record: Record, world: int, time: wp.float64):
+        area = summarise(K, chain, state.last_sample[world])
+        if wp.static(has_energy):
+            i = int(0)
+            while i < chain.link_count:
+                state.last_sample[world, GRAVITATIONAL] += energy(chain, i, read_link(K, chain, i))
+                i += 1
+        if wp.static(features.tilts):
+            move_into_room(K, state.plane[world], chain, state.last_sample[world])
+        keep_sample(state, record, world, time)
+        return area
+
+    return observe
 
 
 @functools.cache
@@ -44,7 +65,8 @@ def sampling(features: Features):
     plane that tilts must be those of the present state.
     """
     has_floor, is_driven = features.has_floor, features.is_driven
-    write, append_frame, watch_plane = VIEWS[features.tilts]
+    write = observation(features)
+    append_frame = write_frame_in_room if features.tilts else write_frame
 
     @wp.func
     def sample(
@@ -80,7 +102,8 @@ def sampling(features: Features):
         if wp.static(has_floor):
             watch_stiffening(state, drive, control, world, time)
             watch_collapse(chain, state, control, world, time, area, is_first)
-        watch_plane(state, world, time)
+        if wp.static(features.tilts):
+            watch_fall(state, world, time)
         if wp.static(has_floor):
             return watch_rest(state, drive, control, world, state.last_sample[world], last_floor_impulse)
         if wp.static(is_driven):

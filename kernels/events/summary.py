@@ -5,8 +5,6 @@ import warp as wp
 from warpchain.kernels import layout
 from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, MASS, OMEGA, RADIUS, RIGHT_X, RIGHT_Y, SINE, U, V, X, Y
 from warpchain.kernels.physics.elementary import HALF, ZERO, from_order_key, order_key
-from warpchain.kernels.physics.geometry import read_link
-from warpchain.kernels.physics.load import NOTHING, link_energy, weight_energy
 from warpchain.kernels.types import Chain, Row, Rows
 
 
@@ -28,7 +26,6 @@ def summarise(K: Rows, chain: Chain, sample: Row):
     along = ZERO
     square = ZERO
     area = ZERO
-    further = NOTHING
     left = order_key(K[RIGHT_X, 0])
     right = left
     bottom = order_key(K[RIGHT_Y, 0])
@@ -43,7 +40,6 @@ def summarise(K: Rows, chain: Chain, sample: Row):
         my += m * K[Y, i]
         mu += m * K[U, i]
         mv += m * K[V, i]
-        further += link_energy(chain, i, read_link(K, chain, i))
         kinetic += HALF * (m * speed + K[layout.INERTIA, i] * K[OMEGA, i] * K[OMEGA, i])
         square += speed
         along += K[U, i] * K[COSINE, i] + K[V, i] * K[SINE, i]
@@ -63,7 +59,7 @@ def summarise(K: Rows, chain: Chain, sample: Row):
     sample[layout.CENTER_U] = mu / mass
     sample[layout.CENTER_V] = mv / mass
     sample[layout.KINETIC] = kinetic
-    sample[layout.GRAVITATIONAL] = weight_energy(chain, my) + further
+    sample[layout.GRAVITATIONAL] = chain.gravity * my
     sample[layout.SPRING] = spring
     sample[layout.LOWEST] = from_order_key(lowest)
     sample[layout.RMS_SPEED] = wp.sqrt(square / wp.float64(n))

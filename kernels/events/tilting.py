@@ -3,8 +3,7 @@
 import warp as wp
 
 from warpchain.kernels import layout
-from warpchain.kernels.events.record import keep_sample, write_frame
-from warpchain.kernels.events.summary import summarise
+from warpchain.kernels.events.record import write_frame
 from warpchain.kernels.layout import AHEAD, FELL_AT, GREATEST_LEAN, LEFT_X, LEFT_Y, ORIGIN, PLANE_VALUES, UP, X, Y
 from warpchain.kernels.physics.elementary import ONE, ZERO, from_order_key, order_key
 from warpchain.kernels.physics.plane import plane_energy
@@ -80,15 +79,6 @@ def move_into_room(K: Rows, P: Row, chain: Chain, sample: Row):
 
 
 @wp.func
-def observe_in_room(K: Rows, chain: Chain, state: State, record: Record, world: int, time: wp.float64):
-    """Writes a sample of a chain whose ends are placed: its sums in the room, and the plane; returns the area [m²]."""
-    area = summarise(K, chain, state.last_sample[world])
-    move_into_room(K, state.plane[world], chain, state.last_sample[world])
-    keep_sample(state, record, world, time)
-    return area
-
-
-@wp.func
 def write_frame_in_room(K: Rows, chain: Chain, state: State, record: Record, world: int, time: wp.float64):
     """Appends joint positions and behind them the plane, if frames are kept."""
     row = record.frame_count[world]
@@ -109,9 +99,3 @@ def watch_fall(state: State, world: int, time: wp.float64):
     state.watch[world, GREATEST_LEAN] = wp.max(state.watch[world, GREATEST_LEAN], lean)
     if state.watch[world, FELL_AT] < ZERO and lean > FALLEN:
         state.watch[world, FELL_AT] = time
-
-
-@wp.func
-def no_fall(_state: State, _world: int, _time: wp.float64):
-    """The watch of a plane that stays upright."""
-    return

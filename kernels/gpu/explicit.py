@@ -10,6 +10,7 @@ from typing import Any
 
 import warp as wp
 
+from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.stage import (
     Attempt,
     Run,
@@ -23,7 +24,7 @@ from warpchain.kernels.gpu.stage import (
     velocity_of,
 )
 from warpchain.kernels.layout import INVERSE_INERTIA, INVERSE_MASS, THETA
-from warpchain.kernels.methods.explicit_tableaus import Tableau
+from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.physics.elementary import LARGEST_TURN, ONE, ZERO, cos_sin
 from warpchain.kernels.physics.geometry import Link, turned
 
@@ -39,19 +40,19 @@ class Ahead:
 
 
 @functools.cache
-def explicit_attempt(tableau: Tableau, block_dim: int, write_proximity: Any, read_proximity: Any, tilts: bool = False):
-    """Warp function that attempts a step with a tableau in blocks of this size.
+def explicit_attempt(features: Features, block_dim: int, write_proximity: Any, read_proximity: Any):
+    """Warp function that attempts a step in blocks of this size.
 
     Args:
-        tableau: Its coefficients.
+        features: What the kernel is compiled for.
         block_dim: Threads in a block.
         write_proximity: See :func:`gpu.contacts.proximity.block_proximity`.
         read_proximity: See :func:`gpu.contacts.proximity.block_proximity`.
-        tilts: Whether the plane of the chain may move.
 
     Returns:
         ``attempt(ends, forces, run, h)`` → Attempt, from the state and first stage on the board.
     """
+    tableau = find_method(features.method).tableau
     stages, last = tableau.stages, tableau.stages - 1
     reuses_last = tableau.first_same_as_last
     velocity_weights = tableau.velocity_weights
@@ -60,7 +61,7 @@ def explicit_attempt(tableau: Tableau, block_dim: int, write_proximity: Any, rea
     velocity = (*tableau.velocity, velocity_weights)
     position = (*tableau.position, tableau.position_weights)
     nodes = (*tableau.nodes, 1.0)
-    exchange_ends, stage = block_stage(block_dim, tilts)
+    exchange_ends, stage = block_stage(features, block_dim)
     Stages = wp.types.matrix(shape=(stages, 3), dtype=wp.float64)
 
     def ahead_of(s: int):

@@ -7,7 +7,7 @@ import warp as wp
 from warpchain.kernels import layout
 from warpchain.kernels.events.present_chain import has_changed, present_chain
 from warpchain.kernels.events.record import lacks_last_sample, record_is_full
-from warpchain.kernels.events.sample import VIEWS, next_mark, sampling
+from warpchain.kernels.events.sample import next_mark, observation, sampling
 from warpchain.kernels.events.softening import book_softening, contact_step, spring_tolerance
 from warpchain.kernels.events.tallies import add_count, of_fixed_body, raise_extreme, row_total, store_losses
 from warpchain.kernels.features import Features
@@ -50,7 +50,7 @@ def block_run(features: Features, touch: TouchLayout, plane: BlockPlane):
     """
     is_driven = features.is_driven
     fixed_loss, fixed_depth, fixed_count = of_fixed_body(features.is_driven)
-    write_sample, _, _ = VIEWS[features.tilts]
+    write_sample = observation(features)
 
     @wp.func
     def load(run: Run, model: Model, drive: Drive, state: State, control: Control):

@@ -12,13 +12,13 @@ import functools
 import warp as wp
 
 from warpchain.kernels import layout
+from warpchain.kernels.features import Features
 from warpchain.kernels.methods.controller import error_scale, quick_quotient
 from warpchain.kernels.physics import geometry
 from warpchain.kernels.physics.elementary import order_bits_single
 from warpchain.kernels.physics.geometry import Link, end_positions, end_velocities
 from warpchain.kernels.physics.joint import friction_torque, joint_force, link_acceleration
-from warpchain.kernels.physics.load import link_load
-from warpchain.kernels.physics.plane import on_plane, plane_load
+from warpchain.kernels.physics.plane import on_plane
 from warpchain.kernels.types import Chain, Ground, Integers, Row, Rows
 
 LARGEST_SCALE = wp.constant(wp.float32(1e30))
@@ -170,19 +170,19 @@ def greatest_of_three(error: vec3d, value: vec3d, rate: vec3d, h: wp.float64):
 
 
 @functools.cache
-def block_stage(block_dim: int, tilts: bool = False):
+def block_stage(features: Features, block_dim: int):
     """Warp functions for blocks of this size: (exchange ends, evaluate a stage).
 
     Args:
+        features: What the kernel is compiled for.
         block_dim: Threads in a block.
-        tilts: Whether the plane of the chain may move.
 
     Returns:
         ``exchange_ends(ends, run, link)`` → left end of the next link;
         ``stage(forces, run, next_end, link, 1/m, 1/I)`` → rates: accelerations ẍ, ÿ [m/s²] and θ̈ [rad/s²] of the link,
         power [W] lost in its right joint by friction, and by damping, divided by the joint's b.
     """
-    load = plane_load if tilts else link_load
+    load = features.acceleration
 
     @wp.func
     def exchange_ends(ends: wp.tile[vec5d, block_dim], run: Run, link: Link):
@@ -230,7 +230,7 @@ def block_stage(block_dim: int, tilts: bool = False):
             torque,
         )
         felt = constants(K)
-        if wp.static(tilts):
+        if wp.static(features.tilts):
             felt = felt_plane(run)
         load_x, load_y, load_turn = load(felt, run.lane, link, inverse_mass, inverse_inertia)
         return vec5d(ax + load_x, ay + load_y, at + load_turn, friction, damping)

@@ -15,6 +15,7 @@ from warpchain.kernels.methods.controller import classical_controller
 from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.methods.w_tableaus import ERROR_ORDER
 from warpchain.kernels.physics.elementary import ONE, ZERO
+from warpchain.kernels.physics.load import weight
 from warpchain.kernels.types import Chain, Control, Rows, State
 
 
@@ -37,7 +38,7 @@ def rigid_in_flight(name: str, columns: int) -> Joints:
     attempt_flight, commit_flight = flight_method(columns, first_row)
     close_joints, open_joints = joint_switch(columns, first_row)
     growth, shrink = classical_controller(ERROR_ORDER)
-    on_springs = springs(name, tilts=False)
+    on_springs = springs(name, weight)
 
     @wp.func
     def settle(K: Rows, chain: Chain, state: State, world: int):

@@ -26,7 +26,7 @@ from warpchain.kernels.layout import STAGES, X
 from warpchain.kernels.physics.elementary import HALF, ONE, ZERO, cos_sin, order_bits
 from warpchain.kernels.physics.geometry import Link, put, three
 from warpchain.kernels.physics.joint import friction_torque
-from warpchain.kernels.physics.load import link_load
+from warpchain.kernels.physics.load import weight
 from warpchain.kernels.physics.rigid_joint import inward_pull, turning_share
 from warpchain.kernels.types import Chain, Rows
 
@@ -155,7 +155,7 @@ def solve_forces(S: Rows, chain: Chain):
     c = int(8)
     while c < end_column(chain):
         pushed = pushed_at(S, a, c)
-        load_x, load_y, load_turn = link_load(chain, c, Link(), S[INVERSE_MASS, c], S[INVERSE_INERTIA, c])
+        load_x, load_y, load_turn = weight(chain, c, Link(), S[INVERSE_MASS, c], S[INVERSE_INERTIA, c])
         put(S, at.RATE, c, wp.vec3d(pushed[0] + load_x, pushed[1] + load_y, S[FREE, c] + (pushed[2] + load_turn)))
         c += 1
 
