@@ -32,7 +32,6 @@ from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step
 from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.physics.elementary import ONE, ZERO
 from warpchain.kernels.physics.geometry import link_is_finite, whole_lanes
-from warpchain.kernels.physics.load import LOADS
 from warpchain.kernels.physics.scaled_loads import write_links
 from warpchain.kernels.types import Chain, Control, Drive, Integers, Model, Record, Rows, State, read_ground
 
@@ -90,12 +89,11 @@ def make_advance(features: Features):
     is_driven = features.is_driven
     face_of = BODIES[features.fixed_body].face
     fixed_loss, _, _ = of_fixed_body(features.is_driven)
-    # on the sprocket the pauses between impulses are too short for a flight
-    is_held = is_driven or features.moving_sprocket
-    has_flight = find_method(features.method).has_rigid_flight and LOADS[features.load].is_uniform and not is_held
-    joints = (
-        rigid_in_flight(features.method, columns) if has_flight else springs(features.method, features.acceleration)
-    )
+    # on the sprocket the pauses between impulses are too short for a flight; in flight joints feel weight only
+    can_fly = not is_driven and not features.moving_sprocket and features.load == "weight"
+    has_flight = find_method(features.method).has_rigid_flight and can_fly
+    on_springs = springs(features.method, features.acceleration)
+    joints = rigid_in_flight(features.method, columns) if has_flight else on_springs
     plane = tilting_plane(joints) if features.tilts else upright_plane(features.fixed_body, joints)
     meet_bodies = body_pass(features, plane)
     make_list, meet_links = link_pass(features, joints)

@@ -33,9 +33,7 @@ class Load:
 
     acceleration: Any  # as :func:`weight`
     energy: Any  # as :func:`no_energy`
-    # whether all links have the same acceleration everywhere, and no torque; otherwise joints are not rigid in flight
-    is_uniform: bool
 
 
-LOADS = {"weight": Load(weight, no_energy, is_uniform=True)}
+LOADS = {"weight": Load(weight, no_energy)}
 """Loads by name. A script may add its own before it asks for a kernel."""

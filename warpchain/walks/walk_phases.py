@@ -44,7 +44,7 @@ def phase_features(setup: Setup) -> dict[str, Features]:
     """
     scene, options = setup.scene, setup.options
 
-    def features(body: str, **more: bool) -> Features:
+    def features(body: str, **more: Any) -> Features:
         columns = layout.padded_width(scene.links)
         return Features(options.method, columns, body, self_contact=options.self_contact, **more)
 

@@ -59,7 +59,7 @@ def pull(position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
 )
 def test_a_load_of_a_script_acts_in_every_stage(method: str, device: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A chain tied to a point, one link of which is slowed, is where DOP853 at 1e-12 has it, and has that energy."""
-    monkeypatch.setitem(LOADS, "tied", Load(tied, stretched, is_uniform=False))
+    monkeypatch.setitem(LOADS, "tied", Load(tied, stretched))
     start = lay_chain(ellipse(1.5), LINKS, SOFT.link_length, 2.0, 0.1)
     batch = Batch(1, LINKS, Options(method=method, device=device, tolerance=1e-10, self_contact=False))
     batch.set_chain(0, SOFT, LINKS)
