@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from studies.common import drawn_terms, read_columns, write_rows
-from studies.phase_diagram import candidates, cells, laws, run, strands
+from studies.phase_diagram import candidates, cells, laws, push, run, strands
 from studies.phase_diagram.endings import Ending, endings
 from tests.support.made_sweeps import distance, make_sweep
 from warpchain import Status
@@ -154,3 +154,9 @@ def test_the_command_draws_and_writes_the_page(tmp_path: Path, monkeypatch: pyte
     run.make()
     assert (tmp_path / "README.md").read_text(encoding="utf-8") == page
     assert {path.stem for path in (tmp_path / "figures").iterdir()} == {"maps", "laws", "scales"}
+
+
+def test_the_table_of_the_push_is_of_its_file() -> None:
+    """The page holds what the command prints; a tenth further than others whose mean is known to a tenth."""
+    assert push.table() in (run.FOLDER / "README.md").read_text(encoding="utf-8")
+    assert push.over({("60", "5"): (1.1, 0.0)}, {("60", "5"): (1.0, 0.1)}) == "+10.00 ± 11.00 %"
