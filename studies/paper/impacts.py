@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from studies.common import Array, Block
-
+Array = NDArray[np.float64]
+Block = Any
+"""A block of `warpchain.SweepResult.blocks`."""
 Motion = Any
 """The kept motion of a walk, as `Block.walk_motion` returns it."""
 
