@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 
 import warpchain
+from studies.common import table as markdown
+from studies.common import write_rows
 
 RESULTS = Path(__file__).parent / "results"
 GROUPS = {
@@ -38,9 +40,9 @@ def reduce(arguments: list[str]) -> None:
                 for j, frequency in enumerate(block.axes["frequency"]):
                     dx = block.dx[i, j][block.status[i, j] == warpchain.Status.AT_REST]
                     error = dx.std(ddof=1) / np.sqrt(len(dx))
-                    rows.append([group, links, frequency, len(dx), f"{dx.mean():.6g}", f"{error:.3g}"])
-    with (RESULTS / "push.csv").open("w", newline="", encoding="utf-8") as file:
-        csv.writer(file, lineterminator="\n").writerows([["group", "links", "frequency", "walks", "dx", "se"], *rows])
+                    row = {"group": group, "links": links, "frequency": frequency, "walks": len(dx)}
+                    rows.append(row | {"dx": float(dx.mean()), "se": float(error)})
+    write_rows(RESULTS / "push.csv", rows)
 
 
 def cells_of(path: Path, mean: str, error: str) -> dict[str, Cells]:
@@ -67,11 +69,11 @@ def table() -> str:
     """The table of the page."""
     groups = cells_of(RESULTS / "push.csv", "dx", "se")
     million = cells_of(RESULTS / "cells.csv", "dx_mean", "dx_se")[""]
-    lines = ["| walks | over the million | over those without the push |", "| --- | --- | --- |"]
+    rows = []
     for name, title in GROUPS.items():
         beside = "" if name == "without" else over(groups[name], groups["without"])
-        lines.append(f"| {title} | {over(groups[name], million)} | {beside} |")
-    return "\n".join(lines)
+        rows.append([title, over(groups[name], million), beside])
+    return markdown("walks | over the million | over those without the push", rows)
 
 
 if __name__ == "__main__":
