@@ -17,8 +17,8 @@ from warpchain.inputs.distributions import TABLE, Uniform
 from warpchain.inputs.methods import METHODS, METHODS_BY_NEED
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS, Parameters
-from warpchain.inputs.scene import LISTS, Scene
-from warpchain.inputs.validation import field_unit, spelled
+from warpchain.inputs.scene import COMPOUND, Scene
+from warpchain.inputs.validation import FIELDS, field_limits, field_unit, spelled
 from warpchain.status import Status
 from warpchain.sweeps.designs import SAMPLERS
 from warpchain.sweeps.recording import FRAME_INTERVAL, SERIES_INTERVAL, Frames
@@ -74,19 +74,17 @@ def values_of(field: FieldInfo) -> str:
         return f", or {others}" if others else ""
     if str in kinds:
         return ""
-    limits = {
-        name: format(limit, "g")
-        for item in field.metadata
-        for name in ("ge", "gt", "le", "lt")
-        if (limit := getattr(item, name, None)) is not None
-    }
-    extra = field.json_schema_extra
-    unit = str(extra.get("unit", "1")) if isinstance(extra, dict) else "1"
+    unit, limits = field_unit(field), field_limits(field)
     if not limits:
         return in_unit(", or a list of numbers", unit if unit == "1" else f"in {unit}")
-    lower = "[" + limits["ge"] if "ge" in limits else "(" + limits["gt"]
-    upper = limits["le"] + "]" if "le" in limits else limits.get("lt", "∞") + ")"
-    return (", whole, " if int in kinds else ", ") + in_unit(f"{lower}, {upper}", unit)
+    return (", whole, " if int in kinds else ", ") + in_unit(bounds_of(limits), unit)
+
+
+def bounds_of(limits: Mapping[str, float]) -> str:
+    """Limits of a number as an interval."""
+    lower = f"[{limits['ge']:g}" if "ge" in limits else f"({limits['gt']:g}"
+    upper = f"{limits['le']:g}]" if "le" in limits else f"{limits['lt']:g})" if "lt" in limits else "∞)"
+    return f"{lower}, {upper}"
 
 
 def fields_of(model: type[BaseModel], other_meanings: Mapping[str, str] | None = None) -> str:
@@ -110,26 +108,19 @@ def parameters_page() -> str:
             ascii_symbol = spelled(row.symbol)
             symbol = row.symbol if ascii_symbol == row.symbol else f"{row.symbol}, `{ascii_symbol}`"
             value = f"{row.value:g}" + (f" ± {row.sigma:g}" if row.sigma else "")
-            bounds = f"{'[' if row.bounds.lower_included else '('}{row.bounds.lower:g}, {row.bounds.upper:g}]"
+            bounds = bounds_of(field_limits(FIELDS[name]))
             rows.append((f"`{name}`", symbol, in_unit(value, row.unit), bounds, row.meaning))
         tables.append(f"## {source.capitalize()}\n\n" + table(("name", "symbol", "value", "bounds", "meaning"), rows))
-    differing = {
-        preset: ", ".join(
-            f"`{name}: {getattr(values, name):g}`"
-            for name, row in quantities.items()
-            if getattr(values, name) != row.value
-        )
-        for preset, values in PRESETS.items()
-    }
+    presets = []
+    for preset, values in PRESETS.items():
+        other = {name: value for name, value in values.model_dump().items() if value != quantities[name].value}
+        presets.append((f"`{preset}`", ", ".join(f"`{name}: {value:g}`" for name, value in other.items()) or "Table 1"))
     return (
         "# Parameters\n\n"
         "The quantities of Table 1 of the paper, in SI units, by source; those *chosen here* are not in the paper. "
         "After ± stands the standard deviation of the Gaussian that samples draw from; a draw outside the bounds is "
         "drawn again. `circle_radius` is smaller than half of `link_length`. A symbol, also in ASCII, stands for its "
-        "name: `mu_fc=0.3` for `floor_friction=0.3`.\n\n"
-        + "\n".join(tables)
-        + "\n## Presets\n\n"
-        + listing((f"`{preset}`", text or "Table 1") for preset, text in differing.items())
+        "name: `mu_fc=0.3` for `floor_friction=0.3`.\n\n" + "\n".join(tables) + "\n## Presets\n\n" + listing(presets)
     )
 
 
@@ -167,18 +158,13 @@ def options_page() -> str:
 
 def sweep_file_page() -> str:
     """Keys, grids, distributions, samplers and recording of a sweep file."""
-    gaussian = [f"`{name}`" for name, law in TABLE.items() if not isinstance(law, Uniform)]
-    uniform = [
-        f"`{name}` uniformly in [{law.lower:g}, {law.upper:g}]"
-        for name, law in TABLE.items()
-        if isinstance(law, Uniform)
-    ]
+    even = {name: f"[{law.lower:g}, {law.upper:g}]" for name, law in TABLE.items() if isinstance(law, Uniform)}
+    uniform = [f"`{name}` uniformly in {interval}" for name, interval in even.items()]
+    gaussian = [f"`{name}`" for name in TABLE if name not in even]
     fields = sorted(SweepFile.model_fields.items(), key=lambda item: item[0] in BlockKeys.model_fields)
     keys = [(f"`{name}`", str(field.description)) for name, field in fields]
-    kept = [
-        (f"`{name}`", f"{field.description}" + ", in s" * (field_unit(field) == "s"))
-        for name, field in Frames.model_fields.items()
-    ]
+    frames = Frames.model_fields.items()
+    kept = [(f"`{name}`", f"{field.description}" + ", in s" * (field_unit(field) == "s")) for name, field in frames]
     only_file = [f"`{name}`" for name, _ in fields if name not in BlockOfFile.model_fields]
     numbers = [f"`{name}`" for name, field in Scene.model_fields.items() if field.annotation is float]
     return (
@@ -190,8 +176,8 @@ def sweep_file_page() -> str:
         "`[10, 15, 20]`, or a range with both ends: `{from: 5, to: 30, step: 5}` or `{from: 5, to: 30, count: 6}`. The "
         "last axis varies fastest. `null` stands for itself where a field may be null, such as `load_factor: [null, "
         "1]`; in merged files, xarray and pandas it is NaN. "
-        f"{', '.join(f'`{name}`' for name in LISTS)} take lists of their own: for several of them, give blocks, each "
-        "with `scene: {floor: …}`.\n"
+        "Where a value may be a list itself, each has a name, as in `floor: {flat: flat, ramp: [[0, 0], [1, 0.1]]}`: "
+        f"{', '.join(f'`{name}`' for name in COMPOUND)}.\n"
         "\n## Distributions\n\nThe key `all` says what is drawn of the other quantities: `table` (the default) or "
         "`fixed`, nothing. Each quantity takes one of `table`, `fixed`, `{uniform: [lower, upper]}` and "
         "`{gaussian: {mean: …, sigma: …}}`; without `mean` the Gaussian lies about the chain's value. Given values, "
@@ -272,21 +258,21 @@ def commands_page() -> str:
     return "".join(parts)
 
 
+PAGES: Final = {
+    "parameters.md": parameters_page,
+    "scene.md": scene_page,
+    "options.md": options_page,
+    "sweep-file.md": sweep_file_page,
+    "results.md": results_page,
+    "commands.md": commands_page,
+}
+
+
 def pages() -> Mapping[str, str]:
     """File name → content of every page."""
-    made = {
-        "parameters.md": parameters_page(),
-        "scene.md": scene_page(),
-        "options.md": options_page(),
-        "sweep-file.md": sweep_file_page(),
-        "results.md": results_page(),
-        "commands.md": commands_page(),
-    }
-    return {name: NOTE + text for name, text in made.items()}
+    return {name: NOTE + page() for name, page in PAGES.items()}
 
 
 if __name__ == "__main__":
-    FOLDER.mkdir(exist_ok=True)
     for name, text in pages().items():
         (FOLDER / name).write_text(text, encoding="utf-8")
-        print(FOLDER / name)

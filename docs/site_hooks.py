@@ -50,12 +50,9 @@ def notebook_page(notebook: Path) -> str:
         parts.append(source if cell["cell_type"] == "markdown" else f"```python\n{source}\n```")
         for output in cell.get("outputs", ()):
             data = {kind: "".join(text) for kind, text in output.get("data", {}).items()}
-            if "text/html" in data:
-                parts.append(f'<div class="output">{data["text/html"]}</div>')
-            elif "image/png" in data:
-                parts.append(
-                    f'<div class="output"><img alt="" src="data:image/png;base64,{data["image/png"].strip()}"></div>'
-                )
+            image = f'<img alt="" src="data:image/png;base64,{data.get("image/png", "").strip()}">'
+            if "text/html" in data or "image/png" in data:
+                parts.append(f'<div class="output">{data.get("text/html", image)}</div>')
             else:
                 parts.append("```text\n" + (data.get("text/plain") or "".join(output["text"])).rstrip() + "\n```")
     return "\n\n".join([*parts, f"[This page as a notebook]({notebook.name})"])

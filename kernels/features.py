@@ -1,6 +1,7 @@
 """What a step kernel is compiled for, and the compiler's flags."""
 
 from dataclasses import dataclass
+from typing import Any
 
 COMPILER_FLAGS = (
     "-march=native -ffp-contract=fast -mllvm=-inline-threshold=40000 -mllvm=-inline-cold-callsite-threshold=3000"
@@ -10,30 +11,33 @@ COMPILER_FLAGS = (
 
 @dataclass(frozen=True)
 class Features:
-    """What a step kernel is compiled for; code for anything else is left out.
+    """What a step kernel is compiled for; code for anything else is left out."""
 
-    Attributes:
-        method: Name of a method, see :mod:`methods.method`.
-        columns: Width of a chain's scratch, see :func:`layout.padded_width`.
-        fixed_body: A key of :data:`contacts.fixed_body.BODIES`.
-        self_contact: Contacts between a chain's own links.
-        tilts: Whether the plane of the chain may move, see :mod:`physics.plane`; with an explicit method only.
-        moving_sprocket: Whether the sprocket is there as well, above a floor, and moves.
-    """
-
-    method: str
-    columns: int
-    fixed_body: str
-    self_contact: bool
+    method: str  # name of a method, see :mod:`methods.method`
+    columns: int  # width of a chain's scratch, see :func:`layout.padded_width`
+    fixed_body: str  # A key of :data:`contacts.fixed_body.BODIES`
+    self_contact: bool  # contacts between a chain's own links
+    # whether the plane of the chain may move, see :mod:`physics.plane`; with an explicit method only
     tilts: bool = False
-    moving_sprocket: bool = False
+    load: str = "weight"  # a key of :data:`physics.load.LOADS`
+    moving_sprocket: bool = False  # whether the sprocket is there as well, above a floor, and moves
 
     @property
     def is_driven(self) -> bool:
         """Whether there is a driven sprocket: loads and links may change at a sample."""
-        return self.fixed_body == "sprocket"
+        from warpchain.kernels.contacts.fixed_body import BODIES  # only a kernel that is compiled needs its source
+
+        return BODIES[self.fixed_body].is_driven
+
+    @property
+    def acceleration(self) -> Any:
+        """Warp function of what accelerates a link besides its joints, see :func:`physics.load.weight`."""
+        from warpchain.kernels.physics.load import LOADS
+        from warpchain.kernels.physics.plane import plane_load
+
+        return plane_load if self.tilts else LOADS[self.load].acceleration
 
     @property
     def has_floor(self) -> bool:
         """Whether there is a floor of any kind."""
-        return self.fixed_body not in ("none", "sprocket")
+        return self.fixed_body != "none" and not self.is_driven

@@ -9,52 +9,52 @@ from itertools import accumulate
 # State at the start of the step.
 X, Y, THETA, U, V, OMEGA = range(6)
 COSINE, SINE = 6, 7
-# Constants of the links, under their present loads; friction of the joints, β [N m s] and τ_c [N m].
-MASS, INERTIA, INVERSE_MASS, INVERSE_INERTIA, VISCOUS, COULOMB = range(8, 14)
+# Constants of the links, under their present loads; friction of the joints, β [N m s] and τ_c [N m]; radius of the
+# links' circles [m].
+MASS, INERTIA, INVERSE_MASS, INVERSE_INERTIA, VISCOUS, COULOMB, RADIUS = range(8, 15)
 # A stage: link ends, arm, spin. Rows of left ends and of the spin are padded: column n repeats column 0.
-LEFT_X, LEFT_Y, RIGHT_X, RIGHT_Y = range(14, 18)
-LEFT_U, LEFT_V, RIGHT_U, RIGHT_V = range(18, 22)
-STAGE_ARM_X, STAGE_ARM_Y, STAGE_SPIN = 22, 23, 24
+LEFT_X, LEFT_Y, RIGHT_X, RIGHT_Y = range(15, 19)
+LEFT_U, LEFT_V, RIGHT_U, RIGHT_V = range(19, 23)
+STAGE_ARM_X, STAGE_ARM_Y, STAGE_SPIN = 23, 24, 25
 # A finished attempt: candidate state and its error ratio.
-NEW_X, NEW_Y, NEW_THETA, NEW_U, NEW_V, NEW_OMEGA = range(25, 31)
-ERROR = 31
+NEW_X, NEW_Y, NEW_THETA, NEW_U, NEW_V, NEW_OMEGA = range(26, 32)
+ERROR = 32
 # Joint forces and torques, shifted by one: column i + 1 is joint i, column 0 repeats column n. They lie at least three
 # rows from the stage rows they are computed from. Closer, clang allows for a load that waits for the store of an
 # earlier column, and vectorises by 2 instead of 8.
-FORCE_X, FORCE_Y, TORQUE = 32, 33, 34
+FORCE_X, FORCE_Y, TORQUE = 33, 34, 35
 # Energy [J] lost so far: per joint to friction and damping, per link to floor or sprocket.
-LOST_FRICTION, LOST_DAMPING, LOST_FIXED = 35, 36, 37
+LOST_FRICTION, LOST_DAMPING, LOST_FIXED = 36, 37, 38
 # Joint positions when the neighbour list was built.
-LISTED_X, LISTED_Y = 38, 39
+LISTED_X, LISTED_Y = 39, 40
 # Per stage, in this order: accelerations of x, y, θ, and the power [W] lost in each joint to friction and damping.
-STAGES = 40
+STAGES = 41
 STAGE_ROWS = 5
 
 # Model.links: what links and joints have of their own, one after the other as in a chain's parameters.
-OWN_MASS, OWN_INERTIA, OWN_VISCOUS, OWN_COULOMB = range(4)
-LINK_ROWS = 4
+OWN_MASS, OWN_INERTIA, OWN_VISCOUS, OWN_COULOMB, OWN_RADIUS = range(5)
+LINK_ROWS = 5
 
-# On a GPU the first 18 rows above and the following ones lie on a board that all threads of a block share. Between
+# On a GPU the first 19 rows above and the following ones lie on a board that all threads of a block share. Between
 # launches the scratch keeps the rows from BOARD_LOST_SELF up to BOARD_VALUES. Every row less leaves a multiprocessor
 # more cache for register spills.
-BOARD_LOST_SELF, BOARD_LOST_FRICTION, BOARD_LOST_DAMPING, BOARD_LOST_FIXED = range(18, 22)
-BOARD_LISTED_X, BOARD_LISTED_Y = 22, 23
+BOARD_LOST_SELF, BOARD_LOST_FRICTION, BOARD_LOST_DAMPING, BOARD_LOST_FIXED = range(19, 23)
+BOARD_LISTED_X, BOARD_LISTED_Y = 23, 24
 # First stage of the next step: accelerations, then the two powers (see STAGES).
-BOARD_FIRST = 24
+BOARD_FIRST = 25
 # Values of the whole chain, in the first columns of one more row; behind them its constants, see gpu.stage.constants.
-BOARD_VALUES = 29
+BOARD_VALUES = 30
 VALUE_OPENING, VALUE_FIXED_DEPTH, VALUE_LAST_IMPULSE, VALUE_STOP_TIME, VALUE_NEXT_SAMPLE = range(5)
 VALUE_DEADLINE, VALUE_CONTACT_STEP, VALUE_TOLERANCE = 5, 6, 7
-# A plane that tilts, as the links feel it: seven values, see gpu.tilting; and in the attempt before.
-VALUE_PLANE, VALUE_PLANE_BEFORE = 8, 15
-VALUES = 22
-BOARD_ROWS = 30
+# A plane that tilts in the middle of the attempt before: the first PLANE_VALUES of State.plane.
+VALUE_PLANE_BEFORE = 8
+VALUES = 20
+BOARD_ROWS = 31
 
-# State.watch
-WINDOW_START, WINDOW_COUNT, SUM_HEIGHT, SUM_WIDTH, SUM_X, SUM_Y, SUM_SPEED = range(7)
-STEADY_SINCE, LEAST_HEIGHT, GREATEST_HEIGHT, LEAST_WIDTH, GREATEST_WIDTH = range(7, 12)
-LEAST_X, GREATEST_X, LEAST_Y, GREATEST_Y = range(12, 16)
-LEAST_SPEED, GREATEST_SPEED = 16, 17
+# State.watch. Of each watched quantity of a loop on its sprocket, in the order of WATCHED_COLUMNS: the sum over the
+# samples of a window, and the least and the greatest mean of a window.
+WINDOW_START, WINDOW_COUNT, WINDOW_SUMS, STEADY_SINCE, RANGES = 0, 1, 2, 7, 8
+LOOP_HEIGHT, LOOP_WIDTH, LOOP_X, LOOP_Y, LOOP_ALONG = range(5)
 HOLD_LOAD, LOADED_SINCE, UNLOADED_SINCE, DRIFT = range(18, 22)
 REST_SINCE, LAST_FLOOR_IMPULSE = 22, 23
 SOFTENED_AT = 24
@@ -105,15 +105,16 @@ TIME, CENTER_X, CENTER_Y, CENTER_U, CENTER_V = range(5)
 KINETIC, GRAVITATIONAL, SPRING, LOWEST, RMS_SPEED = range(5, 10)
 HEIGHT, WIDTH, LOOP_SPEED = 10, 11, 12
 SAMPLE_COLUMNS = 13
+WATCHED_COLUMNS = (HEIGHT, WIDTH, CENTER_X, CENTER_Y, LOOP_SPEED)
 # Further columns if the plane tilts: the plane, then place and speed of the centre of mass along the room's Z axis.
 PLANE_COLUMN = 13
 CENTER_Z, CENTER_W = 25, 26
 ALL_COLUMNS = 27
 
 # Model.faces: where a face begins, the unit vector along it, that along the face before it if the corner between them
-# is convex and 0 otherwise, and where along it it begins and ends: infinite for the first and the last face.
-FACE_X, FACE_Y, ALONG_X, ALONG_Y, BEFORE_X, BEFORE_Y, FACE_BEGIN, FACE_END = range(8)
-FACE_VALUES = 8
+# is convex and 0 otherwise, and where along it it begins and ends: infinite for the first and the last face; e and μ.
+FACE_X, FACE_Y, ALONG_X, ALONG_Y, BEFORE_X, BEFORE_Y, FACE_BEGIN, FACE_END, FACE_RESTITUTION, FACE_FRICTION = range(10)
+FACE_VALUES = 10
 # Drive.motion: time [s], place x, y [m] of the sprocket, its velocity u, v [m/s], angular velocity [rad/s].
 MOTION_TIME, MOTION_X, MOTION_Y, MOTION_U, MOTION_V, MOTION_TURNING = range(6)
 MOTION_VALUES, MOTION_ROWS = 6, 17

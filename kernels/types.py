@@ -7,8 +7,6 @@ from typing import Any
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
-
 Rows: Any = wp.array2d(dtype=wp.float64)
 """One row for each quantity, one column for each link or joint, see :mod:`layout`."""
 Row: Any = wp.array(dtype=wp.float64)
@@ -35,7 +33,7 @@ class Chain:
     joint_damping: wp.float64  # b [N s/m]
     inverse_smoothing: wp.float64  # 1/ω_c [s/rad]
     gravity: wp.float64  # g [m/s²], along −y
-    circle_radius: wp.float64  # r [m], of a link's two circles
+    circle_radius: wp.float64  # r [m], the greatest of the links' circles; of one link's, see with_circles
     half_width: wp.float64  # h [m], of a link, across the plane of the chain
     tangential_restitution: wp.float64  # e_t
     floor_restitution: wp.float64  # e_fc
@@ -54,6 +52,14 @@ class Chain:
     up_y: wp.float64
     up_z: wp.float64
     origin_height: wp.float64
+
+
+@wp.func
+def with_circles(chain: Chain, radius: wp.float64) -> Chain:
+    """The chain as one of its links has it, whose two circles have this radius [m]."""
+    own = chain
+    own.circle_radius = radius
+    return own
 
 
 CHAIN_NUMBERS: Any = Chain.numpy_dtype()  # type: ignore[attr-defined]

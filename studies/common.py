@@ -1,18 +1,27 @@
-"""What all studies share: their commands, how their figures look, and how their tables get into their pages."""
+"""What all studies share: their commands, statistics, how their figures look, and how tables get into their pages."""
 
 import csv
+import re
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
 
 import numpy as np
 import typer
+import xarray
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from warpchain import InputError
+from warpchain import InputError, Status
+
+Array = NDArray[Any]
+Block = Any
+"""A block of `warpchain.SweepResult.blocks`."""
+Columns = Mapping[str, Array]
+"""Columns of a table by name."""
 
 LINE_COLORS: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Colours that people with any kind of colour vision can tell apart (Okabe and Ito, 2008)."""
@@ -28,15 +37,115 @@ DISTANCE: Final = "distance walked $Δx$ / m"
 FREQUENCY: Final = "frequency of the sprocket $ν$ / Hz"
 
 
-def run_study(main: Callable[..., None]) -> None:
-    """Run a study's command, whose arguments are those of the function; what is refused is one line."""
+def run_study(*commands: Callable[..., None]) -> None:
+    """Run a study's command, or one of several, whose arguments are those of its function; what is refused is one line.
+
+    A command of several is given by its name.
+    """
+    app = typer.Typer(pretty_exceptions_enable=False)
+    for command in commands:
+        app.command()(command)
     try:
-        typer.run(main)
+        app()
     except (InputError, OSError) as error:
         sys.exit(str(error))
 
 
-def drawn_terms(columns: Mapping[str, Any]) -> list[NDArray[np.float64]]:
+def at_rest(block: Block, quantity: str = "dx") -> xarray.DataArray:
+    """A column of a block with named axes, links and frequency in front, samples last; NaN of walks not at rest."""
+    values = np.where(block.columns["status"] == Status.AT_REST, block.columns[quantity], np.nan)
+    axes = {name: points for name, points in block.axes.items() if name != "point"}
+    return xarray.DataArray(values, axes, block.dims).transpose("links", "frequency", ..., missing_dims="ignore")
+
+
+def of_cells(block: Block) -> Iterator[tuple[tuple[int, ...], list[float]]]:
+    """Place of each cell of a block, and the values of its axes there."""
+    for place in np.ndindex(*map(len, block.axes.values())):
+        yield place, [values[number] for values, number in zip(block.axes.values(), place, strict=True)]
+
+
+def mean(values: ArrayLike) -> Any:
+    """Mean over the samples, the last axis, of what is known; NaN of nothing."""
+    return np.ma.filled(np.ma.masked_invalid(values).mean(axis=-1), np.nan)
+
+
+def deviation(values: ArrayLike) -> Any:
+    """Standard deviation of a sample, likewise; NaN of fewer than two."""
+    return np.ma.filled(np.ma.masked_invalid(values).std(axis=-1, ddof=1), np.nan)
+
+
+def standard_error(values: ArrayLike) -> Any:
+    """Standard error of the mean, likewise."""
+    return deviation(values) / np.sqrt(np.maximum(np.isfinite(values).sum(axis=-1), 1))
+
+
+def mean_where(chosen: Array, values: Array) -> Array:
+    """Means over the samples of each cell of chosen walks; NaN without one."""
+    return np.asarray(mean(np.where(chosen, values, np.nan)))
+
+
+@dataclass(frozen=True)
+class OverCells:
+    """Values of several cells, each with a standard error, taken together.
+
+    Attributes:
+        values, errors: of the cells that have both.
+        mean: of the values.
+        error: its standard error.
+        typical: root mean square of the values without what their errors contribute.
+        chi2: of no value in any cell.
+        chi2_of_one: of one value in all cells, their mean weighted by errors.
+        rises, falls: numbers of cells that are significant at 95 %.
+    """
+
+    values: Array
+    errors: Array
+    mean: float
+    error: float
+    typical: float
+    chi2: float
+    chi2_of_one: float
+    rises: int
+    falls: int
+
+    def __len__(self) -> int:
+        """Number of the cells."""
+        return len(self.values)
+
+    def text(self, digits: int = 1) -> str:
+        """Mean ± standard error of values in per cent."""
+        return f"{self.mean:+.{digits}f} ± {self.error:.{digits}f} %"
+
+
+def over_cells(values: ArrayLike, errors: ArrayLike) -> OverCells:
+    """Cells taken together; those without a value or an error are left out."""
+    values, errors = np.asarray(values, float).ravel(), np.asarray(errors, float).ravel()
+    known = np.isfinite(values) & np.isfinite(errors)
+    values, errors = values[known], errors[known]
+    if not len(values):
+        return OverCells(values, errors, np.nan, np.nan, np.nan, 0.0, 0.0, 0, 0)
+    weights = np.divide(1, errors, out=np.zeros(len(values)), where=errors > 0)
+    sizes = values * weights
+    one = np.sum(values * weights**2) / max(np.sum(weights**2), np.finfo(float).tiny)
+    return OverCells(
+        values,
+        errors,
+        mean=float(values.mean()),
+        error=float(np.sqrt(np.sum(errors**2)) / len(values)),
+        typical=float(np.sqrt(max(0.0, float(np.mean(values**2 - errors**2))))),
+        chi2=float(np.sum(sizes**2)),
+        chi2_of_one=float(np.sum(((values - one) * weights) ** 2)),
+        rises=int(np.sum(sizes > 1.96)),
+        falls=int(np.sum(sizes < -1.96)),
+    )
+
+
+def minus(text: str) -> str:
+    """The text with signs for hyphens, but for the line under the head of a table."""
+    return re.sub("(?<!-)-(?!-)", "−", text)
+
+
+def drawn_terms(columns: Columns) -> list[Array]:
     """What each walk has drawn, as terms of a linear fit: sine and cosine of the phase, and all else, standardised."""
     drawn = {name: np.asarray(values, float) for name, values in columns.items() if name.endswith(DRAWN)}
     plain = [values for name, values in drawn.items() if name != f"phase{DRAWN}" and values.std() > 0]
@@ -50,14 +159,10 @@ def table(head: str | Iterable[str], rows: Iterable[Iterable[object]]) -> str:
     return "\n".join(f"| {' | '.join(map(str, line))} |" for line in (head, ["---"] * len(head), *rows))
 
 
-def save_figure(figure: Figure, path: Path, dpi: int = 200) -> None:
-    """Write a figure; its folder is made."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=dpi)
-
-
-def tidy(axes: Axes, *, grid: Literal["x", "y", "both"] | None = None) -> None:
-    """Leave out the upper and right border; draw a faint grid across one axis or both."""
+def tidy(axes: Axes, title: str = "", grid: Literal["x", "y", "both"] | None = None, **settings: Any) -> None:
+    """Leave out the upper and right border; set title, further settings, a faint grid across one axis or both."""
+    axes.set(**settings)
+    axes.set_title(title, fontsize="medium", loc="left")
     axes.spines[["top", "right"]].set_visible(False)
     axes.tick_params(color=FAINT)
     if grid is not None:
@@ -77,15 +182,23 @@ def write_text(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8")
 
 
-def read_rows(path: Path) -> list[dict[str, str]]:
-    """The rows of a file of comma-separated values, as texts by column."""
+def read_columns(path: Path) -> dict[str, Array]:
+    """The columns of a file of comma-separated values: texts where not all are numbers."""
     with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
+        head, *rows = csv.reader(file)
+    columns = dict(zip(head, map(np.array, zip(*rows, strict=True)), strict=True))
+    for name, texts in columns.items():
+        try:
+            columns[name] = texts.astype(float)
+        except ValueError:
+            continue
+    return columns
 
 
-def write_rows(path: Path, rows: Sequence[Mapping[str, object]]) -> None:
-    """Write them; numbers that are not whole have six digits."""
-    lines = [[f"{value:.6g}" if isinstance(value, float) else value for value in row.values()] for row in rows]
+def write_rows(path: Path, rows: Iterable[Mapping[str, object]]) -> None:
+    """Write them with commas between values; numbers that are not whole have six digits."""
+    rows = list(rows)
+    lines = ([f"{value:.6g}" if isinstance(value, float) else value for value in row.values()] for row in rows)
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("w", encoding="utf-8", newline="") as file:
         csv.writer(file, lineterminator="\n").writerows([list(rows[0]), *lines])
@@ -106,8 +219,16 @@ def with_tables(text: str, tables: Mapping[str, str]) -> str:
     return text
 
 
-def write_tables(page: Path, tables: Mapping[str, str]) -> None:
-    """Put tables between the markers of a page, and print them."""
+def publish(
+    folder: Path, tables: Mapping[str, str], figures: Mapping[str, Figure] | None = None, dpi: int = 200
+) -> None:
+    """Put tables between the markers of a study's page, and print them; write its figures, figures/NAME.png."""
     for name, table in tables.items():
         print(f"\n{name}\n{table}")
-    write_text(page, with_tables(page.read_text(encoding="utf-8"), tables))
+    page = folder / "README.md"
+    if tables:
+        write_text(page, with_tables(page.read_text(encoding="utf-8"), tables))
+    for name, figure in (figures or {}).items():
+        path = folder / "figures" / f"{name}.png"
+        path.parent.mkdir(exist_ok=True)
+        figure.savefig(path, dpi=dpi)

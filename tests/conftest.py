@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from tests.support.command_line import command  # noqa: F401
 from warpchain.engine.processors import processors
 
 settings.register_profile("long", max_examples=5_000)  # of tests/test_fuzz.py: some minutes

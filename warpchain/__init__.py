@@ -44,13 +44,13 @@ if TYPE_CHECKING:
     from warpchain.inputs.state import State as State
     from warpchain.inputs.validation import InputError as InputError
     from warpchain.run.simulation import Chains as Chains
+    from warpchain.run.simulation import Trajectory as Trajectory
     from warpchain.run.simulation import simulate as simulate
     from warpchain.run.single_walk import walk as walk
     from warpchain.run.sweep_run import sweep as sweep
     from warpchain.status import Status as Status
     from warpchain.store.sweep_result import SweepResult as SweepResult
     from warpchain.store.sweep_result import load as load
-    from warpchain.walks.trajectory import Trajectory as Trajectory
     from warpchain.walks.walk_result import WalkResult as WalkResult
     from warpchain.walks.walk_result import load_walk as load_walk
 
@@ -63,7 +63,7 @@ _HOMES = {
     "State": "inputs.state",
     "Status": "status",
     "SweepResult": "store.sweep_result",
-    "Trajectory": "walks.trajectory",
+    "Trajectory": "run.simulation",
     "WalkResult": "walks.walk_result",
     "films": "films",
     "load": "store.sweep_result",

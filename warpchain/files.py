@@ -157,7 +157,8 @@ def naming(target: Path) -> Iterator[None]:
         yield
     except OSError as error:
         number = error.errno or errno.EIO  # without a number: a library that writes a format failed
-        raise failure(number, f"{target}: cannot be written ({reason(error)}); {remedy(number)}") from error
+        remedy = _REMEDIES.get(number, "see to the disk")
+        raise failure(number, f"{target}: cannot be written ({reason(error)}); {remedy}") from error
 
 
 _REMEDIES: Final = {
@@ -166,11 +167,7 @@ _REMEDIES: Final = {
     **dict.fromkeys((errno.ENOENT, errno.ENOTDIR, errno.EEXIST), "give a folder that is there"),
     errno.ENAMETOOLONG: "give a shorter path",
 }
-
-
-def remedy(number: int) -> str:
-    """What to do when the system refuses to write with that errno."""
-    return _REMEDIES.get(number, "see to the disk")
+"""Errno with which the system refuses to write → what to do."""
 
 
 def reason(error: OSError) -> str:

@@ -79,26 +79,6 @@ def stored_fields(kind: type) -> dict[str, Stored]:
     return {name: note for name, note in notes if isinstance(note, Stored)}
 
 
-def check_fields(values: Any, links: int) -> None:
-    """Check the arrays and dictionaries of a dataclass with annotated fields, among them `time` and `frame_time`.
-
-    Raises:
-        ValueError: an array has another shape, a dictionary other keys than its annotation says, or times do not
-            ascend.
-    """
-    named = {"t": len(values.time), "f": len(values.frame_time), "n": links}
-    for name, stored in stored_fields(type(values)).items():
-        value, shape = getattr(values, name), stored.sizes(named)
-        if stored.keys and set(value) != set(stored.keys):
-            raise ValueError(f"{name}: wrong keys; give exactly {', '.join(stored.keys)}")
-        if shape and np.shape(value) != shape and not (stored.empty and np.shape(value) == (0, *shape[1:])):
-            raise ValueError(f"{name}: its shape is {np.shape(value)}; give an array of shape {shape}")
-    for name in ("time", "frame_time"):
-        times = getattr(values, name)
-        if not (np.isfinite(times).all() and (np.diff(times) >= 0).all()):
-            raise ValueError(f"{name}: does not ascend; give finite times in order")
-
-
 def write_fields(
     group: "h5py.Group", values: Mapping[str, Any], kept: Mapping[str, Stored], joints: type = np.float64
 ) -> None:

@@ -4,10 +4,10 @@ from typing import Final
 
 VERSION: Final = "0.2.0.dev0"
 
-NUMERICS_VERSION: Final = 13
+NUMERICS_VERSION: Final = 14
 """Raised by every change that changes a number of any walk; shards of two versions never mix."""
-FORMAT_VERSION: Final = 9
-"""Of all files of results: sweep.json, shards, merged files and walks."""
+FORMAT_VERSION: Final = 10
+"""Of all files of results: sweep.h5, shards, merged files and walks."""
 
 
 def package_versions() -> dict[str, str]:

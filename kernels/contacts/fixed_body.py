@@ -13,7 +13,7 @@ from typing import Any
 import warp as wp
 
 from warpchain.kernels import layout
-from warpchain.kernels.contacts.impulse import fixed_contact
+from warpchain.kernels.contacts.impulse import Touching, struck
 from warpchain.kernels.contacts.terrain import (
     SMALLEST,
     Face,
@@ -26,8 +26,6 @@ from warpchain.kernels.contacts.terrain import (
 )
 from warpchain.kernels.physics.elementary import ONE, TWO, ZERO, quotient
 from warpchain.kernels.types import Chain, Drive, Ground
-
-wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
@@ -132,94 +130,26 @@ def moved_sprocket(still: Face, drive: Drive, world: int, time: wp.float64) -> F
 
 @dataclass(frozen=True)
 class Body:
-    """A body.
+    """A body."""
 
-    Attributes:
-        surface: See above.
-        face: ``face(ground)`` → its Face but for its motion.
-        motion: ``motion(face, drive, world, time)`` → its Face at a time [s].
-        in_cells: Whether it has many faces, found through cells, and corners.
-        lesser_gap: ``lesser_gap(chain, left_x, left_y, right_x, right_y)``, if that is less work than two surfaces.
-    """
-
-    surface: Any
-    face: Any = nowhere
-    motion: Any = unmoved
-    in_cells: bool = False
+    surface: Any  # see above
+    face: Any = nowhere  # ``face(ground)`` → its Face but for its motion
+    motion: Any = unmoved  # ``motion(face, drive, world, time)`` → its Face at a time [s]
+    in_cells: bool = False  # whether it has many faces, found through cells, and corners
+    is_driven: bool = False  # whether it holds and drives a chain before its release, and is no floor
+    # ``lesser_gap(chain, left_x, left_y, right_x, right_y)``, if that is less work than two surfaces
     lesser_gap: Any = None
 
 
 BODIES = {
     "none": Body(surface=None),
     "floor": Body(floor_surface),
-    "sprocket": Body(sprocket_surface, motion=turning_sprocket, lesser_gap=lesser_sprocket_gap),
+    "sprocket": Body(sprocket_surface, motion=turning_sprocket, is_driven=True, lesser_gap=lesser_sprocket_gap),
     "moving sprocket": Body(moving_sprocket_surface, motion=moved_sprocket),
     "slope": Body(slope_surface, first_face),
     "terrain": Body(terrain_surface, in_cells=True),
 }
 """Every body by its name."""
-
-
-@wp.struct
-class Touching:
-    """A link as a fixed body meets it."""
-
-    left_x: wp.float64  # places of its circles [m]
-    left_y: wp.float64
-    right_x: wp.float64
-    right_y: wp.float64
-    x: wp.float64  # centre of mass [m]
-    y: wp.float64
-    cosine: wp.float64  # direction
-    sine: wp.float64
-    inverse_mass: wp.float64  # [1/kg]
-    inverse_inertia: wp.float64  # [1/(kg m²)]
-    u: wp.float64  # velocity [m/s]
-    v: wp.float64
-    omega: wp.float64  # [rad/s]
-    lost: wp.float64  # energy so far [J]
-    hits: wp.int64  # impulses so far
-
-
-@wp.func
-def struck(
-    chain: Chain,
-    before: Touching,
-    gap: wp.float64,
-    normal_x: wp.float64,
-    normal_y: wp.float64,
-    lever_x: wp.float64,
-    lever_y: wp.float64,
-    surface_u: wp.float64,
-    surface_v: wp.float64,
-    restitution: wp.float64,
-    friction: wp.float64,
-) -> Touching:
-    """A link after a contact, see :func:`contacts.impulse.fixed_contact`."""
-    u, v, omega, lost, hit = fixed_contact(
-        chain,
-        gap,
-        normal_x,
-        normal_y,
-        lever_x,
-        lever_y,
-        surface_u,
-        surface_v,
-        before.inverse_mass,
-        before.inverse_inertia,
-        restitution,
-        friction,
-        before.u,
-        before.v,
-        before.omega,
-    )
-    after = before
-    after.u = u
-    after.v = v
-    after.omega = omega
-    after.lost = before.lost + lost
-    after.hits = before.hits + hit
-    return after
 
 
 @functools.cache
@@ -261,8 +191,8 @@ def link_and_body(name: str):
             push = chain.push_rate * wp.max(ZERO, -gap)
             lever_x = face.x - link.x
             lever_y = face.y - link.y
-            e = chain.floor_restitution
-            mu = chain.floor_friction
+            e = face.restitution
+            mu = face.friction
             link = struck(chain, link, gap, nx, ny, lever_x, lever_y, push * nx, push * ny, e, mu)
         return link
 

@@ -34,7 +34,28 @@ import warp as wp
 from warpchain.kernels.physics.elementary import HALF, ONE, ZERO, quotient
 from warpchain.kernels.types import Chain
 
-wp.set_module_options({"enable_backward": False})
+
+@wp.struct
+class Touching:
+    """A link as a fixed body meets it."""
+
+    left_x: wp.float64  # places of its circles [m]
+    left_y: wp.float64
+    right_x: wp.float64
+    right_y: wp.float64
+    x: wp.float64  # centre of mass [m]
+    y: wp.float64
+    cosine: wp.float64  # direction
+    sine: wp.float64
+    mass: wp.float64  # [kg]
+    inertia: wp.float64  # [kg m²]
+    inverse_mass: wp.float64  # [1/kg]
+    inverse_inertia: wp.float64  # [1/(kg m²)]
+    u: wp.float64  # velocity [m/s]
+    v: wp.float64
+    omega: wp.float64  # [rad/s]
+    lost: wp.float64  # energy so far [J]
+    hits: wp.int64  # impulses so far
 
 
 @wp.func
@@ -76,8 +97,9 @@ def collision_impulse(
 
 
 @wp.func
-def fixed_contact(
+def struck(
     chain: Chain,
+    link: Touching,
     gap: wp.float64,
     normal_x: wp.float64,
     normal_y: wp.float64,
@@ -85,34 +107,26 @@ def fixed_contact(
     lever_y: wp.float64,
     surface_u: wp.float64,
     surface_v: wp.float64,
-    inverse_mass: wp.float64,
-    inverse_inertia: wp.float64,
     restitution: wp.float64,
     friction: wp.float64,
-    u: wp.float64,
-    v: wp.float64,
-    omega: wp.float64,
-):
-    """Velocities of a link (B) after one of its circles met a fixed body (A), without branches.
+) -> Touching:
+    """A link (B) after one of its circles met a fixed body (A), without branches.
 
     A fixed body is a body that no impulse moves; its surface may run. ``gap`` [m] is the distance between the circle
     and the body. ``normal`` is the unit vector n̂ from the body to the link. ``lever`` [m] leads from the link's centre
-    to the touching point; ``surface`` [m/s] is the velocity of the body's surface there.
-
-    Returns:
-        u, v, ω after the contact, the energy [J] that the link lost (negative if it gained), and 1 if there was an
-        impulse, else 0. Unless the circle overlaps (gap < 0) and approaches, nothing changes.
+    to the touching point; ``surface`` [m/s] is the velocity of the body's surface there. Unless the circle overlaps
+    (gap < 0) and approaches, nothing changes; a link may also gain energy from a surface that runs.
     """
-    relative_x = surface_u - (u - omega * lever_y)
-    relative_y = surface_v - (v + omega * lever_x)
+    relative_x = surface_u - (link.u - link.omega * lever_y)
+    relative_y = surface_v - (link.v + link.omega * lever_x)
     normal_speed = relative_x * normal_x + relative_y * normal_y
     tangential_speed = relative_y * normal_x - relative_x * normal_y
     # t̂ = ẑ × n̂ = (−n_y, n_x); the levers' cross products with n̂ and t̂
     cross_n = lever_x * normal_y - lever_y * normal_x
     cross_t = lever_x * normal_x + lever_y * normal_y
-    w_nn = inverse_mass + cross_n * cross_n * inverse_inertia
-    w_nt = cross_n * cross_t * inverse_inertia
-    w_tt = inverse_mass + cross_t * cross_t * inverse_inertia
+    w_nn = link.inverse_mass + cross_n * cross_n * link.inverse_inertia
+    w_nt = cross_n * cross_t * link.inverse_inertia
+    w_tt = link.inverse_mass + cross_t * cross_t * link.inverse_inertia
     inverse_nn, inverse_determinant = inverse_masses(w_nn, w_nt, w_tt)
     impulse_n, impulse_t = collision_impulse(
         normal_speed,
@@ -138,10 +152,10 @@ def fixed_contact(
     gained += impulse_t * (surface_t - tangential_speed + HALF * changed_t)
     impulse_x = impulse_n * normal_x - impulse_t * normal_y
     impulse_y = impulse_n * normal_y + impulse_t * normal_x
-    return (
-        u + impulse_x * inverse_mass,
-        v + impulse_y * inverse_mass,
-        omega + (cross_n * impulse_n + cross_t * impulse_t) * inverse_inertia,
-        -gained,
-        wp.where(hit, wp.int64(1), wp.int64(0)),
-    )
+    after = link
+    after.u = link.u + impulse_x * link.inverse_mass
+    after.v = link.v + impulse_y * link.inverse_mass
+    after.omega = link.omega + (cross_n * impulse_n + cross_t * impulse_t) * link.inverse_inertia
+    after.lost = link.lost - gained
+    after.hits = link.hits + wp.where(hit, wp.int64(1), wp.int64(0))
+    return after

@@ -2,25 +2,11 @@
 
 import warp as wp
 
+from warpchain.kernels import layout
 from warpchain.kernels.contacts.impulse import collision_impulse, inverse_masses
-from warpchain.kernels.layout import (
-    INVERSE_INERTIA,
-    INVERSE_MASS,
-    LEFT_X,
-    LEFT_Y,
-    OMEGA,
-    RIGHT_X,
-    RIGHT_Y,
-    STRANDS_APART,
-    U,
-    V,
-    X,
-    Y,
-)
-from warpchain.kernels.physics.elementary import HALF, TWO, ZERO, quotient
+from warpchain.kernels.layout import INVERSE_INERTIA, INVERSE_MASS, LEFT_X, LEFT_Y, OMEGA, STRANDS_APART, U, V, X, Y
+from warpchain.kernels.physics.elementary import HALF, ZERO, quotient
 from warpchain.kernels.types import Chain, Rows
-
-wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
@@ -63,7 +49,8 @@ def effective_masses(
 
 @wp.func
 def circles_of_links(
-    radius: wp.float64,
+    radius_a: wp.float64,
+    radius_b: wp.float64,
     end_a_x: wp.float64,
     end_a_y: wp.float64,
     end_b_x: wp.float64,
@@ -77,7 +64,7 @@ def circles_of_links(
 
     It returns numbers, not a struct: clang kept a struct in memory, and a pile on the CPU was twice as slow.
 
-    Arguments: the radius of both circles, centres ``end`` of the circles of A and B and centres of mass ``center`` of
+    Arguments: the radii of the circles of A and B, their centres ``end`` and centres of mass ``center`` of
     the links [m].
 
     Returns:
@@ -87,15 +74,17 @@ def circles_of_links(
     """
     dx = end_b_x - end_a_x
     dy = end_b_y - end_a_y
-    touching = TWO * radius
+    touching = radius_a + radius_b
     square = dx * dx + dy * dy
     overlap = square < touching * touching and square > ZERO
     distance = wp.sqrt(square)
     depth = wp.where(overlap, touching - distance, ZERO)
     nx = quotient(dx, distance)
     ny = quotient(dy, distance)
-    px = HALF * (end_a_x + end_b_x)
-    py = HALF * (end_a_y + end_b_y)
+    # the middle of the overlap; for circles of one size to the bit the middle of their centres
+    beyond = HALF * (radius_a - radius_b)
+    px = HALF * (end_a_x + end_b_x) + beyond * nx
+    py = HALF * (end_a_y + end_b_y) + beyond * ny
     ax = px - center_a_x
     ay = py - center_a_y
     bx = px - center_b_x
@@ -140,15 +129,16 @@ def touching_circles(K: Rows, chain: Chain, p: int, q: int, half: int, second: i
     """
     after_q = second ^ half
     link_a, link_b = links_of(p, q, half, second, chain.link_count)
-    ax = wp.where(second == 0, K[RIGHT_X, p], K[LEFT_X, p + 1])
-    ay = wp.where(second == 0, K[RIGHT_Y, p], K[LEFT_Y, p + 1])
-    bx = wp.where(after_q == 0, K[RIGHT_X, q], K[LEFT_X, q + 1])
-    by = wp.where(after_q == 0, K[RIGHT_Y, q], K[LEFT_Y, q + 1])
+    ax = wp.where(second == 0, K[layout.RIGHT_X, p], K[LEFT_X, p + 1])
+    ay = wp.where(second == 0, K[layout.RIGHT_Y, p], K[LEFT_Y, p + 1])
+    bx = wp.where(after_q == 0, K[layout.RIGHT_X, q], K[LEFT_X, q + 1])
+    by = wp.where(after_q == 0, K[layout.RIGHT_Y, q], K[LEFT_Y, q + 1])
     if are_neighbours(link_a, link_b, chain.link_count):
         bx = ax
         by = ay
     depth, nx, ny, a_n, a_t, b_n, b_t = circles_of_links(
-        chain.circle_radius,
+        K[layout.RADIUS, link_a],
+        K[layout.RADIUS, link_b],
         ax,
         ay,
         bx,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from warpchain.kernels import layout
 
-GEOMETRY_ROWS = 30
+GEOMETRY_ROWS = 34
 """Rows of the CPU's scratch of contacts, see :mod:`cpu.contacts.self_contacts`."""
 GEOMETRY_COLUMNS = 64
 """Pairs of joints whose contacts are evaluated together, a multiple of 8."""
@@ -13,41 +13,23 @@ GEOMETRY_COLUMNS = 64
 
 @dataclass(frozen=True)
 class ListLayout:
-    """Where a chain's neighbour list lies in one row of int32.
+    """Where a chain's neighbour list lies in one row of int32."""
 
-    Attributes:
-        capacity: Greatest number of pairs; more is an overflow, which ends the walk with a status.
-        table: Number of hash buckets, a power of two.
-        count: Offset of the number of pairs (one integer). All below are offsets, too.
-        first: Lower joint of each pair; on a CPU in the order of contact resolution.
-        second: Higher joint of each pair.
-        touching: GPU scratch: pairs that touch now, beyond those in shared memory.
-        found_first: CPU scratch: lower joints as found, ordered by (p, q); then those of the pairs that touch now.
-        found_second: CPU scratch: higher joints, likewise.
-        bucket: Scratch: last joint put into each bucket, −1 for none.
-        next_joint: Scratch: the joint put into the same bucket before this one.
-        cell_x: Scratch: cell of each joint.
-        cell_y: Scratch: cell of each joint.
-        owners: GPU scratch of chains too long for shared memory, see :mod:`gpu.contacts.self_contacts`.
-        geometry: CPU scratch for contacts: doubles, on whole cache lines.
-        size: Integers in all.
-    """
-
-    capacity: int
-    table: int
-    count: int
-    first: int
-    second: int
-    touching: int
-    found_first: int
-    found_second: int
-    bucket: int
-    next_joint: int
-    cell_x: int
-    cell_y: int
-    owners: int
-    geometry: int
-    size: int
+    capacity: int  # greatest number of pairs; more is an overflow, which ends the walk with a status
+    table: int  # number of hash buckets, a power of two
+    count: int  # offset of the number of pairs (one integer). All below are offsets, too
+    first: int  # lower joint of each pair; on a CPU in the order of contact resolution
+    second: int  # higher joint of each pair
+    touching: int  # GPU scratch: pairs that touch now, beyond those in shared memory
+    found_first: int  # CPU scratch: lower joints as found, ordered by (p, q); then those of the pairs that touch now
+    found_second: int  # CPU scratch: higher joints, likewise
+    bucket: int  # scratch: last joint put into each bucket, −1 for none
+    next_joint: int  # scratch: the joint put into the same bucket before this one
+    cell_x: int  # scratch: cell of each joint
+    cell_y: int  # scratch: cell of each joint
+    owners: int  # GPU scratch of chains too long for shared memory, see :mod:`gpu.contacts.self_contacts`
+    geometry: int  # CPU scratch for contacts: doubles, on whole cache lines
+    size: int  # integers in all
 
     @property
     def pending(self) -> int:

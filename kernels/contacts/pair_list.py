@@ -5,8 +5,6 @@ import warp as wp
 from warpchain.kernels.physics.elementary import TWO
 from warpchain.kernels.types import Chain
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.func
 def listing_reach(chain: Chain, skin: wp.float64, opening: wp.float64):

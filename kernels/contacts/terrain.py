@@ -18,8 +18,6 @@ from warpchain.kernels import layout
 from warpchain.kernels.physics.elementary import ONE, ZERO, quotient
 from warpchain.kernels.types import Chain, Ground
 
-wp.set_module_options({"enable_backward": False})
-
 SMALLEST = wp.constant(wp.float64(1e-300))
 FAR = wp.constant(wp.float64(1e30))
 LAST_CELL = wp.constant(wp.float64(layout.GROUND_CELLS - 1))
@@ -37,6 +35,8 @@ class Face:
     before_y: wp.float64
     begin: wp.float64  # from its place to its ends [m]
     end: wp.float64
+    restitution: wp.float64  # e
+    friction: wp.float64  # μ
     u: wp.float64  # velocity of the sprocket's centre [m/s]
     v: wp.float64
     turning: wp.float64  # angular velocity of the sprocket [rad/s]
@@ -55,6 +55,8 @@ def read_face(ground: Ground, k: int) -> Face:
     face.before_y = ground.faces[k, layout.BEFORE_Y]
     face.begin = ground.faces[k, layout.FACE_BEGIN]
     face.end = ground.faces[k, layout.FACE_END]
+    face.restitution = ground.faces[k, layout.FACE_RESTITUTION]
+    face.friction = ground.faces[k, layout.FACE_FRICTION]
     return face
 
 
@@ -79,7 +81,7 @@ def slope_surface(chain: Chain, face: Face, circle_x: wp.float64, circle_y: wp.f
     push = chain.push_rate * wp.max(ZERO, -gap)
     nx = -face.along_y
     ny = face.along_x
-    return gap, nx, ny, push * nx, push * ny, chain.floor_restitution, chain.floor_friction
+    return gap, nx, ny, push * nx, push * ny, face.restitution, face.friction
 
 
 @wp.func
@@ -98,7 +100,7 @@ def terrain_surface(chain: Chain, face: Face, circle_x: wp.float64, circle_y: wp
     nx = wp.where(over, -face.along_y, quotient(to_x, distance))
     ny = wp.where(over, face.along_x, quotient(to_y, distance))
     push = chain.push_rate * wp.max(ZERO, -gap)
-    return gap, nx, ny, push * nx, push * ny, chain.floor_restitution, chain.floor_friction
+    return gap, nx, ny, push * nx, push * ny, face.restitution, face.friction
 
 
 @wp.func

@@ -22,22 +22,12 @@ one after the other, instead, tip an upright chain over: those on one side come 
 
 import warp as wp
 
-from warpchain.kernels.layout import (
-    INVERSE_00,
-    INVERSE_01,
-    INVERSE_02,
-    INVERSE_11,
-    INVERSE_12,
-    INVERSE_22,
-    PLANE_SPEED,
-    PLANE_TURN_X,
-    PLANE_TURN_Y,
-)
+from warpchain.kernels import layout
+from warpchain.kernels.contacts.impulse import Touching
+from warpchain.kernels.layout import INVERSE_01, INVERSE_11, INVERSE_12, PLANE_SPEED, PLANE_TURN_X, PLANE_TURN_Y
 from warpchain.kernels.physics.elementary import HALF, ONE, ZERO, quotient
 from warpchain.kernels.physics.plane import plane_times_inverse
 from warpchain.kernels.types import Chain, Row
-
-wp.set_module_options({"enable_backward": False})
 
 SMALLEST = wp.constant(wp.float64(1e-12))
 """Least ρ: a plane that lies flat has no direction q, and touches with the middle of its faces."""
@@ -60,29 +50,15 @@ class TiltingLink:
     hits: wp.int64  # impulses
 
 
-@wp.struct
-class CopyInverse:
-    """N A⁻¹, the inverse mass matrix of a copy of the plane, by rows of its upper triangle."""
-
-    b00: wp.float64
-    b01: wp.float64
-    b02: wp.float64
-    b11: wp.float64
-    b12: wp.float64
-    b22: wp.float64
-
-
 @wp.func
-def copy_inverse(P: Row, copies: wp.float64) -> CopyInverse:
-    """The inverse mass matrix of one of so many copies of the plane."""
-    B = CopyInverse()
-    B.b00 = copies * P[INVERSE_00]
-    B.b01 = copies * P[INVERSE_01]
-    B.b02 = copies * P[INVERSE_02]
-    B.b11 = copies * P[INVERSE_11]
-    B.b12 = copies * P[INVERSE_12]
-    B.b22 = copies * P[INVERSE_22]
-    return B
+def copy_inverse(P: Row, copies: wp.float64):
+    """N A⁻¹, the inverse mass matrix of one of so many copies of the plane."""
+    b00 = copies * P[layout.INVERSE_00]
+    b01 = copies * P[INVERSE_01]
+    b02 = copies * P[layout.INVERSE_02]
+    b11 = copies * P[INVERSE_11]
+    b12 = copies * P[INVERSE_12]
+    return wp.mat33d(b00, b01, b02, b01, b11, b12, b02, b12, copies * P[layout.INVERSE_22])
 
 
 @wp.func
@@ -137,16 +113,17 @@ def approaches(
 def meet_roller(
     chain: Chain,
     slope: wp.float64,
-    B: CopyInverse,
+    B: wp.mat33d,
+    link: Touching,
     before: TiltingLink,
-    inverse_mass: wp.float64,
-    inverse_inertia: wp.float64,
     circle_x: wp.float64,
     circle_y: wp.float64,
-    arm_x: wp.float64,
-    arm_y: wp.float64,
 ) -> TiltingLink:
-    """One roller against the floor, without branches; ``arm`` leads from the link's centre to the circle's."""
+    """One roller against the floor, without branches."""
+    inverse_mass = link.inverse_mass
+    inverse_inertia = link.inverse_inertia
+    arm_x = circle_x - link.x
+    arm_y = circle_y - link.y
     inverse = ONE / wp.max(slope, SMALLEST)
     to_point_x = -chain.circle_radius * chain.up_x * inverse
     to_point_y = -chain.circle_radius * chain.up_y * inverse
@@ -166,12 +143,12 @@ def meet_roller(
     v1 = before.u - before.omega * lever_y + z * before.turn_y - rise * n1
     v2 = before.v + before.omega * lever_x - z * before.turn_x - rise * n2
     v3 = before.plane_speed + before.turn_x * y - before.turn_y * x - rise * n3
-    c0 = B.b00 + B.b01 * y - B.b02 * x
-    c1 = B.b01 + B.b11 * y - B.b12 * x
-    c2 = B.b02 + B.b12 * y - B.b22 * x
-    w11 = inverse_mass + lever_y * lever_y * inverse_inertia + z * z * B.b22
-    w12 = -lever_x * lever_y * inverse_inertia - z * z * B.b12
-    w22 = inverse_mass + lever_x * lever_x * inverse_inertia + z * z * B.b11
+    c0 = B[0, 0] + B[0, 1] * y - B[0, 2] * x
+    c1 = B[0, 1] + B[1, 1] * y - B[1, 2] * x
+    c2 = B[0, 2] + B[1, 2] * y - B[2, 2] * x
+    w11 = inverse_mass + lever_y * lever_y * inverse_inertia + z * z * B[2, 2]
+    w12 = -lever_x * lever_y * inverse_inertia - z * z * B[1, 2]
+    w22 = inverse_mass + lever_x * lever_x * inverse_inertia + z * z * B[1, 1]
     w13 = z * c2
     w23 = -z * c1
     w33 = c0 + y * c1 - x * c2
@@ -215,9 +192,9 @@ def meet_roller(
     after.u = before.u + j1 * inverse_mass
     after.v = before.v + j2 * inverse_mass
     after.omega = before.omega + (lever_x * j2 - lever_y * j1) * inverse_inertia
-    after.plane_speed = before.plane_speed + B.b00 * j3 + B.b01 * q1 + B.b02 * q2
-    after.turn_x = before.turn_x + B.b01 * j3 + B.b11 * q1 + B.b12 * q2
-    after.turn_y = before.turn_y + B.b02 * j3 + B.b12 * q1 + B.b22 * q2
+    after.plane_speed = before.plane_speed + B[0, 0] * j3 + B[0, 1] * q1 + B[0, 2] * q2
+    after.turn_x = before.turn_x + B[0, 1] * j3 + B[1, 1] * q1 + B[1, 2] * q2
+    after.turn_y = before.turn_y + B[0, 2] * j3 + B[1, 2] * q1 + B[2, 2] * q2
     after.push = before.push + j3
     after.moment_x = before.moment_x + q1
     after.moment_y = before.moment_y + q2
@@ -226,12 +203,12 @@ def meet_roller(
 
 
 @wp.func
-def with_copy(chain: Chain, u: wp.float64, v: wp.float64, omega: wp.float64) -> TiltingLink:
+def with_copy(chain: Chain, touching: Touching) -> TiltingLink:
     """A link before it meets the floor, with a copy of the chain's plane."""
     link = TiltingLink()
-    link.u = u
-    link.v = v
-    link.omega = omega
+    link.u = touching.u
+    link.v = touching.v
+    link.omega = touching.omega
     link.plane_speed = chain.plane_speed
     link.turn_x = chain.turn_x
     link.turn_y = chain.turn_y
@@ -239,55 +216,29 @@ def with_copy(chain: Chain, u: wp.float64, v: wp.float64, omega: wp.float64) -> 
 
 
 @wp.func
-def link_touches(
-    chain: Chain,
-    slope: wp.float64,
-    left_x: wp.float64,
-    left_y: wp.float64,
-    right_x: wp.float64,
-    right_y: wp.float64,
-    x: wp.float64,
-    y: wp.float64,
-    u: wp.float64,
-    v: wp.float64,
-    omega: wp.float64,
-):
+def link_touches(chain: Chain, slope: wp.float64, link: Touching):
     """1 if a roller of the link touches the floor, else 0."""
-    link = with_copy(chain, u, v, omega)
+    own = with_copy(chain, link)
     inverse = ONE / wp.max(slope, SMALLEST)
-    to_point_x = -chain.circle_radius * chain.up_x * inverse
-    to_point_y = -chain.circle_radius * chain.up_y * inverse
-    a, b = approaches(chain, slope, link, left_x, left_y, left_x - x + to_point_x, left_y - y + to_point_y)
-    c, d = approaches(chain, slope, link, right_x, right_y, right_x - x + to_point_x, right_y - y + to_point_y)
+    to_x = -chain.circle_radius * chain.up_x * inverse
+    to_y = -chain.circle_radius * chain.up_y * inverse
+    left_x = link.left_x
+    left_y = link.left_y
+    right_x = link.right_x
+    right_y = link.right_y
+    a, b = approaches(chain, slope, own, left_x, left_y, left_x - link.x + to_x, left_y - link.y + to_y)
+    c, d = approaches(chain, slope, own, right_x, right_y, right_x - link.x + to_x, right_y - link.y + to_y)
     return wp.where(a + b + c + d > ZERO, wp.int64(1), wp.int64(0))
 
 
 @wp.func
-def meet_tilting_floor(
-    chain: Chain,
-    slope: wp.float64,
-    B: CopyInverse,
-    left_x: wp.float64,
-    left_y: wp.float64,
-    right_x: wp.float64,
-    right_y: wp.float64,
-    x: wp.float64,
-    y: wp.float64,
-    mass: wp.float64,
-    inertia: wp.float64,
-    inverse_mass: wp.float64,
-    inverse_inertia: wp.float64,
-    u: wp.float64,
-    v: wp.float64,
-    omega: wp.float64,
-) -> TiltingLink:
+def meet_tilting_floor(chain: Chain, slope: wp.float64, B: wp.mat33d, link: Touching) -> TiltingLink:
     """One link against the floor, its left roller first, together with its copy of the plane."""
-    link = with_copy(chain, u, v, omega)
-    link = meet_roller(chain, slope, B, link, inverse_mass, inverse_inertia, left_x, left_y, left_x - x, left_y - y)
-    link = meet_roller(chain, slope, B, link, inverse_mass, inverse_inertia, right_x, right_y, right_x - x, right_y - y)
-    within = mass * ((u - link.u) * (u + link.u) + (v - link.v) * (v + link.v))
-    link.lost = HALF * (within + inertia * ((omega - link.omega) * (omega + link.omega)))
-    return link
+    met = meet_roller(chain, slope, B, link, with_copy(chain, link), link.left_x, link.left_y)
+    met = meet_roller(chain, slope, B, link, met, link.right_x, link.right_y)
+    within = link.mass * ((link.u - met.u) * (link.u + met.u) + (link.v - met.v) * (link.v + met.v))
+    met.lost = HALF * (within + link.inertia * ((link.omega - met.omega) * (link.omega + met.omega)))
+    return met
 
 
 @wp.func

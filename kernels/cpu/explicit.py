@@ -6,20 +6,41 @@ of their own, one array of static shape, no branch and no library call inside.
 """
 
 import functools
+from typing import Any
 
 import warp as wp
 
 from warpchain.kernels import layout
 from warpchain.kernels.layout import STAGE_ROWS, STAGES, U, V, X, Y
 from warpchain.kernels.methods.controller import error_bits
-from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
+from warpchain.kernels.methods.explicit_tableaus import Tableau
 from warpchain.kernels.physics.elementary import LARGEST_TURN, TWO, ZERO, cos_sin, order_bits
-from warpchain.kernels.physics.geometry import end_positions, end_velocities, turned, whole_lanes
+from warpchain.kernels.physics.geometry import Link, end_positions, end_velocities, turned, whole_lanes
 from warpchain.kernels.physics.joint import friction_torque, joint_force, link_acceleration
-from warpchain.kernels.physics.plane import plane_load
 from warpchain.kernels.types import Chain, Rows
 
-wp.set_module_options({"enable_backward": False})
+
+@wp.func
+def write_ends(K: Rows, i: int, x: wp.float64, y: wp.float64, arm_x: wp.float64, arm_y: wp.float64):
+    """End positions of link i."""
+    left_x, left_y, right_x, right_y = end_positions(x, y, arm_x, arm_y)
+    K[layout.LEFT_X, i] = left_x
+    K[layout.LEFT_Y, i] = left_y
+    K[layout.RIGHT_X, i] = right_x
+    K[layout.RIGHT_Y, i] = right_y
+
+
+@wp.func
+def write_motion(K: Rows, i: int, u: wp.float64, v: wp.float64, w: wp.float64, arm_x: wp.float64, arm_y: wp.float64):
+    """Arm, spin and end velocities of link i in a stage."""
+    K[layout.STAGE_ARM_X, i] = arm_x
+    K[layout.STAGE_ARM_Y, i] = arm_y
+    K[layout.STAGE_SPIN, i] = w
+    left_u, left_v, right_u, right_v = end_velocities(u, v, w, arm_x, arm_y)
+    K[layout.LEFT_U, i] = left_u
+    K[layout.LEFT_V, i] = left_v
+    K[layout.RIGHT_U, i] = right_u
+    K[layout.RIGHT_V, i] = right_v
 
 
 @wp.func
@@ -33,11 +54,7 @@ def place_ends(K: Rows, chain: Chain):
         c, s = cos_sin(K[layout.THETA, i])
         K[layout.COSINE, i] = c
         K[layout.SINE, i] = s
-        left_x, left_y, right_x, right_y = end_positions(K[X, i], K[Y, i], a * c, a * s)
-        K[layout.LEFT_X, i] = left_x
-        K[layout.LEFT_Y, i] = left_y
-        K[layout.RIGHT_X, i] = right_x
-        K[layout.RIGHT_Y, i] = right_y
+        write_ends(K, i, K[X, i], K[Y, i], a * c, a * s)
         i += 1
     K[layout.LEFT_X, n] = K[layout.LEFT_X, 0]
     K[layout.LEFT_Y, n] = K[layout.LEFT_Y, 0]
@@ -51,21 +68,25 @@ def begin_stages(K: Rows, chain: Chain):
     a = chain.half_length
     i = int(0)
     while i < lanes:
-        arm_x = a * K[layout.COSINE, i]
-        arm_y = a * K[layout.SINE, i]
-        w = K[layout.OMEGA, i]
-        K[layout.STAGE_ARM_X, i] = arm_x
-        K[layout.STAGE_ARM_Y, i] = arm_y
-        K[layout.STAGE_SPIN, i] = w
-        left_u, left_v, right_u, right_v = end_velocities(K[U, i], K[V, i], w, arm_x, arm_y)
-        K[layout.LEFT_U, i] = left_u
-        K[layout.LEFT_V, i] = left_v
-        K[layout.RIGHT_U, i] = right_u
-        K[layout.RIGHT_V, i] = right_v
+        write_motion(K, i, K[U, i], K[V, i], K[layout.OMEGA, i], a * K[layout.COSINE, i], a * K[layout.SINE, i])
         i += 1
     K[layout.LEFT_U, n] = K[layout.LEFT_U, 0]
     K[layout.LEFT_V, n] = K[layout.LEFT_V, 0]
     K[layout.STAGE_SPIN, n] = K[layout.STAGE_SPIN, 0]
+
+
+@wp.func
+def link_in_stage(K: Rows, i: int) -> Link:
+    """A link in a stage, whose ends are placed."""
+    link = Link()
+    link.arm_x = K[layout.STAGE_ARM_X, i]
+    link.arm_y = K[layout.STAGE_ARM_Y, i]
+    link.omega = K[layout.STAGE_SPIN, i]
+    link.x = K[layout.RIGHT_X, i] - link.arm_x
+    link.y = K[layout.RIGHT_Y, i] - link.arm_y
+    link.u = K[layout.RIGHT_U, i] + link.omega * link.arm_y
+    link.v = K[layout.RIGHT_V, i] - link.omega * link.arm_x
+    return link
 
 
 def sums_over_stages(velocity: tuple[float, ...], position: tuple[float, ...]):
@@ -97,18 +118,18 @@ def sums_over_stages(velocity: tuple[float, ...], position: tuple[float, ...]):
 
 
 @functools.cache
-def explicit_method(name: str, tilts: bool = False):
+def explicit_method(tableau: Tableau, acceleration: Any):
     """Warp functions of one tableau: (evaluate the first stage, attempt a step, commit it).
 
     Args:
-        name: Key of :data:`TABLEAUS`.
-        tilts: Whether the plane of the chain may move; ``chain`` is then on the plane of the middle of the step.
+        tableau: Its coefficients.
+        acceleration: What accelerates a link besides its joints, see :attr:`features.Features.acceleration`; on a plane
+            that may move, ``chain`` is on that of the middle of the step.
 
     Returns:
         ``first_stage(K, chain)``, ``attempt(K, chain, h, tolerance)`` → bits of the greatest error ratio (see
         :func:`order_bits`), ``commit(K, chain, h)``.
     """
-    tableau = TABLEAUS[name]
     stages = tableau.stages
     reuses_last = tableau.first_same_as_last
     nodes, velocity_weights = tableau.nodes, tableau.velocity_weights
@@ -125,9 +146,6 @@ def explicit_method(name: str, tilts: bool = False):
     def derivatives(K: Rows, chain: Chain, row: int, needs_power: bool):
         n = chain.link_count
         lanes = whole_lanes(n)
-        weightless = chain
-        if wp.static(tilts):
-            weightless.gravity = ZERO
         i = int(0)
         while i < lanes:
             cx = K[layout.LEFT_X, i + 1] - K[layout.RIGHT_X, i]
@@ -149,7 +167,6 @@ def explicit_method(name: str, tilts: bool = False):
         i = int(0)
         while i < lanes:
             ax, ay, spin_rate = link_acceleration(
-                weightless,
                 K[layout.INVERSE_MASS, i],
                 K[layout.INVERSE_INERTIA, i],
                 K[layout.STAGE_ARM_X, i],
@@ -161,20 +178,12 @@ def explicit_method(name: str, tilts: bool = False):
                 K[layout.TORQUE, i],
                 K[layout.TORQUE, i + 1],
             )
-            if wp.static(tilts):
-                load_x, load_y, load_turn = plane_load(
-                    chain,
-                    K[layout.RIGHT_X, i] - K[layout.STAGE_ARM_X, i],
-                    K[layout.RIGHT_Y, i] - K[layout.STAGE_ARM_Y, i],
-                    K[layout.STAGE_ARM_X, i],
-                    K[layout.STAGE_ARM_Y, i],
-                )
-                ax += load_x
-                ay += load_y
-                spin_rate += load_turn
-            K[row, i] = ax
-            K[row + 1, i] = ay
-            K[row + 2, i] = spin_rate
+            load_x, load_y, load_turn = acceleration(
+                chain, i, link_in_stage(K, i), K[layout.INVERSE_MASS, i], K[layout.INVERSE_INERTIA, i]
+            )
+            K[row, i] = ax + load_x
+            K[row + 1, i] = ay + load_y
+            K[row + 2, i] = spin_rate + load_turn
             i += 1
 
     @wp.func
@@ -200,19 +209,8 @@ def explicit_method(name: str, tilts: bool = False):
                 u = K[U, i] + h * du
                 v = K[V, i] + h * dv
                 w = K[layout.OMEGA, i] + h * dw
-                K[layout.STAGE_ARM_X, i] = arm_x
-                K[layout.STAGE_ARM_Y, i] = arm_y
-                K[layout.STAGE_SPIN, i] = w
-                left_x, left_y, right_x, right_y = end_positions(x, y, arm_x, arm_y)
-                left_u, left_v, right_u, right_v = end_velocities(u, v, w, arm_x, arm_y)
-                K[layout.LEFT_X, i] = left_x
-                K[layout.LEFT_Y, i] = left_y
-                K[layout.LEFT_U, i] = left_u
-                K[layout.LEFT_V, i] = left_v
-                K[layout.RIGHT_X, i] = right_x
-                K[layout.RIGHT_Y, i] = right_y
-                K[layout.RIGHT_U, i] = right_u
-                K[layout.RIGHT_V, i] = right_v
+                write_ends(K, i, x, y, arm_x, arm_y)
+                write_motion(K, i, u, v, w, arm_x, arm_y)
                 i += 1
             K[layout.LEFT_X, n] = K[layout.LEFT_X, 0]
             K[layout.LEFT_Y, n] = K[layout.LEFT_Y, 0]
@@ -223,36 +221,18 @@ def explicit_method(name: str, tilts: bool = False):
         # new state and error ratio
         i = int(0)
         while i < lanes:
-            du, dv, dw, dx, dy, turn = new_state(K, i)
-            eu, ev, ew, ex, ey, et = errors(K, i)
-            u = K[U, i]
-            v = K[V, i]
-            w = K[layout.OMEGA, i]
-            K[layout.NEW_X, i] = K[X, i] + (h * u + hh * dx)
-            K[layout.NEW_Y, i] = K[Y, i] + (h * v + hh * dy)
-            K[layout.NEW_THETA, i] = K[layout.THETA, i] + (h * w + hh * turn)
-            K[layout.NEW_U, i] = u + h * du
-            K[layout.NEW_V, i] = v + h * dv
-            K[layout.NEW_OMEGA, i] = w + h * dw
+            change = new_state(K, i)
+            error = errors(K, i)
             # Take the maximum over components, not the sum. Compare the floats' bits as integers, where NaN is
             # greatest.
-            worst = wp.max(
-                wp.max(
-                    error_bits(hh * ex, K[X, i], u, h),
-                    error_bits(hh * ey, K[Y, i], v, h),
-                ),
-                error_bits(hh * et, K[layout.THETA, i], w, h),
-            )
-            worst = wp.max(
-                worst,
-                wp.max(
-                    wp.max(
-                        error_bits(h * eu, u, K[wp.static(STAGES), i], h),
-                        error_bits(h * ev, v, K[wp.static(STAGES + 1), i], h),
-                    ),
-                    error_bits(h * ew, w, K[wp.static(STAGES + 2), i], h),
-                ),
-            )
+            worst = wp.int64(0)
+            for k in range(3):
+                place = K[X + k, i]
+                rate = K[U + k, i]
+                K[layout.NEW_X + k, i] = place + (h * rate + hh * change[wp.static(3 + k)])
+                K[layout.NEW_U + k, i] = rate + h * change[k]
+                worst = wp.max(worst, error_bits(hh * error[wp.static(3 + k)], place, rate, h))
+                worst = wp.max(worst, error_bits(h * error[k], rate, K[STAGES + k, i], h))
             worst = wp.where(i < n, worst, wp.int64(0))
             K[layout.ERROR, i] = wp.cast(worst, wp.float64) / tolerance  # wp.cast reads the bits back as a float
             i += 1
@@ -285,12 +265,8 @@ def explicit_method(name: str, tilts: bool = False):
                     damping += wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 4), i]
             K[layout.LOST_FRICTION, i] = K[layout.LOST_FRICTION, i] + h * friction
             K[layout.LOST_DAMPING, i] = K[layout.LOST_DAMPING, i] + h * damping
-            K[X, i] = K[layout.NEW_X, i]
-            K[Y, i] = K[layout.NEW_Y, i]
-            K[layout.THETA, i] = K[layout.NEW_THETA, i]
-            K[U, i] = K[layout.NEW_U, i]
-            K[V, i] = K[layout.NEW_V, i]
-            K[layout.OMEGA, i] = K[layout.NEW_OMEGA, i]
+            for row in range(6):
+                K[wp.static(X + row), i] = K[wp.static(layout.NEW_X + row), i]
             if wp.static(reuses_last):
                 for row in range(wp.static(STAGE_ROWS)):
                     K[wp.static(STAGES + row), i] = K[wp.static(last_row + row), i]

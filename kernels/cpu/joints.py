@@ -12,40 +12,29 @@ from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.types import Chain, Control, Rows, State
 
-wp.set_module_options({"enable_backward": False})
-
 
 @dataclass(frozen=True)
 class Joints:
-    """Warp functions of the joints, in the order in which a step calls them.
+    """Warp functions of the joints, in the order in which a step calls them."""
 
-    Attributes:
-        settle: ``(K, chain, state, world)`` before a step.
-        first_stage: ``(K, chain, state, world)`` evaluates the first stage of a step on springs, if it is not known.
-        attempt: ``(K, chain, state, control, world, h, tolerance)`` → error ratio as ordered bits.
-        shrinkage: ``(state, world, error)`` → factor of the step after rejection, see :mod:`methods.controller`.
-        accept: ``(K, chain, state, control, world, h, error)`` accepts the state that the last attempt found → factor
-            of the step, whether the joints may stay as they are.
-        margins: ``(state, control, world)`` → skin of the neighbour list [m], least slack with which it is kept [m].
-        react: ``(K, chain, state, world)`` after a step with impulses, or in which the joints may not stay.
-    """
-
-    settle: Any
-    first_stage: Any
-    attempt: Any
-    shrinkage: Any
+    settle: Any  # ``(K, chain, state, world)`` before a step
+    first_stage: Any  # ``(K, chain, state, world)`` evaluates the first stage of a step on springs, if it is not known
+    attempt: Any  # ``(K, chain, state, control, world, h, tolerance)`` → error ratio as ordered bits
+    shrinkage: Any  # ``(state, world, error)`` → factor of the step after rejection, see :mod:`methods.controller`
+    # ``(K, chain, state, control, world, h, error)`` accepts the state that the last attempt found → factor of the
+    # step, whether the joints may stay as they are
     accept: Any
-    margins: Any
-    react: Any
+    margins: Any  # ``(state, control, world)`` → skin of the neighbour list [m], least slack with which it is kept [m]
+    react: Any  # ``(K, chain, state, world)`` after a step with impulses, or in which the joints may not stay
 
 
 @functools.cache
-def springs(name: str, tilts: bool) -> Joints:
-    """A method's steps on springs, for chains whose plane tilts or does not."""
-    method = find_method(name)
-    evaluate, attempt_step, commit = explicit_method(method.tableau, tilts)
-    growth, shrink = step_controller(method.order, method.error_order)
-    reuses_last = method.reuses_last
+def springs(name: str, acceleration: Any) -> Joints:
+    """A method's steps on springs, under a load, see :attr:`features.Features.acceleration`."""
+    tableau = find_method(name).tableau
+    evaluate, attempt_step, commit = explicit_method(tableau, acceleration)
+    growth, shrink = step_controller(tableau.order, tableau.error_order)
+    reuses_last = tableau.first_same_as_last
 
     @wp.func
     def nothing(_K: Rows, _chain: Chain, _state: State, _world: int):

@@ -24,38 +24,28 @@ from warpchain.kernels.cpu.tilting import tilting_plane
 from warpchain.kernels.cpu.upright import upright_plane
 from warpchain.kernels.events.present_chain import has_changed, present_chain
 from warpchain.kernels.events.record import lacks_last_sample, record_is_full
-from warpchain.kernels.events.sample import VIEWS, next_mark, sampling
+from warpchain.kernels.events.sample import next_mark, observation, sampling
 from warpchain.kernels.events.softening import book_softening, contact_step, spring_tolerance
-from warpchain.kernels.events.tallies import add_count, attempts_made, of_fixed_body, raise_extreme
+from warpchain.kernels.events.tallies import add_count, attempts_made, of_fixed_body, raise_extreme, store_losses
 from warpchain.kernels.features import COMPILER_FLAGS, Features
 from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step
 from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.physics.elementary import ONE, ZERO
-from warpchain.kernels.physics.geometry import whole_lanes
+from warpchain.kernels.physics.geometry import link_is_finite, whole_lanes
 from warpchain.kernels.physics.scaled_loads import write_links
 from warpchain.kernels.types import Chain, Control, Drive, Integers, Model, Record, Rows, State, read_ground
-
-wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
 def load_state(K: Rows, model: Model, state: State, chain: Chain, world: int):
     """Fills the rows of the state; rows of losses start at zero, columns behind the links are links without mass."""
     i = int(0)
-    while i < chain.link_count:
-        row = int(0)
-        while row < 6:
-            K[row, i] = state.links[world, row, i]
-            row += 1
-        K[layout.LOST_FRICTION, i] = ZERO
-        K[layout.LOST_DAMPING, i] = ZERO
-        K[layout.LOST_FIXED, i] = ZERO
-        i += 1
-    # columns up to whole vectors
     while i < whole_lanes(chain.link_count):
         row = int(0)
         while row < wp.static(layout.STAGES):
             K[row, i] = ZERO
+            if row < 6 and i < chain.link_count:
+                K[row, i] = state.links[world, row, i]
             row += 1
         i += 1
     write_links(K, model, world, state.load_factor[world])
@@ -64,22 +54,14 @@ def load_state(K: Rows, model: Model, state: State, chain: Chain, world: int):
 @wp.func
 def store_state(K: Rows, state: State, chain: Chain, world: int, fixed_loss: int):
     """Writes the state and the losses since loading."""
-    friction = ZERO
-    damping = ZERO
-    fixed = ZERO
     i = int(0)
     while i < chain.link_count:
         row = int(0)
         while row < 6:
             state.links[world, row, i] = K[row, i]
             row += 1
-        friction += K[layout.LOST_FRICTION, i]
-        damping += K[layout.LOST_DAMPING, i]
-        fixed += K[layout.LOST_FIXED, i]
         i += 1
-    state.losses[world, layout.LOSS_FRICTION] = friction
-    state.losses[world, layout.LOSS_DAMPING] = damping
-    state.losses[world, fixed_loss] = fixed
+    store_losses(K, layout.LOST_FRICTION, state, world, chain.link_count, fixed_loss)
 
 
 @wp.func
@@ -88,14 +70,7 @@ def state_is_finite(K: Rows, chain: Chain):
     finite = bool(True)
     i = int(0)
     while i < chain.link_count:
-        row = int(0)
-        while row < 6:
-            finite = finite and wp.isfinite(K[row, i])
-            row += 1
-        row = int(0)
-        while row < 3:
-            finite = finite and wp.isfinite(K[layout.STAGES + row, i])
-            row += 1
+        finite = finite and link_is_finite(K, i, layout.STAGES)
         i += 1
     return finite
 
@@ -113,31 +88,18 @@ def make_advance(features: Features):
     list_size = list_layout(columns).size
     is_driven = features.is_driven
     face_of = BODIES[features.fixed_body].face
-    fixed_loss, _, _ = of_fixed_body(features.fixed_body)
-    # on the sprocket the pauses between impulses are too short for a flight
-    has_flight = find_method(features.method).has_rigid_flight and not (is_driven or features.moving_sprocket)
-    joints = rigid_in_flight(features.method, columns) if has_flight else springs(features.method, features.tilts)
-    settle, attempt, shrinkage, accept, react = (
-        joints.settle,
-        joints.attempt,
-        joints.shrinkage,
-        joints.accept,
-        joints.react,
-    )
+    fixed_loss, _, _ = of_fixed_body(features.is_driven)
+    # on the sprocket the pauses between impulses are too short for a flight; in flight joints feel weight only
+    can_fly = not is_driven and not features.moving_sprocket and features.load == "weight"
+    has_flight = find_method(features.method).has_rigid_flight and can_fly
+    on_springs = springs(features.method, features.acceleration)
+    joints = rigid_in_flight(features.method, columns) if has_flight else on_springs
     plane = tilting_plane(joints) if features.tilts else upright_plane(features.fixed_body, joints)
-    begin_run, at_start, begin_step, end_step, gap_of = (
-        plane.begin_run,
-        plane.at_start,
-        plane.begin_step,
-        plane.end_step,
-        plane.gap,
-    )
     meet_bodies = body_pass(features, plane)
     make_list, meet_links = link_pass(features, joints)
     bound_of_step = step_bound(features, has_flight)
-    sample = sampling(features.fixed_body, features.tilts)
-    write_sample, _, _ = VIEWS[features.tilts]
-    present = present_chain(is_driven)
+    sample = sampling(features)
+    write_sample = observation(features)
 
     @wp.func
     def take_sample(
@@ -155,7 +117,7 @@ def make_advance(features: Features):
         )
         after = chain
         if has_changed(state, world, softness, load_factor):
-            after = present(model, state, control, world)
+            after = present_chain(model, state, control, world)
             book_softening(chain, after, state, world)
             if wp.static(is_driven):
                 write_links(K, model, world, state.load_factor[world])
@@ -168,7 +130,7 @@ def make_advance(features: Features):
         add_count(state, world, layout.REJECTED, wp.int64(1))
         step = h * LEAST_SHRINKAGE
         if wp.isfinite(error):
-            step = h * shrinkage(state, world, error)
+            step = h * joints.shrinkage(state, world, error)
         elif not state_is_finite(K, chain):
             state.status[world] = NOT_FINITE
         state.step[world] = step
@@ -201,12 +163,12 @@ def make_advance(features: Features):
         P = state.plane[world]
         ground = read_ground(model, world)
         still = face_of(ground)
-        chain = present(model, state, control, world)
+        chain = present_chain(model, state, control, world)
         if state.is_fresh[world] != 0:
             load_state(K, model, state, chain, world)
             place_ends(K, chain)
-            begin_run(K, P, chain)
-            state.gap[world] = gap_of(K, at_start(P, chain), ground, still)
+            plane.begin_run(K, P, chain)
+            state.gap[world] = plane.gap(K, plane.at_start(P, chain), ground, still)
             make_list(K, L, chain, state, world, control.skin, greatest_opening(K, chain))
             state.has_first_stage[world] = 0
             state.is_fresh[world] = 0
@@ -221,19 +183,19 @@ def make_advance(features: Features):
             if state.status[world] != RUNNING:
                 break
 
-            settle(K, chain, state, world)
+            joints.settle(K, chain, state, world)
             longest = contact_step(state, control, world, wp.static(is_driven))
-            bound = bound_of_step(K, L, at_start(P, chain), still, control, state, world, longest)
+            bound = bound_of_step(K, L, plane.at_start(P, chain), still, control, state, world, longest)
             h = wp.min(state.step[world], bound)
             reaches_stop = time + h >= stop_time
             if reaches_stop:
                 h = stop_time - time
-            felt = begin_step(K, P, chain, state, world, h)
+            felt = plane.begin_step(K, P, chain, state, world, h)
             tolerance = spring_tolerance(drive, state, control, world, wp.static(is_driven))
-            error = wp.cast(attempt(K, felt, state, control, world, h, tolerance), wp.float64)
+            error = wp.cast(joints.attempt(K, felt, state, control, world, h, tolerance), wp.float64)
             attempts += 1
             if error <= ONE:
-                factor, joints_may_stay = accept(K, chain, state, control, world, h, error)
+                factor, joints_may_stay = joints.accept(K, chain, state, control, world, h, error)
                 add_count(state, world, layout.ACCEPTED, wp.int64(1))
                 state.time[world] = wp.where(reaches_stop, stop_time, time + h)
                 state.step[world] = next_step(state.step[world], h, factor)
@@ -241,12 +203,12 @@ def make_advance(features: Features):
                 place_ends(K, chain)
                 opening = greatest_opening(K, chain)
                 raise_extreme(state, world, layout.OPENING, opening)
-                end_step(K, P, chain, h)
+                plane.end_step(K, P, chain, h)
                 impulses = meet_bodies(K, P, chain, felt, ground, still, drive, state, world)
                 impulses += meet_links(K, L, chain, state, control, world, opening)
                 if impulses > wp.int64(0) or not joints_may_stay:
                     state.has_first_stage[world] = 0
-                    react(K, chain, state, world)
+                    joints.react(K, chain, state, world)
             else:
                 reject(K, chain, state, control, world, h, error)
             if state.status[world] == RUNNING and attempts_made(state, world) >= control.step_limit:

@@ -8,5 +8,5 @@ from warpchain.kernels.methods.method import find_method
 def scratch_rows(name: str, columns: int) -> int:
     """Rows of a chain's scratch with this many columns."""
     method = find_method(name)
-    rows = layout.scratch_rows(method.stages)
+    rows = layout.scratch_rows(method.tableau.stages)
     return rows + flight_rows(columns) if method.has_rigid_flight else rows

@@ -11,40 +11,18 @@ from warpchain.kernels import layout
 from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.contacts.tilting_floor import (
     copy_inverse,
-    greatest_across_speed,
     link_touches,
     meet_tilting_floor,
     middle_height,
     push_plane_by,
     steepness,
 )
-from warpchain.kernels.cpu.contacts.proximity import FURTHEST
+from warpchain.kernels.cpu.contacts.proximity import FURTHEST, any_negative, placed_link
 from warpchain.kernels.cpu.joints import Joints
 from warpchain.kernels.cpu.upright import Plane
-from warpchain.kernels.layout import (
-    COSINE,
-    INERTIA,
-    INVERSE_INERTIA,
-    INVERSE_MASS,
-    LEFT_X,
-    LEFT_Y,
-    LOST_FIXED,
-    MASS,
-    OMEGA,
-    RIGHT_X,
-    RIGHT_Y,
-    SINE,
-    STAGE_ROWS,
-    STAGES,
-    SUMS_OF_MOTION,
-    SUMS_OF_PLACES,
-    U,
-    V,
-    X,
-    Y,
-)
-from warpchain.kernels.physics.elementary import TWO, ZERO, from_order_key, order_bits, order_key
-from warpchain.kernels.physics.geometry import LANES, whole_lanes
+from warpchain.kernels.layout import INERTIA, LEFT_X, LOST_FIXED, MASS, OMEGA, SINE, STAGES, SUMS_OF_MOTION, U, V, X, Y
+from warpchain.kernels.physics.elementary import ZERO, from_order_key, order_key
+from warpchain.kernels.physics.geometry import LANES, read_link, whole_lanes
 from warpchain.kernels.physics.plane import (
     begin_plane_step,
     end_plane_step,
@@ -54,16 +32,14 @@ from warpchain.kernels.physics.plane import (
     place_terms,
     plane_load,
 )
-from warpchain.kernels.types import Chain, Ground, Row, Rows, State
+from warpchain.kernels.types import Chain, Ground, Row, Rows, State, with_circles
 
-wp.set_module_options({"enable_backward": False})
-
-SUMS = STAGES + STAGE_ROWS
+SUMS = STAGES + layout.STAGE_ROWS
 """First of the rows for terms of sums: those of the second to fourth stage, which are free between attempts."""
 SUMMED_IN_CONTACT = 3
 """Impulse on the plane and its two moments."""
 TOUCHES = SUMS + SUMMED_IN_CONTACT
-"""Row of 1 for links that touch the floor, 0 for others."""
+"""Row of −1 for links that touch the floor, 0 for others."""
 
 
 @wp.func_native("""
@@ -79,15 +55,6 @@ TOUCHES = SUMS + SUMMED_IN_CONTACT
 def row_sum(K: Rows, row: int, count: int) -> wp.float64:
     """Sum of the first ``count`` columns of a row, a multiple of 8; in pure Warp clang adds one after the other."""
     ...
-
-
-@wp.func
-def any_touches(K: Rows, first: int):
-    """Whether a link of the vector that begins at this column touches the floor."""
-    greatest = ZERO
-    for lane in range(wp.static(LANES)):
-        greatest = wp.max(greatest, K[wp.static(TOUCHES), first + lane])
-    return greatest > ZERO
 
 
 @wp.func
@@ -110,15 +77,13 @@ def write_plane_sums(K: Rows, P: Row, chain: Chain):
     count = whole_lanes(chain.link_count)
     i = int(0)
     while i < count:
-        places = place_terms(chain, K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[COSINE, i], K[SINE, i])
-        motion = motion_terms(K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[U, i], K[V, i], K[OMEGA, i])
-        for k in range(wp.static(SUMS_OF_PLACES)):
+        places = place_terms(chain, K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[layout.COSINE, i], K[SINE, i])
+        for k in range(wp.static(layout.SUMS_OF_PLACES)):
             K[wp.static(SUMS + k), i] = wp.where(i < chain.link_count, places[k], ZERO)
-        for k in range(wp.static(SUMS_OF_MOTION)):
-            K[wp.static(SUMS + SUMS_OF_PLACES + k), i] = wp.where(i < chain.link_count, motion[k], ZERO)
         i += 1
-    for k in range(wp.static(SUMS_OF_PLACES + SUMS_OF_MOTION)):
+    for k in range(wp.static(layout.SUMS_OF_PLACES)):
         P[wp.static(layout.PLANE_SUMS + k)] = row_sum(K, wp.static(SUMS + k), count)
+    write_sums_of_motion(K, P, chain)
     P[layout.SUM_MASS] = chain.mass
     invert_plane_mass(P)
 
@@ -126,13 +91,11 @@ def write_plane_sums(K: Rows, P: Row, chain: Chain):
 @wp.func
 def shift_first_stage(K: Rows, before: Chain, now: Chain):
     """Changes the stored first stage from one plane to another; links are the same."""
-    a = now.half_length
     i = int(0)
     while i < whole_lanes(now.link_count):
-        arm_x = a * K[COSINE, i]
-        arm_y = a * K[SINE, i]
-        ax, ay, turn = plane_load(now, K[X, i], K[Y, i], arm_x, arm_y)
-        old_ax, old_ay, old_turn = plane_load(before, K[X, i], K[Y, i], arm_x, arm_y)
+        link = read_link(K, now, i)
+        ax, ay, turn = plane_load(now, i, link, ZERO, ZERO)
+        old_ax, old_ay, old_turn = plane_load(before, i, link, ZERO, ZERO)
         K[STAGES, i] = K[STAGES, i] + (ax - old_ax)
         K[STAGES + 1, i] = K[STAGES + 1, i] + (ay - old_ay)
         K[STAGES + 2, i] = K[STAGES + 2, i] + (turn - old_turn)
@@ -140,61 +103,36 @@ def shift_first_stage(K: Rows, before: Chain, now: Chain):
 
 
 @wp.func
-def tilting_gap(K: Rows, chain: Chain):
+def tilting_gap(K: Rows, chain: Chain, _ground: Ground, _face: Face):
     """Height [m] of the lowest rim of a roller above the floor; negative when it is below."""
     slope = steepness(chain)
-    lowest = order_key(middle_height(chain, slope, K[LEFT_X, 0], K[LEFT_Y, 0]))
+    lowest = FURTHEST
     i = int(0)
     while i < whole_lanes(chain.link_count):
-        left = order_key(middle_height(chain, slope, K[LEFT_X, i], K[LEFT_Y, i]))
-        right = order_key(middle_height(chain, slope, K[RIGHT_X, i], K[RIGHT_Y, i]))
+        own = with_circles(chain, K[layout.RADIUS, i])
+        left = order_key(middle_height(own, slope, K[LEFT_X, i], K[layout.LEFT_Y, i]))
+        right = order_key(middle_height(own, slope, K[layout.RIGHT_X, i], K[layout.RIGHT_Y, i]))
         lowest = wp.min(lowest, wp.where(i < chain.link_count, wp.min(left, right), FURTHEST))
         i += 1
     return from_order_key(lowest) - chain.half_width * wp.abs(chain.up_z)
 
 
 @wp.func
-def greatest_tilting_speed(K: Rows, chain: Chain):
-    """A bound on the speed [m/s] of every point of a roller, across the plane too."""
-    greatest = wp.int64(0)
-    i = int(0)
-    while i < whole_lanes(chain.link_count):
-        turn = chain.half_length * K[OMEGA, i]
-        across = greatest_across_speed(chain, K[X, i], K[Y, i])
-        square = TWO * (K[U, i] * K[U, i] + K[V, i] * K[V, i] + turn * turn) + across * across
-        greatest = wp.max(greatest, wp.where(i < chain.link_count, order_bits(square), wp.int64(0)))
-        i += 1
-    return wp.sqrt(wp.cast(greatest, wp.float64))
-
-
-@wp.func
 def write_touches(K: Rows, chain: Chain, slope: wp.float64):
-    """Writes 1 for each link that touches the floor and 0 for others; returns their number."""
+    """Writes −1 for each link that touches the floor and 0 for others; returns their number."""
     touching = wp.int64(0)
     i = int(0)
     while i < whole_lanes(chain.link_count):
-        touches = link_touches(
-            chain,
-            slope,
-            K[LEFT_X, i],
-            K[LEFT_Y, i],
-            K[RIGHT_X, i],
-            K[RIGHT_Y, i],
-            K[X, i],
-            K[Y, i],
-            K[U, i],
-            K[V, i],
-            K[OMEGA, i],
-        )
+        touches = link_touches(with_circles(chain, K[layout.RADIUS, i]), slope, placed_link(K, i))
         touches = wp.where(i < chain.link_count, touches, wp.int64(0))
-        K[wp.static(TOUCHES), i] = wp.float64(touches)
+        K[wp.static(TOUCHES), i] = -wp.float64(touches)
         touching += touches
         i += 1
     return touching
 
 
 @wp.func
-def resolve_tilting_floor(K: Rows, P: Row, own: Chain):
+def resolve_tilting_floor(K: Rows, P: Row, own: Chain, _ground: Ground, _face: Face):
     """Applies the impulses between rollers and floor to links, plane and sums; returns their number.
 
     The sums must be those of the present places. Lanes of links of which none touches are passed over.
@@ -212,29 +150,13 @@ def resolve_tilting_floor(K: Rows, P: Row, own: Chain):
         for k in range(wp.static(SUMMED_IN_CONTACT)):
             for lane in range(wp.static(LANES)):
                 K[wp.static(SUMS + k), first + lane] = ZERO
-        if any_touches(K, first):
+        if any_negative(K, wp.static(TOUCHES), first):
             lane = int(0)
             while lane < wp.static(LANES):
                 i = first + lane
-                link = meet_tilting_floor(
-                    chain,
-                    slope,
-                    B,
-                    K[LEFT_X, i],
-                    K[LEFT_Y, i],
-                    K[RIGHT_X, i],
-                    K[RIGHT_Y, i],
-                    K[X, i],
-                    K[Y, i],
-                    K[MASS, i],
-                    K[INERTIA, i],
-                    K[INVERSE_MASS, i],
-                    K[INVERSE_INERTIA, i],
-                    K[U, i],
-                    K[V, i],
-                    K[OMEGA, i],
-                )
-                touches = K[wp.static(TOUCHES), i] > ZERO
+                own = with_circles(chain, K[layout.RADIUS, i])
+                link = meet_tilting_floor(own, slope, B, placed_link(K, i))
+                touches = K[wp.static(TOUCHES), i] < ZERO
                 K[U, i] = wp.where(touches, link.u, K[U, i])
                 K[V, i] = wp.where(touches, link.v, K[V, i])
                 K[OMEGA, i] = wp.where(touches, link.omega, K[OMEGA, i])
@@ -256,7 +178,6 @@ def resolve_tilting_floor(K: Rows, P: Row, own: Chain):
 @functools.cache
 def tilting_plane(joints: Joints) -> Plane:
     """A plane that may tilt, above a flat floor."""
-    first_stage = joints.first_stage
 
     @wp.func
     def at_start(P: Row, chain: Chain) -> Chain:
@@ -269,7 +190,7 @@ def tilting_plane(joints: Joints) -> Plane:
         felt = on_plane(chain, P, wp.static(layout.PLANE_MID))
         if state.has_first_stage[world] != 0:
             shift_first_stage(K, before, felt)
-        first_stage(K, felt, state, world)
+        joints.first_stage(K, felt, state, world)
         return felt
 
     @wp.func
@@ -277,12 +198,4 @@ def tilting_plane(joints: Joints) -> Plane:
         write_plane_sums(K, P, chain)
         end_plane_step(P, chain.gravity, h)
 
-    @wp.func
-    def gap(K: Rows, chain: Chain, _ground: Ground, _face: Face):
-        return tilting_gap(K, chain)
-
-    @wp.func
-    def meet(K: Rows, P: Row, chain: Chain, _ground: Ground, _face: Face):
-        return resolve_tilting_floor(K, P, chain)
-
-    return Plane(write_plane_sums, at_start, begin_step, end_step, gap, meet)
+    return Plane(write_plane_sums, at_start, begin_step, end_step, tilting_gap, resolve_tilting_floor)

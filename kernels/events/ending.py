@@ -6,8 +6,6 @@ from warpchain.kernels.layout import BOUNCES, COLLAPSED_AT, SELF_CONTACT_AT, STR
 from warpchain.kernels.physics.elementary import HALF, ZERO
 from warpchain.kernels.types import State
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.func
 def note(state: State, world: int, first: int, time: wp.float64, last_floor_impulse: wp.float64):

@@ -1,15 +1,11 @@
 """A chain's constants at this moment: under its present loads, with its present softness."""
 
-import functools
-
 import warp as wp
 
 from warpchain.kernels.physics.elementary import ONE
 from warpchain.kernels.physics.scaled_loads import under_load
 from warpchain.kernels.physics.softness import softened
 from warpchain.kernels.types import Chain, Control, Model, State
-
-wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
@@ -18,19 +14,8 @@ def has_changed(state: State, world: int, softness: wp.float64, load_factor: wp.
     return state.softness[world] != softness or load_factor > ONE or state.load_factor[world] > ONE
 
 
-@functools.cache
-def present_chain(is_driven: bool):
-    """Warp function ``present(model, state, control, world)`` → Chain.
-
-    Args:
-        is_driven: Whether its loads may change, see :mod:`physics.scaled_loads`.
-    """
-
-    @wp.func
-    def present(model: Model, state: State, control: Control, world: int) -> Chain:
-        chain = model.chains[world]
-        if wp.static(is_driven):
-            chain = under_load(chain, state.load_factor[world])
-        return softened(chain, control, state.softness[world])
-
-    return present
+@wp.func
+def present_chain(model: Model, state: State, control: Control, world: int) -> Chain:
+    """The chain of a world; loads are multiplied on a sprocket only, see :mod:`physics.scaled_loads`."""
+    chain = under_load(model.chains[world], state.load_factor[world])
+    return softened(chain, control, state.softness[world])

@@ -2,53 +2,33 @@
 
 import warp as wp
 
-from warpchain.kernels import layout
 from warpchain.kernels.codes import NOT_FINITE, RUNNING
-from warpchain.kernels.events.summary import Summary, summarise
 from warpchain.kernels.layout import COSINE, COULOMB, LEFT_X, LEFT_Y, OMEGA, RIGHT_X, RIGHT_Y, SINE, TIME, VISCOUS, U, V
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.physics.joint import friction_torque, joint_force
 from warpchain.kernels.types import Chain, Record, Rows, State
 
-wp.set_module_options({"enable_backward": False})
+
+@wp.func
+def copy_sample(state: State, world: int, target: Rows, row: int):
+    """Writes the latest sample of a chain as a row, as far as it has columns."""
+    column = int(0)
+    while column < target.shape[1]:
+        target[row, column] = state.last_sample[world, column]
+        column += 1
 
 
 @wp.func
-def write_row(rows: Rows, row: int, time: wp.float64, summary: Summary):
-    """Writes a summary as one row of SAMPLE_COLUMNS numbers."""
-    rows[row, TIME] = time
-    rows[row, layout.CENTER_X] = summary.center_x
-    rows[row, layout.CENTER_Y] = summary.center_y
-    rows[row, layout.CENTER_U] = summary.center_u
-    rows[row, layout.CENTER_V] = summary.center_v
-    rows[row, layout.KINETIC] = summary.kinetic
-    rows[row, layout.GRAVITATIONAL] = summary.gravitational
-    rows[row, layout.SPRING] = summary.spring
-    rows[row, layout.LOWEST] = summary.lowest
-    rows[row, layout.RMS_SPEED] = summary.rms_speed
-    rows[row, layout.HEIGHT] = summary.height
-    rows[row, layout.WIDTH] = summary.width
-    rows[row, layout.LOOP_SPEED] = summary.loop_speed
-
-
-@wp.func
-def write_sample(state: State, record: Record, world: int, time: wp.float64, summary: Summary):
-    """Writes the first and the latest sample of a chain, and appends to the time series if it is kept."""
-    if state.last_sample[world, TIME] < ZERO:
-        write_row(state.first_sample, world, time, summary)
-    write_row(state.last_sample, world, time, summary)
+def keep_sample(state: State, record: Record, world: int, time: wp.float64):
+    """Completes the latest sample of a chain by its time, and keeps it as the first and in the time series."""
+    is_first = state.last_sample[world, TIME] < ZERO
+    state.last_sample[world, TIME] = time
+    if is_first:
+        copy_sample(state, world, state.first_sample, world)
     if record.samples.shape[1] > 0:
         row = record.sample_count[world]
-        write_row(record.samples[world], row, time, summary)
+        copy_sample(state, world, record.samples[world], row)
         record.sample_count[world] = row + 1
-
-
-@wp.func
-def observe(K: Rows, chain: Chain, state: State, record: Record, world: int, time: wp.float64) -> Summary:
-    """Writes a sample of a chain whose ends are placed."""
-    summary = summarise(K, chain)
-    write_sample(state, record, world, time, summary)
-    return summary
 
 
 @wp.func

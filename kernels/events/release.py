@@ -31,12 +31,9 @@ import warp as wp
 
 from warpchain.kernels import layout
 from warpchain.kernels.codes import FINISHED
-from warpchain.kernels.events.summary import Summary
 from warpchain.kernels.physics.elementary import HALF, ONE, ZERO
 from warpchain.kernels.physics.scaled_loads import DRAG_PER_CROSSING, DRAG_PER_TURN, crossing_time
 from warpchain.kernels.types import LOADING_TIME, Chain, Drive, Row, State
-
-wp.set_module_options({"enable_backward": False})
 
 LITTLE_SLIP = wp.constant(wp.float64(0.006))
 """Slip above which a free loop is watched for as long as slow waves need.
@@ -53,6 +50,8 @@ SLOWEST_STEADY = wp.constant(wp.float64(0.02))
 """Changes of the speed [m/s] that are always even enough: for sprockets that stand still."""
 SHORTEST_WINDOW = wp.constant(wp.float64(0.05))
 """Shortest window [s]: passing links make height and width ripple."""
+WATCHED = len(layout.WATCHED_COLUMNS)
+Watched = wp.types.vector(length=WATCHED, dtype=wp.float64)
 
 
 @wp.func
@@ -66,16 +65,15 @@ def begin_window(watch: Row, time: wp.float64):
     """Resets the sums of a window."""
     watch[layout.WINDOW_START] = time
     watch[layout.WINDOW_COUNT] = ZERO
-    watch[layout.SUM_HEIGHT] = ZERO
-    watch[layout.SUM_WIDTH] = ZERO
-    watch[layout.SUM_X] = ZERO
-    watch[layout.SUM_Y] = ZERO
-    watch[layout.SUM_SPEED] = ZERO
+    for k in range(wp.static(WATCHED)):
+        watch[layout.WINDOW_SUMS + k] = ZERO
 
 
 @wp.func
-def widen(watch: Row, least: int, greatest: int, mean: wp.float64, is_first: bool):
-    """Includes a window's mean in the range of a watch, or begins the range with it; returns the width of the range."""
+def widen(watch: Row, k: int, mean: wp.float64, is_first: bool):
+    """Includes a window's mean in a range of a watch, or begins the range with it; returns the width of the range."""
+    least = layout.RANGES + 2 * k
+    greatest = least + 1
     if is_first:
         watch[least] = mean
         watch[greatest] = mean
@@ -110,8 +108,9 @@ def drag_rate(chain: Chain, state: State, drive: Drive, world: int, height: wp.f
 
 
 @wp.func
-def watch_steadiness(chain: Chain, state: State, drive: Drive, world: int, time: wp.float64, summary: Summary):
+def watch_steadiness(chain: Chain, state: State, drive: Drive, world: int, sample: Row):
     """Adds a sample to its window. At the end of a window loads may begin to fall, or the moment of release is set."""
+    time = sample[layout.TIME]
     if not is_watched(state, drive, world, time):
         return
     watch = state.watch[world]
@@ -125,57 +124,49 @@ def watch_steadiness(chain: Chain, state: State, drive: Drive, world: int, time:
     if watch[layout.LOADED_SINCE] < ZERO:
         watch[layout.LOADED_SINCE] = time
     watch[layout.WINDOW_COUNT] = watch[layout.WINDOW_COUNT] + ONE
-    watch[layout.SUM_HEIGHT] = watch[layout.SUM_HEIGHT] + summary.height
-    watch[layout.SUM_WIDTH] = watch[layout.SUM_WIDTH] + summary.width
-    watch[layout.SUM_X] = watch[layout.SUM_X] + summary.center_x
-    watch[layout.SUM_Y] = watch[layout.SUM_Y] + summary.center_y
-    watch[layout.SUM_SPEED] = watch[layout.SUM_SPEED] + summary.loop_speed
+    for k in range(wp.static(WATCHED)):
+        watch[layout.WINDOW_SUMS + k] = watch[layout.WINDOW_SUMS + k] + sample[wp.static(layout.WATCHED_COLUMNS[k])]
 
-    crossing = crossing_time(drive.loop_speed[world], chain.gravity, chain.sprocket_radius, summary.height)
+    target = drive.loop_speed[world]
+    crossing = crossing_time(target, chain.gravity, chain.sprocket_radius, sample[layout.HEIGHT])
     window = drive.steady_window[world]
     wanted = drive.steady_time[world]
     if is_loaded:
         window = wp.max(SHORTEST_WINDOW, HALF * crossing)
         wanted = crossing
     elif wanted < ZERO:
-        slips = drive.loop_speed[world] - summary.loop_speed > LITTLE_SLIP * drive.loop_speed[world]
+        slips = target - sample[layout.LOOP_SPEED] > LITTLE_SLIP * target
         was_loaded = watch[layout.HOLD_LOAD] > ONE
         wanted = wp.where(was_loaded and not slips, drive.loop_period[world], crossing)
     if time - watch[layout.WINDOW_START] < window:
         return
 
-    count = watch[layout.WINDOW_COUNT]
-    height = watch[layout.SUM_HEIGHT] / count
-    width = watch[layout.SUM_WIDTH] / count
-    x = watch[layout.SUM_X] / count
-    y = watch[layout.SUM_Y] / count
-    speed = watch[layout.SUM_SPEED] / count
-    begin_window(watch, time)
     is_first = watch[layout.STEADY_SINCE] < ZERO
-    tall = widen(watch, layout.LEAST_HEIGHT, layout.GREATEST_HEIGHT, height, is_first)
-    wide = widen(watch, layout.LEAST_WIDTH, layout.GREATEST_WIDTH, width, is_first)
-    aside = widen(watch, layout.LEAST_X, layout.GREATEST_X, x, is_first)
-    up = widen(watch, layout.LEAST_Y, layout.GREATEST_Y, y, is_first)
-    drift = wp.max(wp.max(tall, up) / height, wp.max(wide, aside) / width)
+    mean = Watched()
+    width = Watched()  # of the range of all means
+    for k in range(wp.static(WATCHED)):
+        mean[k] = watch[layout.WINDOW_SUMS + k] / watch[layout.WINDOW_COUNT]
+        width[k] = widen(watch, k, mean[k], is_first)
+    begin_window(watch, time)
+    vertical = wp.max(width[layout.LOOP_HEIGHT], width[layout.LOOP_Y]) / mean[layout.LOOP_HEIGHT]
+    horizontal = wp.max(width[layout.LOOP_WIDTH], width[layout.LOOP_X]) / mean[layout.LOOP_WIDTH]
+    drift = wp.max(vertical, horizontal)
     watch[layout.DRIFT] = drift
-    target = drive.loop_speed[world]
-    uneven = widen(watch, layout.LEAST_SPEED, layout.GREATEST_SPEED, speed, is_first)
+    speed = mean[layout.LOOP_ALONG]
     tolerance = drive.steady_tolerance[world]
     is_fast_enough = wp.abs(speed - target) <= wp.max(MOST_SLIP * target, SLOWEST_STEADY)
-    keeps_speed = is_fast_enough and uneven <= wp.max(tolerance * target, SLOWEST_STEADY)
+    keeps_speed = is_fast_enough and width[layout.LOOP_ALONG] <= wp.max(tolerance * target, SLOWEST_STEADY)
     keeps_shape = drift <= tolerance
     is_over = keeps_shape and keeps_speed and not is_first and time - watch[layout.STEADY_SINCE] >= wanted
     if is_first or not (keeps_shape and keeps_speed) or (is_over and is_loaded):
         # the next watch counts this window as its first
         watch[layout.STEADY_SINCE] = time
-        widen(watch, layout.LEAST_HEIGHT, layout.GREATEST_HEIGHT, height, True)
-        widen(watch, layout.LEAST_WIDTH, layout.GREATEST_WIDTH, width, True)
-        widen(watch, layout.LEAST_X, layout.GREATEST_X, x, True)
-        widen(watch, layout.LEAST_Y, layout.GREATEST_Y, y, True)
-        widen(watch, layout.LEAST_SPEED, layout.GREATEST_SPEED, speed, True)
+        for k in range(wp.static(WATCHED)):
+            widen(watch, k, mean[k], True)
     if is_over and is_loaded:
-        watch[layout.LEAST_SPEED] = wp.float64(wp.inf)  # speed starts afresh: under load the loop slipped more
-        watch[layout.GREATEST_SPEED] = -wp.float64(wp.inf)
+        begins = wp.static(layout.RANGES + 2 * layout.LOOP_ALONG)
+        watch[begins] = wp.float64(wp.inf)  # speed starts afresh: under load the loop slipped more
+        watch[begins + 1] = -wp.float64(wp.inf)
         watch[layout.UNLOADED_SINCE] = time
         watch[layout.STEADY_SINCE] = time + LOADING_TIME
     elif is_over:

@@ -6,25 +6,15 @@ gravity, is not at rest: an impulse on the floor must be at most as long ago as 
 
 import warp as wp
 
+from warpchain.kernels import layout
 from warpchain.kernels.codes import AT_REST, DISTANCE_LIMIT, FINISHED, RUNNING
-from warpchain.kernels.events.summary import Summary
 from warpchain.kernels.layout import REST_SINCE
 from warpchain.kernels.physics.elementary import ZERO
-from warpchain.kernels.types import Control, Drive, State
-
-wp.set_module_options({"enable_backward": False})
+from warpchain.kernels.types import Control, Drive, Row, State
 
 
 @wp.func
-def watch_rest(
-    state: State,
-    drive: Drive,
-    control: Control,
-    world: int,
-    time: wp.float64,
-    summary: Summary,
-    last_floor_impulse: wp.float64,
-):
+def watch_rest(state: State, drive: Drive, control: Control, world: int, sample: Row, last_floor_impulse: wp.float64):
     """Status AT_REST once both speeds, the centre's and the rms, have been low for the rest time, else RUNNING.
 
     DISTANCE_LIMIT once the centre is as far away as a walk may go.
@@ -32,10 +22,12 @@ def watch_rest(
     """
     if state.stop_status[world] == FINISHED:
         return RUNNING
-    if drive.farthest[world] > ZERO and wp.abs(summary.center_x) >= drive.farthest[world]:
+    if drive.farthest[world] > ZERO and wp.abs(sample[layout.CENTER_X]) >= drive.farthest[world]:
         return DISTANCE_LIMIT
-    speed = wp.sqrt(summary.center_u * summary.center_u + summary.center_v * summary.center_v)
-    if wp.max(speed, summary.rms_speed) < control.rest_speed:
+    time = sample[layout.TIME]
+    u = sample[layout.CENTER_U]
+    v = sample[layout.CENTER_V]
+    if wp.max(wp.sqrt(u * u + v * v), sample[layout.RMS_SPEED]) < control.rest_speed:
         if state.watch[world, REST_SINCE] < ZERO:
             state.watch[world, REST_SINCE] = time
         is_held = time - last_floor_impulse <= control.rest_time

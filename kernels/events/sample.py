@@ -6,17 +6,19 @@ import warp as wp
 
 from warpchain.kernels.codes import RUNNING
 from warpchain.kernels.events.ending import watch_ending
-from warpchain.kernels.events.record import observe, write_frame
+from warpchain.kernels.events.record import keep_sample, write_frame
 from warpchain.kernels.events.release import drag_rate, load_at, watch_steadiness
 from warpchain.kernels.events.rest import watch_rest
 from warpchain.kernels.events.softening import watch_collapse, watch_drive, watch_stiffening
-from warpchain.kernels.events.tilting import no_fall, observe_in_room, watch_fall, write_frame_in_room
-from warpchain.kernels.layout import TIME
+from warpchain.kernels.events.summary import summarise
+from warpchain.kernels.events.tilting import move_into_room, watch_fall, write_frame_in_room
+from warpchain.kernels.features import Features
+from warpchain.kernels.layout import GRAVITATIONAL, HEIGHT, TIME
 from warpchain.kernels.physics.elementary import ZERO
+from warpchain.kernels.physics.geometry import read_link
+from warpchain.kernels.physics.load import LOADS, no_energy
 from warpchain.kernels.physics.scaled_loads import drag_shape
 from warpchain.kernels.types import Chain, Control, Drive, Record, Rows, State
-
-wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
@@ -28,12 +30,30 @@ def next_mark(state: State, control: Control, world: int):
     return due
 
 
-VIEWS = {False: (observe, write_frame, no_fall), True: (observe_in_room, write_frame_in_room, watch_fall)}
-"""How a sample and a frame are written, and the watch of a fall, by whether the plane of the chain may tilt."""
+@functools.cache
+def observation(features: Features):
+    """Warp function that writes a sample of a chain whose ends are placed; it returns the area inside the loop [m²]."""
+    energy = LOADS[features.load].energy
+    has_energy = energy is not no_energy
+
+    @wp.func
+    def observe(K: Rows, chain: Chain, state: State, record: Record, world: int, time: wp.float64):
+        area = summarise(K, chain, state.last_sample[world])
+        if wp.static(has_energy):
+            i = int(0)
+            while i < chain.link_count:
+                state.last_sample[world, GRAVITATIONAL] += energy(chain, i, read_link(K, chain, i))
+                i += 1
+        if wp.static(features.tilts):
+            move_into_room(K, state.plane[world], chain, state.last_sample[world])
+        keep_sample(state, record, world, time)
+        return area
+
+    return observe
 
 
 @functools.cache
-def sampling(fixed_body: str, tilts: bool = False):
+def sampling(features: Features):
     """Warp function ``sample`` of a chain whose ends are placed: time series, frame, watches; returns the status.
 
     It is called at or after :func:`next_mark`. If only a frame is due, nothing but the record changes. It may also
@@ -41,13 +61,12 @@ def sampling(fixed_body: str, tilts: bool = False):
     between links so far (``touches``), those between strands (``meetings``) and the time of the last one on the floor
     [s] are arguments: on a GPU they are not in the state.
 
-    Args:
-        fixed_body: On a ``"sprocket"`` it watches until the loop is stationary, on a floor until it rests or is far.
-        tilts: Whether the plane of the chain may move; its sums must be those of the present state.
+    On a sprocket it watches until the loop is stationary, on a floor until the chain rests or is far. The sums of a
+    plane that tilts must be those of the present state.
     """
-    has_floor = fixed_body not in ("none", "sprocket")
-    is_driven = fixed_body == "sprocket"
-    write, append_frame, watch_plane = VIEWS[tilts]
+    has_floor, is_driven = features.has_floor, features.is_driven
+    write = observation(features)
+    append_frame = write_frame_in_room if features.tilts else write_frame
 
     @wp.func
     def sample(
@@ -73,24 +92,25 @@ def sampling(fixed_body: str, tilts: bool = False):
             return RUNNING
         last_time = state.last_sample[world, TIME]
         is_first = last_time < ZERO
-        summary = write(K, chain, state, record, world, time)
+        area = write(K, chain, state, record, world, time)
         if frame_mark < wp.int64(0) and mark % control.frame_every == wp.int64(0):
             append_frame(K, chain, state, record, world, time)
         passed = wp.int64(wp.floor(time / control.sample_interval))
         state.next_sample[world] = wp.max(mark, passed) + wp.int64(1)
         if wp.static(not is_driven):
-            watch_ending(state, world, time, summary.area, touches, meetings, last_floor_impulse, is_first)
+            watch_ending(state, world, time, area, touches, meetings, last_floor_impulse, is_first)
         if wp.static(has_floor):
             watch_stiffening(state, drive, control, world, time)
-            watch_collapse(chain, state, control, world, time, summary.area, is_first)
-        watch_plane(state, world, time)
+            watch_collapse(chain, state, control, world, time, area, is_first)
+        if wp.static(features.tilts):
+            watch_fall(state, world, time)
         if wp.static(has_floor):
-            return watch_rest(state, drive, control, world, time, summary, last_floor_impulse)
+            return watch_rest(state, drive, control, world, state.last_sample[world], last_floor_impulse)
         if wp.static(is_driven):
             if state.load_factor[world] > wp.float64(1.0):
-                rate = drag_rate(chain, state, drive, world, summary.height)
+                rate = drag_rate(chain, state, drive, world, state.last_sample[world, HEIGHT])
                 drag_shape(K, chain, wp.exp(-rate * (time - last_time)))
-            watch_steadiness(chain, state, drive, world, time, summary)
+            watch_steadiness(chain, state, drive, world, state.last_sample[world])
             state.load_factor[world] = load_at(state, drive, world, time)
             watch_drive(state, drive, control, world, time)
         return RUNNING

@@ -24,18 +24,10 @@ next.
 
 import warp as wp
 
-from warpchain.kernels.layout import (
-    HOLD_LOAD,
-    LOSS_SOFTENING,
-    SOFTENED_AT,
-    SPRING,
-    TIME,
-)
+from warpchain.kernels.layout import HOLD_LOAD, LOSS_SOFTENING, SOFTENED_AT, SPRING, TIME
 from warpchain.kernels.physics.elementary import HALF, ONE, TWO, ZERO
 from warpchain.kernels.physics.softness import is_stiffer, softened
 from warpchain.kernels.types import Chain, Control, Drive, State
-
-wp.set_module_options({"enable_backward": False})
 
 TEN = wp.constant(wp.float64(10.0))
 ROUGHEST = wp.constant(wp.float64(0.05))

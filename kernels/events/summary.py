@@ -2,35 +2,15 @@
 
 import warp as wp
 
-from warpchain.kernels.layout import COSINE, INERTIA, LEFT_X, LEFT_Y, MASS, OMEGA, RIGHT_X, RIGHT_Y, SINE, U, V, X, Y
+from warpchain.kernels import layout
+from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, MASS, OMEGA, RADIUS, RIGHT_X, RIGHT_Y, SINE, U, V, X, Y
 from warpchain.kernels.physics.elementary import HALF, ZERO, from_order_key, order_key
-from warpchain.kernels.types import Chain, Rows
-
-wp.set_module_options({"enable_backward": False})
-
-
-@wp.struct
-class Summary:
-    """Sums over one chain at one moment; see ``Record.samples`` in :mod:`types`."""
-
-    center_x: wp.float64
-    center_y: wp.float64
-    center_u: wp.float64
-    center_v: wp.float64
-    kinetic: wp.float64
-    gravitational: wp.float64
-    spring: wp.float64
-    lowest: wp.float64
-    rms_speed: wp.float64
-    height: wp.float64
-    width: wp.float64
-    loop_speed: wp.float64
-    area: wp.float64
+from warpchain.kernels.types import Chain, Row, Rows
 
 
 @wp.func
-def summarise(K: Rows, chain: Chain) -> Summary:
-    """Sums over the placed links.
+def summarise(K: Rows, chain: Chain, sample: Row):
+    """Writes the sums over the placed links into a sample, all but its time; returns the area inside the loop.
 
     Loop speed: mean of v·u over links, positive from link i towards link i + 1. Area [m²] inside the loop, positive if
     it runs counter-clockwise: ½ Σ left end × right end.
@@ -50,6 +30,7 @@ def summarise(K: Rows, chain: Chain) -> Summary:
     right = left
     bottom = order_key(K[RIGHT_Y, 0])
     top = bottom
+    lowest = order_key(wp.float64(wp.inf))
     i = int(0)
     while i < n:
         m = K[MASS, i]
@@ -59,7 +40,7 @@ def summarise(K: Rows, chain: Chain) -> Summary:
         my += m * K[Y, i]
         mu += m * K[U, i]
         mv += m * K[V, i]
-        kinetic += HALF * (m * speed + K[INERTIA, i] * K[OMEGA, i] * K[OMEGA, i])
+        kinetic += HALF * (m * speed + K[layout.INERTIA, i] * K[OMEGA, i] * K[OMEGA, i])
         square += speed
         along += K[U, i] * K[COSINE, i] + K[V, i] * K[SINE, i]
         cx = K[LEFT_X, i + 1] - K[RIGHT_X, i]
@@ -68,21 +49,21 @@ def summarise(K: Rows, chain: Chain) -> Summary:
         area += K[LEFT_X, i] * K[RIGHT_Y, i] - K[RIGHT_X, i] * K[LEFT_Y, i]
         left = wp.min(left, order_key(K[RIGHT_X, i]))
         right = wp.max(right, order_key(K[RIGHT_X, i]))
-        bottom = wp.min(bottom, wp.min(order_key(K[LEFT_Y, i]), order_key(K[RIGHT_Y, i])))
+        low = wp.min(K[LEFT_Y, i], K[RIGHT_Y, i])
+        bottom = wp.min(bottom, order_key(low))
+        lowest = wp.min(lowest, order_key(low - K[RADIUS, i]))
         top = wp.max(top, order_key(K[RIGHT_Y, i]))
         i += 1
-    summary = Summary()
-    summary.center_x = mx / mass
-    summary.center_y = my / mass
-    summary.center_u = mu / mass
-    summary.center_v = mv / mass
-    summary.kinetic = kinetic
-    summary.gravitational = chain.gravity * my
-    summary.spring = spring
-    summary.lowest = from_order_key(bottom) - chain.circle_radius
-    summary.rms_speed = wp.sqrt(square / wp.float64(n))
-    summary.height = from_order_key(top) - from_order_key(bottom)
-    summary.width = from_order_key(right) - from_order_key(left)
-    summary.loop_speed = along / wp.float64(n)
-    summary.area = HALF * area
-    return summary
+    sample[layout.CENTER_X] = mx / mass
+    sample[layout.CENTER_Y] = my / mass
+    sample[layout.CENTER_U] = mu / mass
+    sample[layout.CENTER_V] = mv / mass
+    sample[layout.KINETIC] = kinetic
+    sample[layout.GRAVITATIONAL] = chain.gravity * my
+    sample[layout.SPRING] = spring
+    sample[layout.LOWEST] = from_order_key(lowest)
+    sample[layout.RMS_SPEED] = wp.sqrt(square / wp.float64(n))
+    sample[layout.HEIGHT] = from_order_key(top) - from_order_key(bottom)
+    sample[layout.WIDTH] = from_order_key(right) - from_order_key(left)
+    sample[layout.LOOP_SPEED] = along / wp.float64(n)
+    return HALF * area

@@ -2,29 +2,18 @@
 
 import warp as wp
 
-from warpchain.kernels.layout import (
-    ACCEPTED,
-    BOUNCES,
-    FLOOR_DEPTH,
-    FLOOR_IMPULSES,
-    LOSS_FLOOR,
-    LOSS_SPROCKET,
-    REJECTED,
-    SPROCKET_DEPTH,
-    SPROCKET_IMPULSES,
-)
-from warpchain.kernels.types import State
-
-wp.set_module_options({"enable_backward": False})
+from warpchain.kernels import layout
+from warpchain.kernels.layout import ACCEPTED, BOUNCES, FLOOR_DEPTH, FLOOR_IMPULSES, LOSS_FLOOR, LOSS_SPROCKET, REJECTED
+from warpchain.kernels.types import Rows, State
 
 BOUNCE_PAUSE = wp.constant(wp.float64(0.01))
 """A floor impulse this long [s] after the one before it begins a new bounce."""
 
 
-def of_fixed_body(fixed_body: str) -> tuple[int, int, int]:
-    """Places of the loss, the greatest depth and the counter of impulses of the floor or the sprocket."""
-    if fixed_body == "sprocket":
-        return LOSS_SPROCKET, SPROCKET_DEPTH, SPROCKET_IMPULSES
+def of_fixed_body(is_driven: bool) -> tuple[int, int, int]:
+    """Places of the loss, the greatest depth and the counter of impulses of the sprocket or the floor."""
+    if is_driven:
+        return LOSS_SPROCKET, layout.SPROCKET_DEPTH, layout.SPROCKET_IMPULSES
     return LOSS_FLOOR, FLOOR_DEPTH, FLOOR_IMPULSES
 
 
@@ -48,9 +37,28 @@ def raise_extreme(state: State, world: int, extreme: int, value: wp.float64):
 
 
 @wp.func
+def row_total(K: Rows, row: int, n: int):
+    """Sum of the first n numbers of a row, in their order."""
+    total = wp.float64(0.0)
+    i = int(0)
+    while i < n:
+        total += K[row, i]
+        i += 1
+    return total
+
+
+@wp.func
 def book_loss(state: State, world: int, cause: int, energy: wp.float64):
     """Adds an energy [J] to an entry of ``State.losses``."""
     state.losses[world, cause] = state.losses[world, cause] + energy
+
+
+@wp.func
+def store_losses(K: Rows, first: int, state: State, world: int, n: int, fixed_loss: int):
+    """Stores what n joints and links have lost since loading, from three rows: friction, damping, fixed body."""
+    state.losses[world, layout.LOSS_FRICTION] = row_total(K, first, n)
+    state.losses[world, layout.LOSS_DAMPING] = row_total(K, first + 1, n)
+    state.losses[world, fixed_loss] = row_total(K, first + 2, n)
 
 
 @wp.func

@@ -2,35 +2,12 @@
 
 import warp as wp
 
-from warpchain.kernels.events.record import write_frame, write_sample
-from warpchain.kernels.events.summary import Summary, summarise
-from warpchain.kernels.layout import (
-    AHEAD,
-    CENTER_W,
-    CENTER_Z,
-    FELL_AT,
-    GREATEST_LEAN,
-    LEFT_X,
-    LEFT_Y,
-    ORIGIN,
-    PLANE_COLUMN,
-    PLANE_SPEED,
-    PLANE_TURN_X,
-    PLANE_TURN_Y,
-    PLANE_VALUES,
-    RIGHT_X,
-    RIGHT_Y,
-    SUM_MASS,
-    TIME,
-    UP,
-    X,
-    Y,
-)
-from warpchain.kernels.physics.elementary import ZERO, from_order_key, order_key
+from warpchain.kernels import layout
+from warpchain.kernels.events.record import write_frame
+from warpchain.kernels.layout import AHEAD, FELL_AT, GREATEST_LEAN, LEFT_X, LEFT_Y, ORIGIN, PLANE_VALUES, UP, X, Y
+from warpchain.kernels.physics.elementary import ONE, ZERO, from_order_key, order_key
 from warpchain.kernels.physics.plane import plane_energy
 from warpchain.kernels.types import Chain, Record, Row, Rows, State
-
-wp.set_module_options({"enable_backward": False})
 
 FALLEN = wp.constant(wp.float64(0.7071067811865476))
 """Sine of the tilt beyond which a chain has fallen over: 45°."""
@@ -54,64 +31,51 @@ def sideways(P: Row, x: wp.float64, y: wp.float64, z: wp.float64):
 @wp.func
 def across_speed(P: Row, x: wp.float64, y: wp.float64):
     """Speed w [m/s] across the plane of the point at (x, y)."""
-    return P[PLANE_SPEED] + P[PLANE_TURN_X] * y - P[PLANE_TURN_Y] * x
+    return P[layout.PLANE_SPEED] + P[layout.PLANE_TURN_X] * y - P[layout.PLANE_TURN_Y] * x
 
 
 @wp.func
-def in_room(K: Rows, P: Row, chain: Chain, flat: Summary) -> Summary:
-    """Sums in the room, from those in the plane; height, width and speed of the loop stay those in the plane."""
+def move_into_room(K: Rows, P: Row, chain: Chain, sample: Row):
+    """Changes sums in the plane to sums in the room and adds the further columns.
+
+    Height, width and speed of the loop stay those in the plane.
+    """
     n = chain.link_count
-    square = flat.rms_speed * flat.rms_speed * wp.float64(n)
+    square = sample[layout.RMS_SPEED] * sample[layout.RMS_SPEED] * wp.float64(n)
     bottom = order_key(wp.float64(wp.inf))
     i = int(0)
     while i < n:
         w = across_speed(P, K[X, i], K[Y, i])
         square += w * w
         left = order_key(component(P, UP, K[LEFT_X, i], K[LEFT_Y, i], ZERO))
-        right = order_key(component(P, UP, K[RIGHT_X, i], K[RIGHT_Y, i], ZERO))
-        bottom = wp.min(bottom, wp.min(left, right))
+        right = order_key(component(P, UP, K[layout.RIGHT_X, i], K[layout.RIGHT_Y, i], ZERO))
+        low = wp.min(left, right)
+        if K[layout.RADIUS, i] < chain.circle_radius:
+            smaller = chain.circle_radius - K[layout.RADIUS, i]
+            low = order_key(from_order_key(low) + smaller * wp.sqrt(ONE - P[UP + 2] * P[UP + 2]))
+        bottom = wp.min(bottom, low)
         i += 1
     slope = wp.sqrt(P[UP] * P[UP] + P[UP + 1] * P[UP + 1])
     extent = chain.circle_radius * slope + chain.half_width * wp.abs(P[UP + 2])
-    w = across_speed(P, flat.center_x, flat.center_y)
-    summary = flat
-    summary.center_x = P[ORIGIN] + component(P, AHEAD, flat.center_x, flat.center_y, ZERO)
-    summary.center_y = P[ORIGIN + 1] + component(P, UP, flat.center_x, flat.center_y, ZERO)
-    summary.center_u = component(P, AHEAD, flat.center_u, flat.center_v, w)
-    summary.center_v = component(P, UP, flat.center_u, flat.center_v, w)
-    summary.kinetic = flat.kinetic + plane_energy(P)
-    summary.gravitational = chain.gravity * P[SUM_MASS] * summary.center_y
-    summary.lowest = P[ORIGIN + 1] + from_order_key(bottom) - extent
-    summary.rms_speed = wp.sqrt(square / wp.float64(n))
-    return summary
-
-
-@wp.func
-def write_plane_columns(row: Row, P: Row, flat: Summary):
-    """Writes the further columns of a sample."""
+    x = sample[layout.CENTER_X]
+    y = sample[layout.CENTER_Y]
+    u = sample[layout.CENTER_U]
+    v = sample[layout.CENTER_V]
+    w = across_speed(P, x, y)
+    sample[layout.CENTER_X] = P[ORIGIN] + component(P, AHEAD, x, y, ZERO)
+    sample[layout.CENTER_Y] = P[ORIGIN + 1] + component(P, UP, x, y, ZERO)
+    sample[layout.CENTER_Z] = P[ORIGIN + 2] + sideways(P, x, y, ZERO)
+    sample[layout.CENTER_U] = component(P, AHEAD, u, v, w)
+    sample[layout.CENTER_V] = component(P, UP, u, v, w)
+    sample[layout.CENTER_W] = sideways(P, u, v, w)
+    sample[layout.KINETIC] = sample[layout.KINETIC] + plane_energy(P)
+    sample[layout.GRAVITATIONAL] = chain.gravity * P[layout.SUM_MASS] * sample[layout.CENTER_Y]
+    sample[layout.LOWEST] = P[ORIGIN + 1] + from_order_key(bottom) - extent
+    sample[layout.RMS_SPEED] = wp.sqrt(square / wp.float64(n))
     k = int(0)
     while k < PLANE_VALUES:
-        row[PLANE_COLUMN + k] = P[k]
+        sample[layout.PLANE_COLUMN + k] = P[k]
         k += 1
-    w = across_speed(P, flat.center_x, flat.center_y)
-    row[CENTER_Z] = P[ORIGIN + 2] + sideways(P, flat.center_x, flat.center_y, ZERO)
-    row[CENTER_W] = sideways(P, flat.center_u, flat.center_v, w)
-
-
-@wp.func
-def observe_in_room(K: Rows, chain: Chain, state: State, record: Record, world: int, time: wp.float64) -> Summary:
-    """Writes a sample of a chain whose ends are placed: its sums in the room, and the plane."""
-    P = state.plane[world]
-    flat = summarise(K, chain)
-    seen = in_room(K, P, chain, flat)
-    if state.last_sample[world, TIME] < ZERO:
-        write_plane_columns(state.first_sample[world], P, flat)
-    write_plane_columns(state.last_sample[world], P, flat)
-    if record.samples.shape[1] > 0:
-        samples = record.samples[world]
-        write_plane_columns(samples[record.sample_count[world]], P, flat)
-    write_sample(state, record, world, time, seen)
-    return seen
 
 
 @wp.func
@@ -135,9 +99,3 @@ def watch_fall(state: State, world: int, time: wp.float64):
     state.watch[world, GREATEST_LEAN] = wp.max(state.watch[world, GREATEST_LEAN], lean)
     if state.watch[world, FELL_AT] < ZERO and lean > FALLEN:
         state.watch[world, FELL_AT] = time
-
-
-@wp.func
-def no_fall(_state: State, _world: int, _time: wp.float64):
-    """The watch of a plane that stays upright."""
-    return

@@ -18,7 +18,7 @@ def board_size(threads: int) -> int:
 
 
 def board_rows(block_dim: int, columns: int) -> int:
-    """Rows of a chain's scratch of this width: for the part of the board kept between launches, or for all of it."""
+    """Rows of a chain's scratch of this width: for what is kept between launches, or all of the board and a plane."""
     if shares_board(block_dim):
         return layout.BOARD_VALUES
-    return -(-board_size(block_dim) // columns)
+    return -(-(board_size(block_dim) + layout.PLANE_ROWS) // columns)

@@ -1,4 +1,4 @@
-"""A stage on springs, one thread per link, and the structs of a step: link, rates, proximity, attempt.
+"""A stage on springs, one thread per link, and the structs of a step: run, proximity, attempt.
 
 A thread evaluates the joint at its link's right end. In each stage it passes its left end to the previous link and its
 joint's force to the next one. Two barriers a stage cost less than evaluating every joint twice.
@@ -12,15 +12,14 @@ import functools
 import warp as wp
 
 from warpchain.kernels import layout
-from warpchain.kernels.layout import COSINE, OMEGA, SINE, U, V, X, Y
+from warpchain.kernels.features import Features
 from warpchain.kernels.methods.controller import error_scale, quick_quotient
-from warpchain.kernels.physics.elementary import ZERO, order_bits_single
-from warpchain.kernels.physics.geometry import end_positions, end_velocities
+from warpchain.kernels.physics import geometry
+from warpchain.kernels.physics.elementary import order_bits_single
+from warpchain.kernels.physics.geometry import Link, end_positions, end_velocities
 from warpchain.kernels.physics.joint import friction_torque, joint_force, link_acceleration
-from warpchain.kernels.physics.plane import plane_load
-from warpchain.kernels.types import Chain, Rows
-
-wp.set_module_options({"enable_backward": False})
+from warpchain.kernels.physics.plane import on_plane
+from warpchain.kernels.types import Chain, Ground, Integers, Row, Rows
 
 LARGEST_SCALE = wp.constant(wp.float32(1e30))
 """Divisors are reduced to this, because :func:`quick_quotient` is 0 beyond 2¹²⁶; the ratio only grows."""
@@ -30,38 +29,27 @@ vec5d = wp.types.vector(length=5, dtype=wp.float64)
 
 
 @wp.struct
-class Link:
-    """State of a link, with its arm (see :mod:`physics.geometry`) instead of its angle, which no stage needs."""
+class Run:
+    """A thread's view of its block: which world it carries on, memory of all its threads, its own link."""
 
-    x: wp.float64  # [m]
-    y: wp.float64  # [m]
-    u: wp.float64  # ẋ [m/s]
-    v: wp.float64  # ẏ [m/s]
-    omega: wp.float64  # θ̇ [rad/s]
-    arm_x: wp.float64  # [m]
-    arm_y: wp.float64
-
-
-@wp.struct
-class Place:
-    """A thread's place in its block."""
-
+    ground: Ground
+    world: wp.int32
+    K: Rows  # the board
+    kept: Rows  # rows of the scratch, of which some are kept between launches
+    L: Integers  # the neighbour list
+    T: Integers  # of the contacts, see TouchLayout
+    P: Row  # the plane of the chain, if it tilts; the first thread changes it
+    stored_plane: Row  # where that lies between launches
+    # memory in which stages exchange ends and forces; between them contacts use it as E and F, sums over the links as M
+    E: Rows
+    F: Rows
+    M: Row
+    maxima: wp.uint64  # for :func:`gpu.threads.block_maxima`
     lane: wp.int32  # its link
     column: wp.int32  # its link, or the last one for threads without a link
     before: wp.int32  # the link to the left
     after: wp.int32  # the link to the right
     links: wp.int32  # number of links of the chain
-
-
-@wp.struct
-class Rates:
-    """A stage: accelerations of the link, and power lost in its right joint."""
-
-    x: wp.float64
-    y: wp.float64
-    theta: wp.float64
-    friction: wp.float64  # [W]
-    damping: wp.float64  # [W], divided by the joint's b
 
 
 @wp.struct
@@ -78,13 +66,9 @@ class Proximity:
 class Attempt:
     """A finished attempt: the link's new state, its last stage, and mean powers lost in the step."""
 
-    x: wp.float64
-    y: wp.float64
-    theta: wp.float64
-    u: wp.float64
-    v: wp.float64
-    omega: wp.float64
-    last: Rates
+    place: vec3d  # x, y [m], θ [rad]
+    velocity: vec3d  # their rates
+    last: vec5d
     proximity: Proximity  # of the new state, if the method reuses the last stage
     cosine: wp.float64  # direction of the new state
     sine: wp.float64
@@ -124,53 +108,29 @@ def write_constants(K: Rows, chain: Chain):
 @wp.func
 def read_link(K: Rows, column: int) -> Link:
     """A link, from the board."""
-    link = Link()
-    link.x = K[X, column]
-    link.y = K[Y, column]
-    link.u = K[U, column]
-    link.v = K[V, column]
-    link.omega = K[OMEGA, column]
-    half_length = constants(K).half_length
-    link.arm_x = half_length * K[COSINE, column]
-    link.arm_y = half_length * K[SINE, column]
-    return link
+    return geometry.read_link(K, constants(K), column)
 
 
 @wp.func
-def write_first_stage(K: Rows, column: int, first: Rates, with_powers: bool):
+def write_first_stage(K: Rows, column: int, first: vec5d):
     """Writes a link's first stage of the next step on the board."""
-    K[layout.BOARD_FIRST, column] = first.x
-    K[layout.BOARD_FIRST + 1, column] = first.y
-    K[layout.BOARD_FIRST + 2, column] = first.theta
-    if with_powers:
-        K[layout.BOARD_FIRST + 3, column] = first.friction
-        K[layout.BOARD_FIRST + 4, column] = first.damping
+    for k in range(wp.static(layout.STAGE_ROWS)):
+        K[layout.BOARD_FIRST + k, column] = first[k]
 
 
 @wp.func
-def read_first_stage(K: Rows, column: int) -> Rates:
-    """A link's first stage, from the board; its powers are those of the last :func:`write_first_stage` with powers."""
-    first = Rates()
-    first.x = K[layout.BOARD_FIRST, column]
-    first.y = K[layout.BOARD_FIRST + 1, column]
-    first.theta = K[layout.BOARD_FIRST + 2, column]
-    first.friction = K[layout.BOARD_FIRST + 3, column]
-    first.damping = K[layout.BOARD_FIRST + 4, column]
+def read_first_stage(K: Rows, column: int) -> vec5d:
+    """A link's first stage, from the board."""
+    first = vec5d()
+    for k in range(wp.static(layout.STAGE_ROWS)):
+        first[k] = K[layout.BOARD_FIRST + k, column]
     return first
 
 
 @wp.func
-def felt_plane(K: Rows, own: Chain, first: int) -> Chain:
-    """The chain on the plane whose values begin at this place of the board's values."""
-    chain = own
-    chain.plane_speed = K[layout.BOARD_VALUES, first]
-    chain.turn_x = K[layout.BOARD_VALUES, first + 1]
-    chain.turn_y = K[layout.BOARD_VALUES, first + 2]
-    chain.up_x = K[layout.BOARD_VALUES, first + 3]
-    chain.up_y = K[layout.BOARD_VALUES, first + 4]
-    chain.up_z = K[layout.BOARD_VALUES, first + 5]
-    chain.origin_height = K[layout.BOARD_VALUES, first + 6]
-    return chain
+def felt_plane(run: Run) -> Chain:
+    """The chain on the plane that its links feel in this step."""
+    return on_plane(constants(run.K), run.P, layout.PLANE_MID)
 
 
 @wp.func
@@ -191,81 +151,57 @@ def error_of(result: Attempt, tolerance: wp.float64):
 
 
 @wp.func
-def greatest_of_three(
-    error_a: wp.float64,
-    scale_a: wp.float64,
-    error_b: wp.float64,
-    scale_b: wp.float64,
-    error_c: wp.float64,
-    scale_c: wp.float64,
-):
-    """The greatest of three quotients, see :func:`greater`."""
-    error, scale = greater(error_a, scale_a, error_b, scale_b)
-    return greater(error, scale, error_c, scale_c)
+def velocity_of(link: Link) -> vec3d:
+    """ẋ, ẏ [m/s] and θ̇ [rad/s] of a link."""
+    return vec3d(link.u, link.v, link.omega)
 
 
 @wp.func
-def greatest_position_error(
-    link: Link, theta: wp.float64, h: wp.float64, ex: wp.float64, ey: wp.float64, et: wp.float64
-):
-    """Greatest error of x, y and θ over its scale, as numerator and divisor.
+def greatest_of_three(error: vec3d, value: vec3d, rate: vec3d, h: wp.float64):
+    """The greatest of the errors of three values with these rates over their scales, as numerator and divisor.
 
     Quotients are compared by cross-multiplication, so that a single division remains.
     """
-    return greatest_of_three(
-        ex,
-        error_scale(link.x, link.u, h),
-        ey,
-        error_scale(link.y, link.v, h),
-        et,
-        error_scale(theta, link.omega, h),
-    )
-
-
-@wp.func
-def greatest_velocity_error(link: Link, first: Rates, h: wp.float64, eu: wp.float64, ev: wp.float64, ew: wp.float64):
-    """Greatest error of u, v and ω over its scale, as numerator and divisor."""
-    return greatest_of_three(
-        eu,
-        error_scale(link.u, first.x, h),
-        ev,
-        error_scale(link.v, first.y, h),
-        ew,
-        error_scale(link.omega, first.theta, h),
-    )
+    top = error[0]
+    scale = error_scale(value[0], rate[0], h)
+    for k in range(1, 3):
+        top, scale = greater(top, scale, error[k], error_scale(value[k], rate[k], h))
+    return top, scale
 
 
 @functools.cache
-def block_stage(block_dim: int, tilts: bool = False):
+def block_stage(features: Features, block_dim: int):
     """Warp functions for blocks of this size: (exchange ends, evaluate a stage).
 
     Args:
+        features: What the kernel is compiled for.
         block_dim: Threads in a block.
-        tilts: Whether the plane of the chain may move; what links feel of it lies on the board.
 
     Returns:
-        ``exchange_ends(ends, place, link)`` → left end of the next link;
-        ``stage(forces, K, place, next_end, link, 1/m, 1/I)`` → Rates.
+        ``exchange_ends(ends, run, link)`` → left end of the next link;
+        ``stage(forces, run, next_end, link, 1/m, 1/I)`` → rates: accelerations ẍ, ÿ [m/s²] and θ̈ [rad/s²] of the link,
+        power [W] lost in its right joint by friction, and by damping, divided by the joint's b.
     """
+    load = features.acceleration
 
     @wp.func
-    def exchange_ends(ends: wp.tile[vec5d, block_dim], place: Place, link: Link):
+    def exchange_ends(ends: wp.tile[vec5d, block_dim], run: Run, link: Link):
         left_x, left_y, _right_x, _right_y = end_positions(link.x, link.y, link.arm_x, link.arm_y)
         left_u, left_v, _right_u, _right_v = end_velocities(link.u, link.v, link.omega, link.arm_x, link.arm_y)
-        ends[place.lane] = vec5d(left_x, left_y, left_u, left_v, link.omega)
-        return ends[place.after]
+        ends[run.lane] = vec5d(left_x, left_y, left_u, left_v, link.omega)
+        return ends[run.after]
 
     @wp.func
     def stage(
         forces: wp.tile[vec3d, block_dim],
-        K: Rows,
-        place: Place,
+        run: Run,
         next_end: vec5d,
         link: Link,
         inverse_mass: wp.float64,
         inverse_inertia: wp.float64,
     ):
         # constants are read from the board where they are needed: that costs less than registers
+        K = run.K
         chain = constants(K)
         _left_x, _left_y, right_x, right_y = end_positions(link.x, link.y, link.arm_x, link.arm_y)
         _left_u, _left_v, right_u, right_v = end_velocities(link.u, link.v, link.omega, link.arm_x, link.arm_y)
@@ -275,18 +211,13 @@ def block_stage(block_dim: int, tilts: bool = False):
         force_x = joint_force(chain, next_end[0] - right_x, cu)
         force_y = joint_force(chain, next_end[1] - right_y, cv)
         torque = friction_torque(
-            K[layout.VISCOUS, place.column], K[layout.COULOMB, place.column], spin, chain.inverse_smoothing
+            K[layout.VISCOUS, run.column], K[layout.COULOMB, run.column], spin, chain.inverse_smoothing
         )
         friction = torque * spin
         damping = cu * cu + cv * cv
-        forces[place.lane] = vec3d(force_x, force_y, torque)
-        left = forces[place.before]
-        chain.gravity = ZERO
-        if wp.static(not tilts):
-            chain.gravity = constants(K).gravity
-        rates = Rates()
+        forces[run.lane] = vec3d(force_x, force_y, torque)
+        left = forces[run.before]
         ax, ay, at = link_acceleration(
-            chain,
             inverse_mass,
             inverse_inertia,
             link.arm_x,
@@ -298,17 +229,10 @@ def block_stage(block_dim: int, tilts: bool = False):
             left[2],
             torque,
         )
-        if wp.static(tilts):
-            felt = felt_plane(K, constants(K), wp.static(layout.VALUE_PLANE))
-            load_x, load_y, load_turn = plane_load(felt, link.x, link.y, link.arm_x, link.arm_y)
-            ax += load_x
-            ay += load_y
-            at += load_turn
-        rates.x = ax
-        rates.y = ay
-        rates.theta = at
-        rates.friction = friction
-        rates.damping = damping
-        return rates
+        felt = constants(K)
+        if wp.static(features.tilts):
+            felt = felt_plane(run)
+        load_x, load_y, load_turn = load(felt, run.lane, link, inverse_mass, inverse_inertia)
+        return vec5d(ax + load_x, ay + load_y, at + load_turn, friction, damping)
 
     return exchange_ends, stage

@@ -13,8 +13,6 @@ import warp as wp
 
 from warpchain.kernels.types import Integers
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.func_native("WP_TILE_SYNC();")
 def barrier():
@@ -24,22 +22,20 @@ def barrier():
 
 @wp.func_native("""
 #if defined(__CUDA_ARCH__)
-    return __syncthreads_or(x) != 0;
+    return __syncthreads_count(x);
 #else
     int& seen = flags.data[slot];
-    if (x) {
-        seen = 1;
-    }
+    seen += x;
     WP_TILE_SYNC();
-    const bool any = seen != 0;
+    const int count = seen;
     WP_TILE_SYNC();
     seen = 0;
     WP_TILE_SYNC();
-    return any;
+    return count;
 #endif
 """)
-def barrier_if_any(flags: Integers, slot: int, x: bool) -> bool:
-    """A barrier that returns to all threads whether x is true in any of them; one instruction on a GPU.
+def barrier_count(flags: Integers, slot: int, x: bool) -> int:
+    """A barrier that returns to all threads in how many of them x is true; one instruction on a GPU.
 
     Fibers use ``flags[slot]`` instead, which is 0 before and after.
     """
@@ -150,9 +146,9 @@ def block_maxima(block_dim: int):
 
     @wp.func
     def write_maxima(memory: wp.uint64, lane: int, values: vec4i):
-        of_warp = vec4i(
-            warp_greatest(values[0]), warp_greatest(values[1]), warp_greatest(values[2]), warp_greatest(values[3])
-        )
+        of_warp = vec4i()
+        for k in range(4):
+            of_warp[k] = warp_greatest(values[k])
         write_four(memory, lane // warp_width(), of_warp)
 
     @wp.func
@@ -161,9 +157,7 @@ def block_maxima(block_dim: int):
         i = int(1)
         while i < wp.static(block_dim) // warp_width():
             other = read_four(memory, i)
-            top = vec4i(
-                wp.max(top[0], other[0]), wp.max(top[1], other[1]), wp.max(top[2], other[2]), wp.max(top[3], other[3])
-            )
+            top = wp.max(top, other)
             i += 1
         return top
 

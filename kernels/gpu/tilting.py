@@ -1,8 +1,7 @@
 """A chain whose plane may tilt, in a block of threads: see :mod:`cpu.tilting`.
 
-The first thread of the block moves the plane, in one row of :attr:`State.plane`. What the links feel of it lies on the
-board. Sums over the links are those of the hardware warps, added up by the first thread, and round otherwise than on a
-CPU.
+The first thread of the block moves the plane, a row of :attr:`State.plane` that lies behind the board meanwhile. Sums
+over the links are those of the hardware warps, added up by the first thread, and round otherwise than on a CPU.
 """
 
 import functools
@@ -17,35 +16,11 @@ from warpchain.kernels.contacts.tilting_floor import (
     push_plane_by,
     steepness,
 )
-from warpchain.kernels.gpu.board import ends_of
-from warpchain.kernels.gpu.stage import Place, constants, felt_plane, read_link
-from warpchain.kernels.gpu.threads import barrier, warp_width
+from warpchain.kernels.gpu.contacts.proximity import touching_link
+from warpchain.kernels.gpu.stage import Run, constants, felt_plane, read_link
+from warpchain.kernels.gpu.threads import barrier, barrier_count, warp_width
 from warpchain.kernels.gpu.upright import BlockPlane
-from warpchain.kernels.layout import (
-    BOARD_FIRST,
-    BOARD_VALUES,
-    COSINE,
-    INERTIA,
-    INVERSE_INERTIA,
-    INVERSE_MASS,
-    MASS,
-    OMEGA,
-    ORIGIN,
-    PLANE_MID,
-    PLANE_SPEED,
-    PLANE_TURN_X,
-    PLANE_TURN_Y,
-    SINE,
-    SUMS_OF_MOTION,
-    SUMS_OF_PLACES,
-    UP,
-    VALUE_PLANE,
-    VALUE_PLANE_BEFORE,
-    U,
-    V,
-    X,
-    Y,
-)
+from warpchain.kernels.layout import BOARD_VALUES, INERTIA, MASS, OMEGA, PLANE_MID, SINE, U, V, X, Y
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.physics.plane import (
     begin_plane_step,
@@ -56,27 +31,22 @@ from warpchain.kernels.physics.plane import (
     place_terms,
     plane_load,
 )
-from warpchain.kernels.types import Drive, Ground, Row, Rows, State
+from warpchain.kernels.types import Drive, Row, Rows, with_circles
 
-wp.set_module_options({"enable_backward": False})
-
-FELT = 7
-"""Values of a plane that lie on the board: u, ω1, ω2, the three of up, and the height of the origin."""
-
-
-vec4d = wp.types.vector(length=4, dtype=wp.float64)
+SUMS = layout.SUMS_OF_PLACES + layout.SUMS_OF_MOTION
 vec8d = wp.types.vector(length=8, dtype=wp.float64)
 
 
-def sum_up_source(count: int) -> str:
-    """Source of a native function that sums ``count`` values of each thread, a power of two up to 16.
+def sum_up_source() -> str:
+    """Source of a native function that sums eight values of each thread.
 
     In each round a thread keeps half of its values and passes the other half to its partner, which keeps those: 9
     exchanges for 8 values, where a sum of each value by itself takes 40. Exchanges are what such sums cost on a GPU.
-    The rounds are written out, because a loop over them would keep the values in local memory.
+    The rounds are written out, because a loop over them would keep the values in local memory. Fibers take turns
+    instead: the first adds up what all have written.
     """
     lines = ["#if defined(__CUDA_ARCH__)", "int index = 0;"]
-    half, width = count // 2, 16
+    half, width = SUMS // 2, 16
     while half:
         lines.append(f"{{ const bool upper = (lane & {width}) != 0; index = 2 * index + (upper ? 1 : 0);")
         for k in range(half):
@@ -89,73 +59,41 @@ def sum_up_source(count: int) -> str:
     while width:
         lines.append(f"x[0] += __shfl_xor_sync(0xffffffffu, x[0], {width});")
         width //= 2
-    lines.append(
-        f"if ((lane & {2 * sharing - 1}) == 0) memory.data[(slot + index) * (block_dim / 32) + lane / 32] = x[0];"
-    )
+    lines.append(f"if ((lane & {2 * sharing - 1}) == 0) memory.data[index * (block_dim / 32) + lane / 32] = x[0];")
     lines += [
         "#else",
-        f"for (int k = 0; k < {count}; ++k) memory.data[(slot + k) * block_dim + lane] = x[k];",
+        f"for (int k = 0; k < {SUMS}; ++k) {{",
+        f"    memory.data[{SUMS} + lane] = x[k];",
+        "    WP_TILE_SYNC();",
+        "    double sum = 0.0;",
+        f"    for (int i = 0; i < block_dim; ++i) sum += memory.data[{SUMS} + i];",
+        "    WP_TILE_SYNC();",
+        "    memory.data[k] = sum;",
+        "}",
         "#endif",
     ]
     return "\n" + "\n".join(lines) + "\n"
 
 
-@wp.func_native(sum_up_source(4))
-def add_up_four(memory: Row, slot: int, lane: int, block_dim: int, x: vec4d):
-    """Writes the sums of four values over each hardware warp, from ``slot`` on; a fiber is a warp of its own.
+@wp.func_native(sum_up_source())
+def add_up(memory: Row, lane: int, block_dim: int, x: vec8d):
+    """Writes the sums of eight values over each hardware warp into the memory; fibers those over the block.
 
     After a barrier :func:`added_up` reads the sums over the block.
     """
     ...
 
 
-@wp.func_native(sum_up_source(8))
-def add_up_eight(memory: Row, slot: int, lane: int, block_dim: int, x: vec8d):
-    """The same for eight values, which fibers have no memory for."""
-    ...
-
-
-@wp.func_native("""
-#if defined(__CUDA_ARCH__)
-    return __syncthreads_count(x);
-#else
-    memory.data[slot * block_dim + lane] = x ? 1.0 : 0.0;
-    WP_TILE_SYNC();
-    int count = 0;
-    for (int i = 0; i < block_dim; ++i) {
-        count += memory.data[slot * block_dim + i] != 0.0;
-    }
-    return count;
-#endif
-""")
-def barrier_count(memory: Row, slot: int, lane: int, block_dim: int, x: bool) -> int:
-    """A barrier that returns to all threads in how many of them x is true; fibers count in a slot of the memory."""
-    ...
-
-
 @wp.func
-def added_up(memory: Row, slot: int, block_dim: int):
-    """The sum over all threads of the block."""
-    warps = block_dim // warp_width()
+def added_up(memory: Row, k: int, block_dim: int):
+    """The sum over all threads of the block of the value ``k``."""
+    warps = wp.where(warp_width() > 1, block_dim // 32, 1)
     total = ZERO
     i = int(0)
     while i < warps:
-        total += memory[slot * warps + i]
+        total += memory[k * warps + i]
         i += 1
     return total
-
-
-@wp.func
-def write_felt_plane(K: Rows, P: Row):
-    """Writes the plane of the middle of the step on the board; what lay there becomes that of the attempt before."""
-    for k in range(wp.static(FELT)):
-        K[BOARD_VALUES, VALUE_PLANE_BEFORE + k] = K[BOARD_VALUES, VALUE_PLANE + k]
-    K[BOARD_VALUES, VALUE_PLANE] = P[PLANE_MID + PLANE_SPEED]
-    K[BOARD_VALUES, VALUE_PLANE + 1] = P[PLANE_MID + PLANE_TURN_X]
-    K[BOARD_VALUES, VALUE_PLANE + 2] = P[PLANE_MID + PLANE_TURN_Y]
-    for k in range(3):
-        K[BOARD_VALUES, VALUE_PLANE + 3 + k] = P[PLANE_MID + UP + k]
-    K[BOARD_VALUES, VALUE_PLANE + 6] = P[PLANE_MID + ORIGIN + 1]
 
 
 @wp.func
@@ -168,23 +106,23 @@ def copy_plane(target: Row, source: Row):
 
 
 @wp.func
-def shift_first_stage(K: Rows, lane: int):
+def shift_first_stage(run: Run):
     """Changes a link's first stage on the board from the plane of the attempt before to that of this one."""
-    own = constants(K)
+    K = run.K
+    lane = run.lane
     link = read_link(K, lane)
-    now = felt_plane(K, own, VALUE_PLANE)
-    before = felt_plane(K, own, VALUE_PLANE_BEFORE)
-    ax, ay, turn = plane_load(now, link.x, link.y, link.arm_x, link.arm_y)
-    old_ax, old_ay, old_turn = plane_load(before, link.x, link.y, link.arm_x, link.arm_y)
-    K[BOARD_FIRST, lane] = K[BOARD_FIRST, lane] + (ax - old_ax)
-    K[BOARD_FIRST + 1, lane] = K[BOARD_FIRST + 1, lane] + (ay - old_ay)
-    K[BOARD_FIRST + 2, lane] = K[BOARD_FIRST + 2, lane] + (turn - old_turn)
+    before = on_plane(constants(K), K[BOARD_VALUES], layout.VALUE_PLANE_BEFORE)
+    ax, ay, turn = plane_load(felt_plane(run), lane, link, ZERO, ZERO)
+    old_ax, old_ay, old_turn = plane_load(before, lane, link, ZERO, ZERO)
+    K[layout.BOARD_FIRST, lane] = K[layout.BOARD_FIRST, lane] + (ax - old_ax)
+    K[layout.BOARD_FIRST + 1, lane] = K[layout.BOARD_FIRST + 1, lane] + (ay - old_ay)
+    K[layout.BOARD_FIRST + 2, lane] = K[layout.BOARD_FIRST + 2, lane] + (turn - old_turn)
 
 
 @wp.func
 def places_of(K: Rows, i: int):
     """The part of link i in the sums for its plane that depend on places."""
-    return place_terms(constants(K), K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[COSINE, i], K[SINE, i])
+    return place_terms(constants(K), K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[layout.COSINE, i], K[SINE, i])
 
 
 @wp.func
@@ -193,168 +131,107 @@ def motion_of(K: Rows, i: int):
     return motion_terms(K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[U, i], K[V, i], K[OMEGA, i])
 
 
-@wp.func
-def add_places_one_by_one(K: Rows, P: Row, n: int):
-    """Writes the sums over all links that depend on places, by one fiber."""
-    for k in range(wp.static(SUMS_OF_PLACES)):
-        P[wp.static(layout.PLANE_SUMS + k)] = ZERO
-    i = int(0)
-    while i < n:
-        places = places_of(K, i)
-        for k in range(wp.static(SUMS_OF_PLACES)):
-            P[wp.static(layout.PLANE_SUMS + k)] = P[wp.static(layout.PLANE_SUMS + k)] + places[k]
-        i += 1
-
-
-@wp.func
-def add_motion_one_by_one(K: Rows, P: Row, n: int):
-    """Writes those that depend on velocities, by one fiber."""
-    for k in range(wp.static(SUMS_OF_MOTION)):
-        P[wp.static(layout.MOTION_SUMS + k)] = ZERO
-    i = int(0)
-    while i < n:
-        motion = motion_of(K, i)
-        for k in range(wp.static(SUMS_OF_MOTION)):
-            P[wp.static(layout.MOTION_SUMS + k)] = P[wp.static(layout.MOTION_SUMS + k)] + motion[k]
-        i += 1
-
-
 @functools.cache
-def block_tilting(block_dim: int) -> BlockPlane:
-    """A plane that may tilt, above a flat floor, for blocks of this size."""
-    count_slot, sum_slot = 0, 1
+def block_tilting(block_dim: int, votes: int) -> BlockPlane:
+    """A plane that may tilt, above a flat floor, for blocks of this size.
+
+    votes: see :func:`gpu.threads.barrier_count`.
+    """
 
     @wp.func
-    def load(K: Rows, P: Row, state: State, world: int):
-        copy_plane(P, state.plane[world])
-        write_felt_plane(K, P)
+    def load(run: Run):
+        copy_plane(run.P, run.stored_plane)
 
     @wp.func
-    def store(P: Row, state: State, world: int):
-        copy_plane(state.plane[world], P)
+    def store(run: Run):
+        copy_plane(run.stored_plane, run.P)
 
     @wp.func
-    def after_first_stage():
+    def after_first_stage(_run: Run):
         barrier()  # all have read the plane that they feel
 
     @wp.func
-    def begin_step(K: Rows, P: Row, place: Place, h: wp.float64):
-        if place.lane == 0:
-            begin_plane_step(P, constants(K).gravity, h)
-            write_felt_plane(K, P)
+    def begin_step(run: Run, h: wp.float64):
+        if run.lane == 0:
+            for k in range(wp.static(layout.PLANE_VALUES)):
+                run.K[BOARD_VALUES, layout.VALUE_PLANE_BEFORE + k] = run.P[PLANE_MID + k]
+            begin_plane_step(run.P, constants(run.K).gravity, h)
         barrier()
-        if place.lane < place.links:
-            shift_first_stage(K, place.lane)
+        if run.lane < run.links:
+            shift_first_stage(run)
 
     @wp.func
-    def sum_up(K: Rows, P: Row, M: Row, place: Place):
-        if warp_width() > 1:
-            places = places_of(K, place.column)
-            motion = motion_of(K, place.column)
-            terms = vec8d()
-            if place.lane < place.links:
-                for k in range(wp.static(SUMS_OF_PLACES)):
-                    terms[k] = places[k]
-                for k in range(wp.static(SUMS_OF_MOTION)):
-                    terms[wp.static(SUMS_OF_PLACES + k)] = motion[k]
-            add_up_eight(M, wp.static(sum_slot), place.lane, wp.static(block_dim), terms)
+    def sum_up(run: Run):
+        places = places_of(run.K, run.column)
+        motion = motion_of(run.K, run.column)
+        terms = vec8d()
+        if run.lane < run.links:
+            for k in range(wp.static(layout.SUMS_OF_PLACES)):
+                terms[k] = places[k]
+            for k in range(wp.static(layout.SUMS_OF_MOTION)):
+                terms[wp.static(layout.SUMS_OF_PLACES + k)] = motion[k]
+        add_up(run.M, run.lane, wp.static(block_dim), terms)
         barrier()
-        if place.lane == 0:
-            if warp_width() > 1:
-                for k in range(wp.static(SUMS_OF_PLACES + SUMS_OF_MOTION)):
-                    P[wp.static(layout.PLANE_SUMS + k)] = added_up(M, wp.static(sum_slot + k), wp.static(block_dim))
-            else:
-                add_places_one_by_one(K, P, place.links)
-                add_motion_one_by_one(K, P, place.links)
-            invert_plane_mass(P)
+        if run.lane == 0:
+            for k in range(wp.static(SUMS)):
+                run.P[wp.static(layout.PLANE_SUMS + k)] = added_up(run.M, wp.static(k), wp.static(block_dim))
+            invert_plane_mass(run.P)
 
     @wp.func
-    def begin_run(K: Rows, P: Row, M: Row, place: Place):
-        if place.lane == 0:
-            P[layout.SUM_MASS] = constants(K).mass
+    def begin_run(run: Run):
+        if run.lane == 0:
+            run.P[layout.SUM_MASS] = constants(run.K).mass
         barrier()  # all have read the ends
-        sum_up(K, P, M, place)
+        sum_up(run)
 
     @wp.func
-    def end_step(K: Rows, P: Row, M: Row, place: Place, h: wp.float64):
-        sum_up(K, P, M, place)
-        if place.lane == 0:
-            end_plane_step(P, constants(K).gravity, h)
+    def end_step(run: Run, h: wp.float64):
+        sum_up(run)
+        if run.lane == 0:
+            end_plane_step(run.P, constants(run.K).gravity, h)
 
     @wp.func
-    def meet(K: Rows, P: Row, M: Row, place: Place, _ground: Ground, _drive: Drive, _world: int, _time: wp.float64):
-        lane = place.lane
+    def meet(run: Run, _drive: Drive, _time: wp.float64):
+        K = run.K
+        P = run.P
+        lane = run.lane
         barrier()  # the plane and its mass are those of the new state
-        chain = on_plane(constants(K), P, 0)
+        chain = with_circles(on_plane(constants(K), P, 0), K[layout.RADIUS, run.column])
         slope = steepness(chain)
-        link = read_link(K, lane)
-        left_x, left_y, right_x, right_y = ends_of(link)
+        link = touching_link(run, chain)
         touches = wp.int64(0)
-        if lane < place.links:
-            touches = link_touches(
-                chain, slope, left_x, left_y, right_x, right_y, link.x, link.y, link.u, link.v, link.omega
-            )
-        touching = barrier_count(M, wp.static(count_slot), lane, wp.static(block_dim), touches > wp.int64(0))
+        if lane < run.links:
+            touches = link_touches(chain, slope, link)
+        touching = barrier_count(run.T, wp.static(votes), touches > wp.int64(0))
         hits = int(0)
         if touching > 0:
-            push = ZERO
-            moment_x = ZERO
-            moment_y = ZERO
+            summed = vec8d()
             if touches > wp.int64(0):
-                met = meet_tilting_floor(
-                    chain,
-                    slope,
-                    copy_inverse(P, wp.float64(touching)),
-                    left_x,
-                    left_y,
-                    right_x,
-                    right_y,
-                    link.x,
-                    link.y,
-                    K[MASS, lane],
-                    K[INERTIA, lane],
-                    K[INVERSE_MASS, lane],
-                    K[INVERSE_INERTIA, lane],
-                    link.u,
-                    link.v,
-                    link.omega,
-                )
+                met = meet_tilting_floor(chain, slope, copy_inverse(P, wp.float64(touching)), link)
                 K[U, lane] = met.u
                 K[V, lane] = met.v
                 K[OMEGA, lane] = met.omega
                 K[layout.BOARD_LOST_FIXED, lane] = K[layout.BOARD_LOST_FIXED, lane] + met.lost
-                push = met.push
-                moment_x = met.moment_x
-                moment_y = met.moment_y
+                summed[0] = met.push
+                summed[1] = met.moment_x
+                summed[2] = met.moment_y
                 hits = int(met.hits)
-            if warp_width() > 1:
-                summed = vec8d()
-                summed[0] = push
-                summed[1] = moment_x
-                summed[2] = moment_y
-                motion = motion_of(K, place.column)
-                if lane < place.links:
-                    for k in range(wp.static(SUMS_OF_MOTION)):
-                        summed[3 + k] = motion[k]
-                add_up_eight(M, wp.static(sum_slot), lane, wp.static(block_dim), summed)
-            else:
-                add_up_four(M, wp.static(sum_slot), lane, wp.static(block_dim), vec4d(push, moment_x, moment_y, ZERO))
+            motion = motion_of(K, run.column)
+            if lane < run.links:
+                for k in range(wp.static(layout.SUMS_OF_MOTION)):
+                    summed[3 + k] = motion[k]
+            add_up(run.M, lane, wp.static(block_dim), summed)
             barrier()
             if lane == 0:
-                if warp_width() > 1:
-                    for k in range(wp.static(SUMS_OF_MOTION)):
-                        P[wp.static(layout.MOTION_SUMS + k)] = added_up(
-                            M, wp.static(sum_slot + 3 + k), wp.static(block_dim)
-                        )
-                else:
-                    add_motion_one_by_one(K, P, place.links)
+                for k in range(wp.static(layout.SUMS_OF_MOTION)):
+                    P[wp.static(layout.MOTION_SUMS + k)] = added_up(run.M, wp.static(3 + k), wp.static(block_dim))
                 lost = push_plane_by(
                     P,
-                    added_up(M, wp.static(sum_slot), wp.static(block_dim)),
-                    added_up(M, wp.static(sum_slot + 1), wp.static(block_dim)),
-                    added_up(M, wp.static(sum_slot + 2), wp.static(block_dim)),
+                    added_up(run.M, 0, wp.static(block_dim)),
+                    added_up(run.M, 1, wp.static(block_dim)),
+                    added_up(run.M, 2, wp.static(block_dim)),
                 )
                 K[layout.BOARD_LOST_FIXED, 0] = K[layout.BOARD_LOST_FIXED, 0] + lost
         return hits
 
-    return BlockPlane(load, store, begin_run, after_first_stage, begin_step, end_step, meet)
+    return BlockPlane(meet, load, store, begin_run, after_first_stage, begin_step, end_step)

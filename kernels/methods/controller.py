@@ -6,8 +6,6 @@ import warp as wp
 
 from warpchain.kernels.physics.elementary import ONE, order_bits
 
-wp.set_module_options({"enable_backward": False})
-
 GREATEST_GROWTH = 5.0
 SAFETY = 0.9
 LEAST_SHRINKAGE = wp.constant(wp.float64(0.2))

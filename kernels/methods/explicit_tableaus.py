@@ -20,26 +20,16 @@ class Tableau:
     The chain's equations are of second order, q'' = a(q, q'), and the positions' rows are integrated with the
     products A·A and b·A (the Nyström form). Every row sum of A is the stage's time, and the weights add up to one, so
     this is the same method on (q, q'), with half of the derivatives to store.
-
-    Attributes:
-        name: What a user writes for ``method``.
-        title: One line for help texts.
-        order: Order of the solution that is propagated.
-        error_order: Order of the embedded solution; sets the exponent of the step controller after a rejection.
-        matrix: Lower-triangular stage coefficients A; row s has s entries.
-        weights: Weights b of the propagated solution.
-        embedded: Weights of the embedded solution.
-        source: Where the coefficients were published.
     """
 
-    name: str
-    title: str
-    order: int
-    error_order: int
-    matrix: tuple[tuple[F, ...], ...]
-    weights: tuple[F, ...]
-    embedded: tuple[F, ...]
-    source: str
+    name: str  # what a user writes for ``method``
+    title: str  # one line for help texts
+    order: int  # order of the solution that is propagated
+    error_order: int  # order of the embedded solution; sets the exponent of the step controller after a rejection
+    matrix: tuple[tuple[F, ...], ...]  # lower-triangular stage coefficients A; row s has s entries
+    weights: tuple[F, ...]  # weights b of the propagated solution
+    embedded: tuple[F, ...]  # weights of the embedded solution
+    source: str  # where the coefficients were published
 
     @property
     def stages(self) -> int:
@@ -125,6 +115,11 @@ def register(tableau: Tableau) -> None:
     TABLEAUS[name] = tableau
 
 
+def _fractions(row: str) -> tuple[F, ...]:
+    """Fractions between blanks, such as ``1/4 0 3/4``."""
+    return tuple(map(F, row.split()))
+
+
 RKF78 = Tableau(
     name="rkf78",
     title="Fehlberg 7(8)",
@@ -132,36 +127,21 @@ RKF78 = Tableau(
     error_order=7,
     matrix=(
         (),
-        (F(2, 27),),
-        (F(1, 36), F(1, 12)),
-        (F(1, 24), F(0), F(1, 8)),
-        (F(5, 12), F(0), F(-25, 16), F(25, 16)),
-        (F(1, 20), F(0), F(0), F(1, 4), F(1, 5)),
-        (F(-25, 108), F(0), F(0), F(125, 108), F(-65, 27), F(125, 54)),
-        (F(31, 300), F(0), F(0), F(0), F(61, 225), F(-2, 9), F(13, 900)),
-        (F(2), F(0), F(0), F(-53, 6), F(704, 45), F(-107, 9), F(67, 90), F(3)),
-        (F(-91, 108), F(0), F(0), F(23, 108), F(-976, 135), F(311, 54), F(-19, 60), F(17, 6), F(-1, 12)),
-        (
-            *(F(2383, 4100), F(0), F(0), F(-341, 164), F(4496, 1025), F(-301, 82), F(2133, 4100)),
-            *(F(45, 82), F(45, 164), F(18, 41)),
-        ),
-        (
-            *(F(3, 205), F(0), F(0), F(0), F(0), F(-6, 41), F(-3, 205)),
-            *(F(-3, 41), F(3, 41), F(6, 41), F(0)),
-        ),
-        (
-            *(F(-1777, 4100), F(0), F(0), F(-341, 164), F(4496, 1025), F(-289, 82), F(2193, 4100)),
-            *(F(51, 82), F(33, 164), F(12, 41), F(0), F(1)),
-        ),
+        _fractions("2/27"),
+        _fractions("1/36 1/12"),
+        _fractions("1/24 0 1/8"),
+        _fractions("5/12 0 -25/16 25/16"),
+        _fractions("1/20 0 0 1/4 1/5"),
+        _fractions("-25/108 0 0 125/108 -65/27 125/54"),
+        _fractions("31/300 0 0 0 61/225 -2/9 13/900"),
+        _fractions("2 0 0 -53/6 704/45 -107/9 67/90 3"),
+        _fractions("-91/108 0 0 23/108 -976/135 311/54 -19/60 17/6 -1/12"),
+        _fractions("2383/4100 0 0 -341/164 4496/1025 -301/82 2133/4100 45/82 45/164 18/41"),
+        _fractions("3/205 0 0 0 0 -6/41 -3/205 -3/41 3/41 6/41 0"),
+        _fractions("-1777/4100 0 0 -341/164 4496/1025 -289/82 2193/4100 51/82 33/164 12/41 0 1"),
     ),
-    weights=(
-        *(F(0), F(0), F(0), F(0), F(0), F(34, 105), F(9, 35), F(9, 35), F(9, 280), F(9, 280), F(0)),
-        *(F(41, 840), F(41, 840)),
-    ),
-    embedded=(
-        *(F(41, 840), F(0), F(0), F(0), F(0), F(34, 105), F(9, 35), F(9, 35), F(9, 280), F(9, 280)),
-        *(F(41, 840), F(0), F(0)),
-    ),
+    weights=_fractions("0 0 0 0 0 34/105 9/35 9/35 9/280 9/280 0 41/840 41/840"),
+    embedded=_fractions("41/840 0 0 0 0 34/105 9/35 9/35 9/280 9/280 41/840 0 0"),
     source="E. Fehlberg, NASA TR R-287 (1968), table X; the higher-order solution is propagated",
 )
 
@@ -172,18 +152,15 @@ DP5 = Tableau(
     error_order=4,
     matrix=(
         (),
-        (F(1, 5),),
-        (F(3, 40), F(9, 40)),
-        (F(44, 45), F(-56, 15), F(32, 9)),
-        (F(19372, 6561), F(-25360, 2187), F(64448, 6561), F(-212, 729)),
-        (F(9017, 3168), F(-355, 33), F(46732, 5247), F(49, 176), F(-5103, 18656)),
-        (F(35, 384), F(0), F(500, 1113), F(125, 192), F(-2187, 6784), F(11, 84)),
+        _fractions("1/5"),
+        _fractions("3/40 9/40"),
+        _fractions("44/45 -56/15 32/9"),
+        _fractions("19372/6561 -25360/2187 64448/6561 -212/729"),
+        _fractions("9017/3168 -355/33 46732/5247 49/176 -5103/18656"),
+        _fractions("35/384 0 500/1113 125/192 -2187/6784 11/84"),
     ),
-    weights=(F(35, 384), F(0), F(500, 1113), F(125, 192), F(-2187, 6784), F(11, 84), F(0)),
-    embedded=(
-        *(F(5179, 57600), F(0), F(7571, 16695), F(393, 640), F(-92097, 339200), F(187, 2100)),
-        F(1, 40),
-    ),
+    weights=_fractions("35/384 0 500/1113 125/192 -2187/6784 11/84 0"),
+    embedded=_fractions("5179/57600 0 7571/16695 393/640 -92097/339200 187/2100 1/40"),
     source="J. R. Dormand, P. J. Prince, J. Comput. Appl. Math. 6 (1980) 19-26",
 )
 
@@ -192,9 +169,9 @@ BS32 = Tableau(
     title="Bogacki–Shampine 3(2)",
     order=3,
     error_order=2,
-    matrix=((), (F(1, 2),), (F(0), F(3, 4)), (F(2, 9), F(1, 3), F(4, 9))),
-    weights=(F(2, 9), F(1, 3), F(4, 9), F(0)),
-    embedded=(F(7, 24), F(1, 4), F(1, 3), F(1, 8)),
+    matrix=((), _fractions("1/2"), _fractions("0 3/4"), _fractions("2/9 1/3 4/9")),
+    weights=_fractions("2/9 1/3 4/9 0"),
+    embedded=_fractions("7/24 1/4 1/3 1/8"),
     source="P. Bogacki, L. F. Shampine, Appl. Math. Lett. 2 (1989) 321-325",
 )
 
@@ -205,15 +182,15 @@ OS32 = Tableau(
     error_order=2,
     matrix=(
         (),
-        (F(23, 400),),
-        (F(0), F(3, 25)),
-        (F(0), F(0), F(39, 200)),
-        (F(0), F(0), F(0), F(1, 3)),
-        (F(0), F(0), F(0), F(0), F(2, 3)),
-        (F(1, 4), F(0), F(0), F(0), F(0), F(3, 4)),
+        _fractions("23/400"),
+        _fractions("0 3/25"),
+        _fractions("0 0 39/200"),
+        _fractions("0 0 0 1/3"),
+        _fractions("0 0 0 0 2/3"),
+        _fractions("1/4 0 0 0 0 3/4"),
     ),
-    weights=(F(1, 4), F(0), F(0), F(0), F(0), F(3, 4), F(0)),
-    embedded=(F(3, 16), F(0), F(0), F(0), F(0), F(15, 16), F(-1, 8)),
+    weights=_fractions("1/4 0 0 0 0 3/4 0"),
+    embedded=_fractions("3/16 0 0 0 0 15/16 -1/8"),
     source="Heun's method of order 3 (Z. Math. Phys. 45 (1900) 23-38) with three stages before it for stability",
 )
 """Order 3 with six stages and a reused one, for steps that stability limits.

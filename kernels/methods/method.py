@@ -6,32 +6,17 @@ rigid joints between them.
 
 from dataclasses import dataclass
 
-from warpchain.kernels.methods.explicit_tableaus import HYBRID, HYBRID_SPRINGS, TABLEAUS
+from warpchain.kernels.methods.explicit_tableaus import HYBRID, HYBRID_SPRINGS, TABLEAUS, Tableau
 
 
 @dataclass(frozen=True)
 class Method:
-    """One method.
+    """One method."""
 
-    Attributes:
-        name: What a user writes for ``method``.
-        title: One line for help texts.
-        tableau: Key in :data:`TABLEAUS` of its steps on springs.
-        order: Order of the solution that is propagated.
-        error_order: Order of the embedded solution; both set the controller's exponents.
-        stages: Number of stages.
-        reuses_last: Whether a step leaves the first stage of the next.
-        has_rigid_flight: Whether joints are rigid between impulses.
-    """
-
-    name: str
-    title: str
-    tableau: str
-    order: int
-    error_order: int
-    stages: int
-    reuses_last: bool
-    has_rigid_flight: bool
+    name: str  # what a user writes for ``method``
+    title: str  # one line for help texts
+    tableau: Tableau  # of its steps on springs
+    has_rigid_flight: bool  # whether joints are rigid between impulses
 
     @property
     def runs_on_gpus(self) -> bool:
@@ -60,15 +45,7 @@ def find_method(name: str) -> Method:
     Raises:
         KeyError: There is none.
     """
-    key = HYBRID_SPRINGS if name == HYBRID else name
-    tableau = TABLEAUS[key]
-    return Method(
-        name=name,
-        title=f"rigid joints between impulses, {key} around them" if name == HYBRID else tableau.title,
-        tableau=key,
-        order=tableau.order,
-        error_order=tableau.error_order,
-        stages=tableau.stages,
-        reuses_last=tableau.first_same_as_last,
-        has_rigid_flight=name == HYBRID,
-    )
+    if name != HYBRID:
+        return Method(name, TABLEAUS[name].title, TABLEAUS[name], has_rigid_flight=False)
+    title = f"rigid joints between impulses, {HYBRID_SPRINGS} around them"
+    return Method(name, title, TABLEAUS[HYBRID_SPRINGS], has_rigid_flight=True)

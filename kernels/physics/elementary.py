@@ -9,8 +9,6 @@ Coefficients of sine and cosine on [-π/4, π/4]: FreeBSD msun ``k_sin.c``, ``k_
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
-
 # A Python float inside a wp.func would be rounded to float32 first; wp.constant keeps all 53 bits.
 ZERO = wp.constant(wp.float64(0.0))
 HALF = wp.constant(wp.float64(0.5))

@@ -4,14 +4,70 @@ Scalar functions, one link a call. A link's arm is the vector from its centre of
 length a times its direction (cos θ, sin θ); the left end is at minus the arm.
 """
 
+from typing import Any
+
 import warp as wp
 
 from warpchain.kernels import layout
 from warpchain.kernels.physics.elementary import small_turn
-
-wp.set_module_options({"enable_backward": False})
+from warpchain.kernels.types import Chain, Rows
 
 LANES = wp.constant(layout.LANES)
+
+
+@wp.struct
+class Link:
+    """State of a link, with its arm instead of its angle, which no stage needs."""
+
+    x: wp.float64  # [m]
+    y: wp.float64  # [m]
+    u: wp.float64  # ẋ [m/s]
+    v: wp.float64  # ẏ [m/s]
+    omega: wp.float64  # θ̇ [rad/s]
+    arm_x: wp.float64  # [m]
+    arm_y: wp.float64
+
+
+@wp.func
+def read_link(K: Rows, chain: Chain, i: int) -> Link:
+    """Link i, from the rows of the state."""
+    link = Link()
+    link.x = K[layout.X, i]
+    link.y = K[layout.Y, i]
+    link.u = K[layout.U, i]
+    link.v = K[layout.V, i]
+    link.omega = K[layout.OMEGA, i]
+    link.arm_x = chain.half_length * K[layout.COSINE, i]
+    link.arm_y = chain.half_length * K[layout.SINE, i]
+    return link
+
+
+@wp.func
+def link_is_finite(K: Rows, i: int, rates: int):
+    """False if the state of link i, or its accelerations from row ``rates`` on, hold an infinity or a NaN."""
+    finite = bool(True)
+    row = int(0)
+    while row < 6:
+        finite = finite and wp.isfinite(K[row, i])
+        row += 1
+    row = int(0)
+    while row < 3:
+        finite = finite and wp.isfinite(K[rates + row, i])
+        row += 1
+    return finite
+
+
+@wp.func
+def put(rows: Rows, first: int, i: int, values: Any):
+    """Writes a vector's components into column i of consecutive rows."""
+    for k in range(len(values)):
+        rows[first + k, i] = values[k]
+
+
+@wp.func
+def three(rows: Rows, first: int, i: int):
+    """Column i of three consecutive rows."""
+    return wp.vec3d(rows[first, i], rows[first + 1, i], rows[first + 2, i])
 
 
 @wp.func

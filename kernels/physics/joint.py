@@ -8,8 +8,6 @@ import warp as wp
 from warpchain.kernels.physics.elementary import tanh
 from warpchain.kernels.types import Chain
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.func
 def joint_force(chain: Chain, opening: wp.float64, opening_rate: wp.float64):
@@ -33,7 +31,6 @@ def friction_torque(viscous: wp.float64, coulomb: wp.float64, spin: wp.float64, 
 
 @wp.func
 def link_acceleration(
-    chain: Chain,
     inverse_mass: wp.float64,
     inverse_inertia: wp.float64,
     arm_x: wp.float64,
@@ -45,13 +42,13 @@ def link_acceleration(
     left_torque: wp.float64,
     right_torque: wp.float64,
 ):
-    """Accelerations (ẍ, ÿ [m/s²], θ̈ [rad/s²]) of a link.
+    """Accelerations (ẍ, ÿ [m/s²], θ̈ [rad/s²]) of a link by its joints.
 
-    m Ẍ = F_right − F_left − m g ŷ and I θ̈ = arm × (F_right + F_left) + f_left − f_right. F_left and F_right are the
+    m Ẍ = F_right − F_left and I θ̈ = arm × (F_right + F_left) + f_left − f_right. F_left and F_right are the
     forces of the joints at its two ends. f_left and f_right are their friction torques, each f(ω of the link left of
     the joint − ω of the link right of it). The arm leads from the link's centre to its right end.
     """
     ax = (right_x - left_x) * inverse_mass
-    ay = (right_y - left_y) * inverse_mass - chain.gravity
+    ay = (right_y - left_y) * inverse_mass
     lever = arm_x * (right_y + left_y) - arm_y * (right_x + left_x)
     return ax, ay, (lever + left_torque - right_torque) * inverse_inertia

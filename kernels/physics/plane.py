@@ -40,38 +40,11 @@ Functions here work on one row of :attr:`State.plane`, see :mod:`layout`.
 
 import warp as wp
 
-from warpchain.kernels.layout import (
-    AHEAD,
-    INVERSE_00,
-    INVERSE_01,
-    INVERSE_02,
-    INVERSE_11,
-    INVERSE_12,
-    INVERSE_22,
-    MEAN_RATE_XX,
-    MOMENTUM,
-    ORIGIN,
-    PLANE_MID,
-    PLANE_SPEED,
-    PLANE_TURN_X,
-    PLANE_TURN_Y,
-    RATE_XX,
-    START_XX,
-    SUM_MASS,
-    SUM_MOMENT,
-    SUM_MU,
-    SUM_MV,
-    SUM_MX,
-    SUM_MY,
-    SUM_XX,
-    SUM_XY,
-    SUM_YY,
-    UP,
-)
+from warpchain.kernels import layout
+from warpchain.kernels.layout import AHEAD, MOMENTUM, ORIGIN, RATE_XX, SUM_MU, SUM_MV, SUM_MX, SUM_MY, SUM_XX, UP
 from warpchain.kernels.physics.elementary import HALF, ONE, quotient
+from warpchain.kernels.physics.geometry import Link
 from warpchain.kernels.types import Chain, Row
-
-wp.set_module_options({"enable_backward": False})
 
 THIRD = wp.constant(wp.float64(1.0 / 3.0))
 FIVE_SIXTHS = wp.constant(wp.float64(5.0 / 6.0))
@@ -79,11 +52,11 @@ THREE_HALVES = wp.constant(wp.float64(1.5))
 
 
 @wp.func
-def plane_load(chain: Chain, x: wp.float64, y: wp.float64, arm_x: wp.float64, arm_y: wp.float64):
+def plane_load(chain: Chain, _i: int, link: Link, _inverse_mass: wp.float64, _inverse_inertia: wp.float64):
     """Accelerations (ẍ, ÿ [m/s²], θ̈ [rad/s²]) of a link by gravity and the motion of its plane."""
-    across = chain.plane_speed + chain.turn_x * y - chain.turn_y * x
-    about_rod = arm_x * chain.turn_x + arm_y * chain.turn_y
-    across_rod = arm_x * chain.turn_y - arm_y * chain.turn_x
+    across = chain.plane_speed + chain.turn_x * link.y - chain.turn_y * link.x
+    about_rod = link.arm_x * chain.turn_x + link.arm_y * chain.turn_y
+    across_rod = link.arm_x * chain.turn_y - link.arm_y * chain.turn_x
     ax = -chain.gravity * chain.up_x - chain.turn_y * across
     ay = chain.turn_x * across - chain.gravity * chain.up_y
     return ax, ay, -(about_rod * across_rod) * chain.inverse_square
@@ -93,9 +66,9 @@ def plane_load(chain: Chain, x: wp.float64, y: wp.float64, arm_x: wp.float64, ar
 def on_plane(own: Chain, P: Row, first: int) -> Chain:
     """The chain on the plane whose values begin at this row."""
     chain = own
-    chain.plane_speed = P[first + PLANE_SPEED]
-    chain.turn_x = P[first + PLANE_TURN_X]
-    chain.turn_y = P[first + PLANE_TURN_Y]
+    chain.plane_speed = P[first + layout.PLANE_SPEED]
+    chain.turn_x = P[first + layout.PLANE_TURN_X]
+    chain.turn_y = P[first + layout.PLANE_TURN_Y]
     chain.up_x = P[first + UP]
     chain.up_y = P[first + UP + 1]
     chain.up_z = P[first + UP + 2]
@@ -139,31 +112,31 @@ def motion_terms(
 @wp.func
 def invert_plane_mass(P: Row):
     """Writes the inverse of the plane's mass matrix, from the sums."""
-    a00 = P[SUM_MASS]
+    a00 = P[layout.SUM_MASS]
     a01 = P[SUM_MY]
     a02 = -P[SUM_MX]
-    a11 = P[SUM_YY]
-    a12 = -P[SUM_XY]
+    a11 = P[layout.SUM_YY]
+    a12 = -P[layout.SUM_XY]
     a22 = P[SUM_XX]
     c00 = a11 * a22 - a12 * a12
     c01 = a02 * a12 - a01 * a22
     c02 = a01 * a12 - a02 * a11
     scale = quotient(ONE, a00 * c00 + a01 * c01 + a02 * c02)
-    P[INVERSE_00] = c00 * scale
-    P[INVERSE_01] = c01 * scale
-    P[INVERSE_02] = c02 * scale
-    P[INVERSE_11] = (a00 * a22 - a02 * a02) * scale
-    P[INVERSE_12] = (a01 * a02 - a00 * a12) * scale
-    P[INVERSE_22] = (a00 * a11 - a01 * a01) * scale
+    P[layout.INVERSE_00] = c00 * scale
+    P[layout.INVERSE_01] = c01 * scale
+    P[layout.INVERSE_02] = c02 * scale
+    P[layout.INVERSE_11] = (a00 * a22 - a02 * a02) * scale
+    P[layout.INVERSE_12] = (a01 * a02 - a00 * a12) * scale
+    P[layout.INVERSE_22] = (a00 * a11 - a01 * a01) * scale
 
 
 @wp.func
 def plane_times_inverse(P: Row, q0: wp.float64, q1: wp.float64, q2: wp.float64):
     """A⁻¹ q: rates of (u, ω1, ω2) under generalised forces, or their change by impulses."""
     return (
-        P[INVERSE_00] * q0 + P[INVERSE_01] * q1 + P[INVERSE_02] * q2,
-        P[INVERSE_01] * q0 + P[INVERSE_11] * q1 + P[INVERSE_12] * q2,
-        P[INVERSE_02] * q0 + P[INVERSE_12] * q1 + P[INVERSE_22] * q2,
+        P[layout.INVERSE_00] * q0 + P[layout.INVERSE_01] * q1 + P[layout.INVERSE_02] * q2,
+        P[layout.INVERSE_01] * q0 + P[layout.INVERSE_11] * q1 + P[layout.INVERSE_12] * q2,
+        P[layout.INVERSE_02] * q0 + P[layout.INVERSE_12] * q1 + P[layout.INVERSE_22] * q2,
     )
 
 
@@ -183,9 +156,9 @@ class Plane:
 def read_plane(P: Row, first: int) -> Plane:
     """The plane whose values begin at this row."""
     plane = Plane()
-    plane.speed = P[first + PLANE_SPEED]
-    plane.turn_x = P[first + PLANE_TURN_X]
-    plane.turn_y = P[first + PLANE_TURN_Y]
+    plane.speed = P[first + layout.PLANE_SPEED]
+    plane.turn_x = P[first + layout.PLANE_TURN_X]
+    plane.turn_y = P[first + layout.PLANE_TURN_Y]
     plane.ahead = wp.vec3d(P[first + AHEAD], P[first + AHEAD + 1], P[first + AHEAD + 2])
     plane.up = wp.vec3d(P[first + UP], P[first + UP + 1], P[first + UP + 2])
     plane.origin = wp.vec3d(P[first + ORIGIN], P[first + ORIGIN + 1], P[first + ORIGIN + 2])
@@ -195,9 +168,9 @@ def read_plane(P: Row, first: int) -> Plane:
 @wp.func
 def write_plane(P: Row, first: int, plane: Plane):
     """Writes a plane's values from this row on."""
-    P[first + PLANE_SPEED] = plane.speed
-    P[first + PLANE_TURN_X] = plane.turn_x
-    P[first + PLANE_TURN_Y] = plane.turn_y
+    P[first + layout.PLANE_SPEED] = plane.speed
+    P[first + layout.PLANE_TURN_X] = plane.turn_x
+    P[first + layout.PLANE_TURN_Y] = plane.turn_y
     for k in range(3):
         P[first + AHEAD + k] = plane.ahead[k]
         P[first + UP + k] = plane.up[k]
@@ -211,9 +184,9 @@ def momenta(P: Row, plane: Plane):
     w1 = plane.turn_x
     w2 = plane.turn_y
     return (
-        P[SUM_MASS] * u + P[SUM_MY] * w1 - P[SUM_MX] * w2,
-        P[SUM_MY] * u + P[SUM_YY] * w1 - P[SUM_XY] * w2,
-        P[SUM_XX] * w2 - P[SUM_MX] * u - P[SUM_XY] * w1,
+        P[layout.SUM_MASS] * u + P[SUM_MY] * w1 - P[SUM_MX] * w2,
+        P[SUM_MY] * u + P[layout.SUM_YY] * w1 - P[layout.SUM_XY] * w2,
+        P[SUM_XX] * w2 - P[SUM_MX] * u - P[layout.SUM_XY] * w1,
     )
 
 
@@ -222,9 +195,9 @@ def momentum_rates(P: Row, gravity: wp.float64, plane: Plane):
     """Rates of the plane's momenta, from the sums."""
     weight = gravity * plane.up[2]
     return (
-        plane.turn_y * P[SUM_MU] - plane.turn_x * P[SUM_MV] - weight * P[SUM_MASS],
-        plane.speed * P[SUM_MV] - plane.turn_y * P[SUM_MOMENT] - weight * P[SUM_MY],
-        plane.turn_x * P[SUM_MOMENT] - plane.speed * P[SUM_MU] + weight * P[SUM_MX],
+        plane.turn_y * P[SUM_MU] - plane.turn_x * P[SUM_MV] - weight * P[layout.SUM_MASS],
+        plane.speed * P[SUM_MV] - plane.turn_y * P[layout.SUM_MOMENT] - weight * P[SUM_MY],
+        plane.turn_x * P[layout.SUM_MOMENT] - plane.speed * P[SUM_MU] + weight * P[SUM_MX],
     )
 
 
@@ -283,14 +256,14 @@ def begin_plane_step(P: Row, gravity: wp.float64, h: wp.float64):
     half = HALF * h
     plane = read_plane(P, 0)
     mean = pushed(P, gravity, plane, pushed(P, gravity, plane, plane, THIRD * h), half)
-    write_plane(P, PLANE_MID, mean)
+    write_plane(P, layout.PLANE_MID, mean)
     p0, p1, p2 = momenta(P, plane)
     f0, f1, f2 = momentum_rates(P, gravity, mean)
     P[MOMENTUM] = p0 + half * f0
     P[MOMENTUM + 1] = p1 + half * f1
     P[MOMENTUM + 2] = p2 + half * f2
     for k in range(3):
-        P[START_XX + k] = P[SUM_XX + k]
+        P[layout.START_XX + k] = P[SUM_XX + k]
 
 
 @wp.func
@@ -300,10 +273,10 @@ def end_plane_step(P: Row, gravity: wp.float64, h: wp.float64):
     inverse = ONE / h
     for k in range(3):
         # from the middle of this step to a third of the next, which is taken to be as long
-        rate = inverse * (P[SUM_XX + k] - P[START_XX + k])
-        P[RATE_XX + k] = rate + FIVE_SIXTHS * (rate - P[MEAN_RATE_XX + k])
-        P[MEAN_RATE_XX + k] = rate
-    mean = read_plane(P, PLANE_MID)
+        rate = inverse * (P[SUM_XX + k] - P[layout.START_XX + k])
+        P[RATE_XX + k] = rate + FIVE_SIXTHS * (rate - P[layout.MEAN_RATE_XX + k])
+        P[layout.MEAN_RATE_XX + k] = rate
+    mean = read_plane(P, layout.PLANE_MID)
     f0, f1, f2 = momentum_rates(P, gravity, mean)
     u, w1, w2 = plane_times_inverse(
         P, P[MOMENTUM] + half * f0, P[MOMENTUM + 1] + half * f1, P[MOMENTUM + 2] + half * f2

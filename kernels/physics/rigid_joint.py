@@ -5,8 +5,6 @@ import warp as wp
 from warpchain.kernels.physics.elementary import ONE
 from warpchain.kernels.types import Chain
 
-wp.set_module_options({"enable_backward": False})
-
 SWITCH_WIDTH = wp.constant(wp.float64(0.2))
 """c of :mod:`cpu.implicit.rigid_flight`: fraction of a joint's change of spin over which friction is smoothed."""
 
@@ -23,43 +21,6 @@ def inward_pull(cosine: wp.float64, sine: wp.float64, spin: wp.float64, free: wp
     """A link's part of the right-hand side r / a [1/s²]: u ω² − t α, α [rad/s²] being due to friction alone."""
     square = spin * spin
     return square * cosine + free * sine, square * sine - free * cosine
-
-
-@wp.func
-def pushed(
-    half_length: wp.float64,
-    inverse_mass: wp.float64,
-    inverse_inertia: wp.float64,
-    cosine: wp.float64,
-    sine: wp.float64,
-    left_x: wp.float64,
-    left_y: wp.float64,
-    right_x: wp.float64,
-    right_y: wp.float64,
-):
-    """M⁻¹ Gᵀ P of a link: how the P of its two joints (forces, impulses or displacements) change x, y and θ."""
-    lever = half_length * (cosine * (right_y + left_y) - sine * (right_x + left_x))
-    return (right_x - left_x) * inverse_mass, (right_y - left_y) * inverse_mass, lever * inverse_inertia
-
-
-@wp.func
-def opening_rate_of(
-    half_length: wp.float64,
-    u: wp.float64,
-    v: wp.float64,
-    spin: wp.float64,
-    cosine: wp.float64,
-    sine: wp.float64,
-    next_u: wp.float64,
-    next_v: wp.float64,
-    next_spin: wp.float64,
-    next_cosine: wp.float64,
-    next_sine: wp.float64,
-):
-    """Opening rate Ċ [m/s] of the joint between a link and the next."""
-    turn_x = spin * sine + next_spin * next_sine
-    turn_y = spin * cosine + next_spin * next_cosine
-    return next_u - u + half_length * turn_x, next_v - v - half_length * turn_y
 
 
 @wp.func

@@ -25,26 +25,10 @@ loads.
 
 import warp as wp
 
-from warpchain.kernels.layout import (
-    COSINE,
-    COULOMB,
-    INERTIA,
-    INVERSE_INERTIA,
-    INVERSE_MASS,
-    MASS,
-    OWN_COULOMB,
-    OWN_INERTIA,
-    OWN_MASS,
-    OWN_VISCOUS,
-    SINE,
-    VISCOUS,
-    U,
-    V,
-)
+from warpchain.kernels import layout
+from warpchain.kernels.layout import COSINE, COULOMB, INERTIA, MASS, OWN_MASS, OWN_RADIUS, RADIUS, SINE, VISCOUS, U, V
 from warpchain.kernels.physics.elementary import HALF, ONE, TWO
 from warpchain.kernels.types import Chain, Model, Rows
-
-wp.set_module_options({"enable_backward": False})
 
 SIX = wp.constant(wp.float64(6.0))
 TWELFTH = wp.constant(wp.float64(1.0 / 12.0))
@@ -78,13 +62,14 @@ def write_link(K: Rows, model: Model, world: int, i: int, factor: wp.float64):
     """Writes the constants of link i and of joint i, with loads multiplied by a factor, into their rows."""
     mass = model.links[world, OWN_MASS, i]
     length = TWO * model.chains[world].half_length
-    inertia = scaled_inertia(model.links[world, OWN_INERTIA, i], mass, length, factor)
+    inertia = scaled_inertia(model.links[world, layout.OWN_INERTIA, i], mass, length, factor)
     K[MASS, i] = mass
-    K[INVERSE_MASS, i] = ONE / mass
+    K[layout.INVERSE_MASS, i] = ONE / mass
     K[INERTIA, i] = inertia
-    K[INVERSE_INERTIA, i] = ONE / inertia
-    K[VISCOUS, i] = factor * model.links[world, OWN_VISCOUS, i]
-    K[COULOMB, i] = factor * model.links[world, OWN_COULOMB, i]
+    K[layout.INVERSE_INERTIA, i] = ONE / inertia
+    K[VISCOUS, i] = factor * model.links[world, layout.OWN_VISCOUS, i]
+    K[COULOMB, i] = factor * model.links[world, layout.OWN_COULOMB, i]
+    K[RADIUS, i] = model.links[world, OWN_RADIUS, i]
 
 
 @wp.func

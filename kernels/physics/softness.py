@@ -5,8 +5,6 @@ import warp as wp
 from warpchain.kernels.physics.elementary import ONE, ZERO
 from warpchain.kernels.types import Chain, Control
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.func
 def between(own: wp.float64, soft: wp.float64, softness: wp.float64):

@@ -11,25 +11,22 @@ cells their mean and χ², scatter and bounces; and how exact either is.
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 import warpchain
-from studies.common import run_study
-
-Array = NDArray[np.float64]
+from studies.common import Array, of_cells, over_cells, run_study
 
 LENGTHS: Final = ("penetration_floor", "penetration_self", "penetration_sprocket", "greatest_opening")
 
 
 def cells(sweep: warpchain.SweepResult, column: str) -> dict[str, Array]:
     """Values (samples,) of a column, by block and cell."""
-    found = {}
-    for name, block in sweep.blocks.items():
-        values = np.asarray(block.columns[column], dtype=np.float64)
-        for index in np.ndindex(values.shape[:-1]):
-            place = (f"{axis} {points[k]:g}" for (axis, points), k in zip(block.axes.items(), index, strict=True))
-            found[", ".join([name, *place])] = values[index]
-    return found
+    return {
+        ", ".join([name, *(f"{axis} {value:g}" for axis, value in zip(block.axes, values, strict=True))]): np.asarray(
+            block.columns[column][place], dtype=np.float64
+        )
+        for name, block in sweep.blocks.items()
+        for place, values in of_cells(block)
+    }
 
 
 def together(sweep: warpchain.SweepResult, column: str) -> Array:
@@ -61,15 +58,12 @@ def compare(new: warpchain.SweepResult, base: warpchain.SweepResult) -> None:
         b = b[: len(a)]
         pairs = np.isfinite(a) & np.isfinite(b)
         a, b = a[pairs], b[pairs]
-        error = np.std(a / a.mean() - b / b.mean(), ddof=1) / np.sqrt(len(a))
-        rows.append(
-            (a.mean() / b.mean() - 1, error, a.std() / b.std(), bounces[name].mean() / base_bounces[name].mean())
-        )
-        print(f"{name}: {100 * rows[-1][0]:+.2f} ± {100 * error:.2f} % ({len(a)} pairs)")
-    difference, error, scatter, bounced = np.array(rows).T
-    mean, its_error = 100 * difference.mean(), 100 * np.sqrt(np.sum(error**2)) / len(error)
-    chi_squared = np.sum((difference[error > 0] / error[error > 0]) ** 2)
-    print(f"mean of {len(rows)} cells {mean:+.3f} ± {its_error:.3f} %, χ² {chi_squared:.1f}")
+        difference, error = a.mean() / b.mean() - 1, np.std(a / a.mean() - b / b.mean(), ddof=1) / np.sqrt(len(a))
+        rows.append((difference, error, a.std() / b.std(), bounces[name].mean() / base_bounces[name].mean()))
+        print(f"{name}: {100 * difference:+.2f} ± {100 * error:.2f} % ({len(a)} pairs)")
+    differences, errors, scatter, bounced = np.array(rows).T
+    over = over_cells(100 * differences, 100 * errors)
+    print(f"mean of {len(rows)} cells {over.mean:+.3f} ± {over.error:.3f} %, χ² {over.chi2:.1f}")
     print(f"standard deviations {100 * scatter.mean() - 100:+.1f} %, bounces {100 * bounced.mean() - 100:+.1f} %")
 
 

@@ -7,20 +7,17 @@ The three loops of the figure are walked anew, in some seconds of a CPU.
 """
 
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import warpchain
-from studies.common import DISTANCE, LINE_COLORS, RED, error_line, run_study, save_figure, table, tidy, write_tables
-
-Block = Any
-"""A block of `warpchain.SweepResult.blocks` with the axes links, perhaps frequency, and charm_mass."""
+from studies import common
+from studies.common import DISTANCE, LINE_COLORS, RED, Array, Block
 
 FOLDER: Final = Path(__file__).parent
-FIGURE: Final = FOLDER / "figures" / "charm.png"
 TIMES: Final = (0.0, 0.04, 0.08, 0.16, 0.32)
 """Moments of the loops [s] since the release."""
 DRAWN: Final = (0.0, 0.02, 0.1)
@@ -29,26 +26,16 @@ DRAWN: Final = (0.0, 0.02, 0.1)
 
 def distances(block: Block) -> str:
     """Δx with its errors, duration, bounces and share at rest of each cell, in Markdown."""
-    cells = block.statistics()
-    rest = block.columns["status"] == warpchain.Status.AT_REST
-    means = {
-        name: np.ma.masked_array(block.columns[name], ~rest).mean(axis=-1).filled(np.nan)
-        for name in ("walk_time", "bounces")
-    }
+    cells, rest = block.statistics(), block.columns["status"] == warpchain.Status.AT_REST
+    time, bounces = (common.mean_where(rest, block.columns[name]) for name in ("walk_time", "bounces"))
     rows = []
-    for place in np.ndindex(cells.mean.shape):
-        values = [axis[index] for axis, index in zip(block.axes.values(), place, strict=True)]
-        numbers = (
-            f"{cells.mean[place]:.3f} ± {cells.standard_error[place]:.3f}",
-            f"{cells.sd[place]:.3f}",
-            f"{means['walk_time'][place]:.2f}",
-            f"{means['bounces'][place]:.1f}",
-        )
-        shown = numbers if rest[place].any() else ("–",) * len(numbers)
+    for place, values in common.of_cells(block):
+        numbers = f"{cells.mean[place]:.3f} ± {cells.standard_error[place]:.3f}", f"{cells.sd[place]:.3f}"
+        shown = (*numbers, f"{time[place]:.2f}", f"{bounces[place]:.1f}") if rest[place].any() else ("–",) * 4
         cell = *(f"{value:g}" for value in values[:-1]), f"{1e3 * values[-1]:g}"
         rows.append((*cell, *shown, f"{rest[place].mean():.0%}"))
     names = [name.replace("frequency", "ν / Hz") for name in block.axes][:-1]
-    return table((*names, "charm / g", "Δx / m", "σ / m", "t / s", "bounces", "at rest"), rows)
+    return common.table((*names, "charm / g", "Δx / m", "σ / m", "t / s", "bounces", "at rest"), rows)
 
 
 def draw_distances(panel: Axes, block: Block) -> None:
@@ -57,27 +44,18 @@ def draw_distances(panel: Axes, block: Block) -> None:
     for number, place in enumerate(np.ndindex(cells.mean.shape[:-1])):
         values = [block.axes[name][index] for name, index in zip(("links", "frequency"), place, strict=True)]
         label = "$n$ = {:g}, {:g} Hz".format(*values)
-        error_line(panel, masses, cells, place, color=LINE_COLORS[number], label=label)
-    panel.set_xlabel("mass of the charm / g")
-    panel.set_ylabel(DISTANCE)
-    panel.set_ylim(0, 1.3 * panel.get_ylim()[1])
+        common.error_line(panel, masses, cells, place, color=LINE_COLORS[number], label=label)
     panel.legend(frameon=False, fontsize="small")
-    tidy(panel, grid="both")
+    top = 1.3 * panel.get_ylim()[1]
+    common.tidy(panel, grid="both", xlabel="mass of the charm / g", ylabel=DISTANCE, ylim=(0, top))
 
 
-def draw_loops(panels: np.ndarray, links: int = 60, frequency: float = 15.0) -> None:
+def draw_loops(panels: Array, links: int = 60, frequency: float = 15.0) -> None:
     """The loop with three charms at the same moments, a panel for each charm, which is a dot."""
     for panel, mass in zip(panels, DRAWN, strict=True):
-        walk = warpchain.walk(
-            preset="soft",
-            method="explicit",
-            start="ellipse",
-            links=links,
-            frequency=frequency,
-            charm_mass=mass,
-            frame_interval=0.01,
-            walk_limit=TIMES[-1] + 0.02,
-        )
+        scene = {"start": "ellipse", "links": links, "frequency": frequency, "charm_mass": mass}
+        times = {"frame_interval": 0.01, "walk_limit": TIMES[-1] + 0.02}
+        walk = warpchain.walk(preset="soft", method="explicit", **scene, **times)
         for number, moment in enumerate(TIMES):
             joints = walk.frame_joints[int(np.argmin(np.abs(walk.frame_time - moment)))]
             closed = np.vstack([joints[-1], joints]) + np.array([0.3 * number - joints[:, 0].mean(), 0.0])
@@ -85,28 +63,20 @@ def draw_loops(panels: np.ndarray, links: int = 60, frequency: float = 15.0) -> 
             panel.plot(*closed[:2].mean(axis=0), "o", color=RED, markersize=4 if mass else 2)
             panel.annotate(f"{moment:g} s", (0.3 * number, -0.06), ha="center", fontsize="x-small")
         panel.axhline(0.0, color="black", linewidth=0.8)
-        panel.set_title(f"charm of {1e3 * mass:g} g", loc="left", fontsize="medium")
-        panel.set_aspect("equal")
-        panel.set_xlim(-0.2, 0.3 * len(TIMES) - 0.1)
-        panel.set_ylim(-0.07, 0.5)
+        limits = {"xlim": (-0.2, 0.3 * len(TIMES) - 0.1), "ylim": (-0.07, 0.5)}
+        common.tidy(panel, f"charm of {1e3 * mass:g} g", aspect="equal", **limits)
         panel.set_axis_off()
 
 
-def draw(blocks: dict[str, Block]) -> Figure:
-    """Distances on the left, loops on the right."""
+def main(folder: str) -> None:
+    """Write the tables into the page and draw the figure: distances on the left, loops on the right."""
+    blocks = warpchain.load(folder).blocks
     figure = Figure(figsize=(9.2, 4.2), layout="constrained")
     left, right = figure.subfigures(1, 2, width_ratios=(1, 1.25))
     draw_distances(left.subplots(), blocks["ellipse"])
     draw_loops(right.subplots(len(DRAWN), 1))
-    return figure
-
-
-def main(folder: str) -> None:
-    """Write the tables into the page and draw the figure."""
-    blocks = warpchain.load(folder).blocks
-    write_tables(FOLDER / "README.md", {name: distances(block) for name, block in blocks.items()})
-    save_figure(draw(blocks), FIGURE)
+    common.publish(FOLDER, {name: distances(block) for name, block in blocks.items()}, {"charm": figure})
 
 
 if __name__ == "__main__":
-    run_study(main)
+    common.run_study(main)

@@ -5,11 +5,10 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studies.common import Array
 from warpchain import InputError, films
 
-Array = NDArray[np.float64]
 Wanted = Mapping[tuple[int, float], int]
 """Links and frequency of an experiment → number of films of it."""
 
@@ -68,8 +67,6 @@ def calibrate(
     believed: films.Camera = CAMERA,
     shared: Array | None = None,
     delay: float = 0.0,
-    measured: Mapping[str, float] | None = None,
-    seed: int = 1,
 ) -> Calibration:
     """Film every hidden chain once and ask the bank for it.
 
@@ -80,10 +77,8 @@ def calibrate(
         believed: the camera that the posterior believes in; films are made by `CAMERA`.
         shared: errors of the camera in all films, in place of random ones.
         delay: by which the release was set too late in all films [s].
-        measured: standard error of parameters that were measured by other means.
-        seed: of the errors.
     """
-    random, found, refused = np.random.default_rng(seed), [], 0
+    random, found, refused = np.random.default_rng(1), [], 0
     for chain, values in enumerate(truths.values):
         errors = CAMERA.errors(random) if shared is None else shared
         seen = set_of_films(truths, chain, wanted, CAMERA, errors, random)
@@ -94,11 +89,6 @@ def calibrate(
         except InputError:
             refused += 1
             continue
-        known = {
-            name: (values[answer.names.index(name)] + random.normal() * error, error)
-            for name, error in (measured or {}).items()
-        }
-        answer = answer.given(**known)
         found.append((answer.mean - values, answer.sigma, values))
     errors, sigmas, values = np.reshape(found, (-1, 3, len(bank.names))).swapaxes(0, 1)
     return Calibration(tuple(bank.names), errors, sigmas, values, refused / len(truths.values))

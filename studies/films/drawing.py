@@ -5,9 +5,7 @@ from statistics import NormalDist
 from typing import Final
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from studies.common import BLUE, DASHES, FAINT, LINE_COLORS, RED, tidy
 from studies.films.calibration import Calibration
@@ -30,14 +28,14 @@ def _unit(value: float) -> tuple[float, str]:
     return (1.0, "") if power >= -1 else (10.0**power, f" / $10^{{{power}}}$")
 
 
-def corner(answer: films.Posterior, truth: Mapping[str, float] | None = None) -> Figure:
-    """Ellipses of 68 and 95 % for each pair of parameters, and the Gaussians on the diagonal; the truth in red."""
+def corner(answer: films.Posterior) -> Figure:
+    """Ellipses of 68 and 95 % for each pair of parameters, and the Gaussians on the diagonal."""
     count, mean, sigma = len(answer.names), answer.mean, answer.sigma
     figure = Figure(figsize=(1.5 * count, 1.5 * count), layout="constrained")
-    panels: NDArray[np.object_] = figure.subplots(count, count, squeeze=False)
+    panels = figure.subplots(count, count, squeeze=False)
     turn = np.linspace(0, 2 * np.pi, 100)
     for row, column in np.ndindex(count, count):
-        panel: Axes = panels[row, column]
+        panel = panels[row, column]
         if column > row:
             panel.set_axis_off()
             continue
@@ -54,17 +52,11 @@ def corner(answer: films.Posterior, truth: Mapping[str, float] | None = None) ->
                 panel.plot(x / unit, y / other, color=BLUE, linewidth=1)
             panel.set_ylim((mean[row] - 3 * sigma[row]) / other, (mean[row] + 3 * sigma[row]) / other)
         panel.set_xlim(values[0] / unit, values[-1] / unit)
-        if truth is not None:
-            panel.axvline(truth[answer.names[column]] / unit, color=RED, linewidth=0.8)
-            if row != column:
-                panel.axhline(truth[answer.names[row]] / other, color=RED, linewidth=0.8)
-        if row == count - 1:
-            panel.set_xlabel(f"{SYMBOLS[answer.names[column]]}{across}")
-        if column == 0 and row:
-            panel.set_ylabel(f"{SYMBOLS[answer.names[row]]}{up}")
+        below = f"{SYMBOLS[answer.names[column]]}{across}" if row == count - 1 else ""
+        beside = f"{SYMBOLS[answer.names[row]]}{up}" if column == 0 and row else ""
         panel.locator_params(axis="x", nbins=3)
         panel.tick_params(labelsize="x-small", labelleft=column == 0 and row > 0, labelbottom=row == count - 1)
-        tidy(panel)
+        tidy(panel, xlabel=below, ylabel=beside)
     return figure
 
 
@@ -76,9 +68,8 @@ def line_figure(line: films.FrictionLine) -> Figure:
         axes.plot(1e3 * line.lift[chosen], 1e3 * line.way[chosen], style, color=BLUE, markersize=3.5)
     ends = 1e3 * np.array([0, line.lift[used].max()])
     axes.plot(ends, line.friction * ends, color=RED, label=f"$μ$ = {line.friction:.4f} ± {line.error:.4f}")
-    axes.set(xlabel="lift $y - y_0 + g t^2/2$ / mm", ylabel="way $x - x_0$ / mm")
     axes.legend(frameon=False)
-    tidy(axes, grid="both")
+    tidy(axes, grid="both", xlabel="lift $y - y_0 + g t^2/2$ / mm", ylabel="way $x - x_0$ / mm")
     return figure
 
 
@@ -93,9 +84,7 @@ def coverage_figure(found: Mapping[str, Calibration]) -> Figure:
         for k, parameter in enumerate(each.names):
             inside = [100 * each.coverage(size)[k] for size in sizes]
             panel.plot(100 * expected, inside, color=LINE_COLORS[k], linewidth=1.2, label=SYMBOLS[parameter])
-        panel.set_title(name, loc="left", fontsize="medium")
-        panel.set_xlabel("interval / %")
-        tidy(panel, grid="both")
+        tidy(panel, name, grid="both", xlabel="interval / %")
     panels[0].set_ylabel("hidden chains inside / %")
     panels[-1].legend(frameon=False, fontsize="small", loc="lower right")
     return figure

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 import warpchain
-from studies.common import run_study
+from studies.common import run_study, write_text
 from warpchain import films
 
 FOLDER: Final = Path(__file__).parent / "hidden"
@@ -30,18 +30,15 @@ def main() -> None:
     camera, random = films.Camera(), np.random.default_rng(34)
     errors = camera.errors(random)
     for frequency in (5.0, 20.0):
-        walk = warpchain.walk(
-            links=60, frequency=frequency, start="spinning", preset="soft", walk_limit=0.45, phase=0.3, **CHAIN
-        )
+        scene = {"links": 60, "frequency": frequency, "start": "spinning", "walk_limit": 0.45, "phase": 0.3}
+        walk = warpchain.walk(preset="soft", **scene, **CHAIN)
         film = films.film_of(walk, None).seen(camera, errors, random)
         assert film.outline is not None and film.speed is not None
         delay, mm = 0.35 + random.uniform(0, 0.1), 1e3
-        rows = [
-            f"{t + delay:.6E}\t{mm * x:.4E}\t{mm * y:.4E}\t" for t, (x, y) in zip(film.time, film.center, strict=True)
-        ]
-        FOLDER.mkdir(exist_ok=True)
+        places = zip(film.time + delay, *(mm * film.center.T), strict=True)
+        rows = (f"{t:.6E}\t{x:.4E}\t{y:.4E}\t" for t, x, y in places)
         text = "\n".join(["cm_A", "t\tx\ty\t", *rows, ""])
-        (FOLDER / f"60_links_{frequency:g}_Hz.txt").write_text(text, encoding="utf-8")
+        write_text(FOLDER / f"60_links_{frequency:g}_Hz.txt", text)
         edges = ", ".join(f"{mm * edge:.1f}" for edge in film.outline)
         print(f"{frequency:g} Hz: outline {edges} mm, speed {film.speed:.3f} m/s")
 

@@ -12,9 +12,8 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from studies.common import run_study, save_figure, table, write_tables
+from studies.common import publish, run_study, table
 from studies.films.calibration import CAMERA, Calibration, Wanted, calibrate, set_of_films
 from studies.films.drawing import SYMBOLS, corner, coverage_figure, line_figure
 from studies.films.reduce import load
@@ -80,16 +79,12 @@ def calibration_rows(found: Calibration) -> Iterator[str]:
 
 def pitfalls_table(bank: films.Bank, truths: films.Bank) -> str:
     """Coverage of 95 % intervals with one error of the camera at twice its σ, allowed for or not."""
-
-    def one(place: int, size: float) -> NDArray[np.float64]:
-        return np.eye(8)[place] * size
-
     errors = {
         "none": (np.zeros(8), 0.0),
-        "floor 1 mm too low": (one(1, 1e-3), 0.0),
-        "scale 0.5 %": (one(0, 5e-3), 0.0),
-        "axis of the sprocket 1 mm off": (one(2, 1e-3), 0.0),
-        "camera rolled by 0.3°": (one(3, 5.2e-3), 0.0),
+        "floor 1 mm too low": (1e-3 * np.eye(8)[1], 0.0),
+        "scale 0.5 %": (5e-3 * np.eye(8)[0], 0.0),
+        "axis of the sprocket 1 mm off": (1e-3 * np.eye(8)[2], 0.0),
+        "camera rolled by 0.3°": (5.2e-3 * np.eye(8)[3], 0.0),
         "release 4 ms off": (np.zeros(8), 4e-3),
     }
     rows = []
@@ -132,49 +127,30 @@ def main(banks: Path) -> None:
         for kind, hidden in truths.items()
         for name, wanted in SETS.items()
     }
-    head = ("films", *SYMBOLS.values(), "refused")
+    rows = {key: (*calibration_rows(each), percent(each.refused)) for key, each in found.items()}
+    head, others = ("films", *SYMBOLS.values(), "refused"), {key: row for key, row in rows.items() if key[0] != "same"}
     tables = {
         "experiments": experiments_table(beside(bank, long)),
-        "calibration": table(
-            head,
-            [(name, *calibration_rows(found["same", name]), percent(found["same", name].refused)) for name in SETS],
-        ),
-        "other chains": table(
-            ("truth", *head),
-            [
-                (kind, name, *calibration_rows(each), percent(each.refused))
-                for (kind, name), each in found.items()
-                if kind != "same"
-            ],
-        ),
+        "calibration": table(head, ((name, *rows["same", name]) for name in SETS)),
+        "other chains": table(("truth", *head), ((*key, *row) for key, row in others.items())),
         "pitfalls": pitfalls_table(bank, truths["same"]),
         "lines": lines_table(
             {"film_bank": bank, "film_bank_90": long} | {kind: each for kind, each in truths.items() if kind != "same"}
         ),
     }
-    write_tables(FOLDER / "README.md", tables)
-    save_figure(
-        coverage_figure({name: found["same", name] for name in SETS}), FOLDER / "figures" / "coverage.png", dpi=130
-    )
+    publish(FOLDER, tables, {"coverage": coverage_figure({name: found["same", name] for name in SETS})}, dpi=130)
+    outlines = {(5, 1.906): (-59.9, 62.1, 13.4, 335.8), (20, 7.648): (-68.7, 62.1, 13.4, 330.0)}
     hidden = [
         films.read(
-            FOLDER / "hidden" / f"60_links_{frequency}_Hz.txt",
-            links=60,
-            frequency=frequency,
-            unit="mm",
-            outline=outline,
-            speed=speed,
+            FOLDER / f"hidden/60_links_{hz}_Hz.txt", links=60, frequency=hz, unit="mm", outline=outline, speed=speed
         )
-        for frequency, outline, speed in (
-            (5, (-59.9, 62.1, 13.4, 335.8), 1.906),
-            (20, (-68.7, 62.1, 13.4, 330.0), 7.648),
-        )
+        for (hz, speed), outline in outlines.items()
     ]
     answer = bank.posterior(hidden)
     print(f"\nthe hidden chain\n{answer}\n{films.friction_line(hidden[1])}")
     print(f"with r by calipers\n{answer.given(circle_radius=(4.05e-3, 5e-5))}")
-    save_figure(corner(answer), FOLDER / "figures" / "corner.png", dpi=110)
-    save_figure(line_figure(films.friction_line(hidden[1])), FOLDER / "figures" / "line.png")
+    publish(FOLDER, {}, {"corner": corner(answer)}, dpi=110)
+    publish(FOLDER, {}, {"line": line_figure(films.friction_line(hidden[1]))})
 
 
 if __name__ == "__main__":

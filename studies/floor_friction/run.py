@@ -7,20 +7,15 @@ The numbers are printed, the figure is written beside the page.
 """
 
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 import warpchain
-from studies.common import DISTANCE, LINE_COLORS, error_line, run_study, save_figure, table, tidy
+from studies.common import DISTANCE, LINE_COLORS, Array, Block, error_line, mean_where, publish, run_study, table, tidy
 
-Array = NDArray[np.float64]
-Block = Any
-"""A block of `warpchain.SweepResult.blocks` with the axes links, frequency and floor_friction."""
-
-FIGURE: Final = Path(__file__).parent / "figures" / "distances.png"
+FOLDER: Final = Path(__file__).parent
 
 
 def furthest(block: Block) -> Array:
@@ -33,8 +28,7 @@ def ledger(block: Block, links: int, frequency: float) -> str:
     cell = [list(block.axes[name]).index(value) for name, value in (("links", links), ("frequency", frequency))]
     rest = block.columns["status"][tuple(cell)] == warpchain.Status.AT_REST
     dx, time, lost = (
-        np.ma.masked_array(block.columns[name][tuple(cell)], ~rest).mean(axis=-1)
-        for name in ("dx", "walk_time", "loss_self_contact")
+        mean_where(rest, block.columns[name][tuple(cell)]) for name in ("dx", "walk_time", "loss_self_contact")
     )
     values = zip(block.axes["floor_friction"], dx, dx / time, time, lost, strict=True)
     rows = ((f"{friction:g}", f"{a:.3f}", f"{b:.2f}", f"{c:.2f}", f"{d:.2f}") for friction, a, b, c, d in values)
@@ -55,9 +49,8 @@ def draw(blocks: dict[str, Block]) -> Figure:
                 error_line(panel, friction, cells, (row, column), color=color, linestyle=style, label=label)
             if column == len(panels) - 1:
                 panel.plot([], [], style, color="black", linewidth=1, label=name)
-        panel.set_title(f"$ν$ = {axes_of['frequency'][column]:g} Hz", loc="left", fontsize="medium")
         panel.set_ylim(bottom=0)
-        tidy(panel, grid="both")
+        tidy(panel, f"$ν$ = {axes_of['frequency'][column]:g} Hz", grid="both")
     panels[0].set_ylabel(DISTANCE)
     figure.supxlabel("friction of the floor $μ_\\mathrm{fc}$", fontsize="medium")
     figure.legend(*panels[-1].get_legend_handles_labels(), loc="outside right upper", frameon=False, fontsize="small")
@@ -71,7 +64,7 @@ def main(folder: str) -> None:
         print(f"\n{name}: friction with the greatest mean Δx, rows links {block.axes['links'].tolist()}")
         print(furthest(block))
         print(ledger(block, int(block.axes["links"].max() * 2 // 3), float(block.axes["frequency"].max())))
-    save_figure(draw(blocks), FIGURE)
+    publish(FOLDER, {}, {"distances": draw(blocks)})
 
 
 if __name__ == "__main__":

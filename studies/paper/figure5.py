@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 import warpchain
-from studies.common import read_rows, table, write_rows
+from studies.common import read_columns, table, write_rows
 
 RESULTS: Final = Path(__file__).parent / "results" / "figure5.csv"
 CELLS: Final = tuple((links, frequency) for links in (60, 90, 120, 150, 180) for frequency in (10.0, 15.0, 20.0, 30.0))
@@ -27,14 +27,12 @@ def shape(links: int, frequency: float) -> dict[str, object]:
     without turning back.
     """
     walk = warpchain.walk(links=links, frequency=frequency, start="spinning", preset="soft")
-    near = walk.lowest < NEAR
-    change = np.abs(np.diff(walk.center_velocity[:, 0]))
+    near, height, speed = walk.lowest < NEAR, walk.center[:, 1], walk.center_velocity[:, 0]
+    change = np.abs(np.diff(speed))
     impacts = near[1:] | near[:-1]
     begins = np.flatnonzero(impacts & ~np.r_[False, impacts[:-1]])
     begins = begins[np.r_[True, np.diff(walk.time[begins]) > APART]]
-    height = walk.center[:, 1]
     maxima = [height[a : b + 1].max() > max(height[a], height[b]) + 1e-3 for a, b in pairwise(begins)]
-    speed = walk.center_velocity[:, 0]
     return {
         "links": links,
         "frequency": frequency,
@@ -53,13 +51,12 @@ def figure5_table() -> str:
         *("cell", "bounces", "times it rises between them", "share of the changes of v_x in impacts"),
         *("greatest v_x / m/s", "greatest backward v_x over it", "time from collapse to rest, over the walk's"),
     )
-    return table(
-        head,
-        (
-            (f"{row['links']} × {float(row['frequency']):g} Hz", *(row[name] for name in list(row)[2:]))
-            for row in read_rows(RESULTS)
-        ),
-    )
+    columns = read_columns(RESULTS)
+    formats, rows = ("g", "g", ".3f", ".3g", ".3f", ".2f"), []
+    for links, frequency, *numbers in zip(*columns.values(), strict=True):
+        texts = map(format, numbers, formats)
+        rows.append((f"{links:g} × {frequency:g} Hz", *texts))
+    return table(head, rows)
 
 
 def main() -> None:

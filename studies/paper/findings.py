@@ -1,65 +1,59 @@
 """What came out for each claim of the paper, from the numbers of `studies.paper.reduction`.
 
-A function takes the numbers of all sweeps, name → content, and gives a sentence with a verdict by the rules of
-`studies.paper.verdicts`.
+A function takes the numbers of all sweeps, name → content. It gives a verdict by the rules of `studies.paper.verdicts`
+and, by name, what the words of the claim in claims.yaml need.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 
-from studies.common import read_rows
-from studies.paper.reduction import effect_of
-from studies.paper.statistics import Effect, exceeding, summary, within
-from studies.paper.verdicts import Verdict, bounds, direction, share, smallness, together
+from studies.common import minus, read_columns
+from studies.paper.figure5 import RESULTS as FIGURE5
+from studies.paper.statistics import Effect
+from studies.paper.verdicts import Verdict, bounds, direction, share, together
 from studies.waves import directions, doses
 
 Numbers = Mapping[str, Any]
+Found = tuple[Verdict, Mapping[str, object]]
+Check = Callable[[Numbers], Found]
 
 LONG: Final = 150
 """Chains of so many links or more are those that the paper's start from rest underestimates."""
-
-
-@dataclass(frozen=True)
-class Finding:
-    """What came out, and what it says of the claim."""
-
-    text: str
-    verdict: Verdict
-    is_typed: bool = False
-    """Whether a person wrote it, from another page, or set its verdict."""
-
-
-Check = Callable[[Numbers], Finding]
+SYMBOLS: Final = {
+    **{"joint_stiffness": "k", "joint_damping": "b", "friction_smoothing": "ω_c", "tangential_restitution": "e_t"},
+    **{"sprocket_restitution": "e_sc", "sprocket_friction": "μ_sc", "floor_restitution": "e_fc"},
+    **{"inner_mass": "m_inner", "outer_mass": "m_outer", "inner_inertia": "I_inner", "outer_inertia": "I_outer"},
+}
+"""Of quantities whose effects are claimed to be small."""
 
 
 def percent(value: float, half_width: float | None = None, *, sign: bool = True) -> str:
     """A share in per cent with two significant digits of its interval, such as ``+3.1 ± 0.4 %``."""
     if not np.isfinite(value):
         return "—"
-    number = 100 * value
-    if half_width is None or not np.isfinite(half_width) or half_width == 0:
-        digits = 0 if abs(number) >= 10 else 1
-        text = f"{number:+.{digits}f}" if sign else f"{number:.{digits}f}"
-        return f"{text.replace('-', '−')} %"
-    width = 100 * half_width
-    digits = 0 if width >= 2 else 1 if width >= 0.2 else 2
-    text = f"{number:+.{digits}f}" if sign else f"{number:.{digits}f}"
-    return f"{text.replace('-', '−')} ± {width:.{digits}f} %"
+    number, width = 100 * value, 100 * (half_width or np.nan)
+    if np.isfinite(width):
+        digits, end = 0 if width >= 2 else 1 if width >= 0.2 else 2, " ± {:.{}f}"
+    else:
+        digits, end = 0 if abs(number) >= 10 else 1, ""
+    return minus(f"{number:{'+' if sign else ''}.{digits}f}") + f"{end.format(width, digits)} %"
 
 
-def counted(effect: Effect) -> str:
-    """Mean effect, and in how many cells it is significant."""
-    found = summary(effect)
-    mean = percent(found.mean, found.half_width)
-    return f"{mean}; of {found.cells} cells {found.rises} rise, {found.falls} fall"
+def plain(value: float) -> str:
+    """A share in per cent without a sign."""
+    return percent(float(value), sign=False)
 
 
-def part(effect: Effect, rows: slice) -> Effect:
-    """The effect in the cells of some numbers of links."""
-    return Effect(effect.relative[rows], effect.half_width[rows], effect.sign[rows], effect.pairs[rows], effect.lost)
+def over(effect: Effect) -> str:
+    """Mean effect over the cells with its interval."""
+    return percent(effect.cells.mean, 1.96 * effect.cells.error)
+
+
+def of_start(numbers: Numbers, start: str, name: str) -> Any:
+    """A table (links, frequencies) of chains that began so."""
+    return np.array(numbers["paper_claims"]["starts"][start][name], float)
 
 
 def long_chains(numbers: Numbers) -> slice:
@@ -68,352 +62,282 @@ def long_chains(numbers: Numbers) -> slice:
     return slice(next(place for place, each in enumerate(links) if each >= LONG), None)
 
 
-def changes(numbers: Numbers, name: str) -> list[tuple[Any, Effect]]:
+def steps(content: Mapping[str, Any]) -> list[tuple[Any, Effect]]:
     """Value → effect, for each value of a quantity but that of the paper."""
-    for sweep in ("paper_claims", "paper_joints"):
-        found = numbers[sweep]["effects"].get(name)
-        if found is not None:
-            return [(each["value"], effect_of(each)) for each in found["values"]]
-    raise KeyError(name)
+    return [(each["value"], Effect.of(each)) for each in content["values"]]
 
 
-def bounces(numbers: Numbers) -> Finding:
+def effects(numbers: Numbers) -> dict[str, Any]:
+    """Effects of quantities by name, with Table 1's joints last."""
+    return {**numbers["paper_claims"]["effects"], **numbers["paper_joints"]["effects"]}
+
+
+def ellipse(numbers: Numbers) -> Effect:
+    """What an ellipse does to Δx of long chains, in place of a start from rest."""
+    return dict(steps(effects(numbers)["start"]))["ellipse"][long_chains(numbers)]
+
+
+def rising(effect: Effect, words: Mapping[str, object]) -> Found:
+    """A claim that an effect is a rise; its words, and the effect as `found`."""
+    return direction(effect.rises, effect.falls, effect.count), {**words, "found": effect}
+
+
+def bounces(numbers: Numbers) -> Found:
     """Chains bounce."""
-    table = np.array(numbers["paper_claims"]["starts"]["rest"]["bounces"], np.float64)
+    table = of_start(numbers, "rest", "bounces")
     several = int((table >= 2).sum())
-    ends = f"{np.nanmin(table):.1f} to {np.nanmax(table):.1f}"
-    text = f"{ends} bounces on average; at least two in {several} of {table.size} cells"
-    return Finding(text, share(several, table.size))
+    found = {"least": np.nanmin(table), "most": np.nanmax(table), "several": several, "cells": table.size}
+    return share(several, table.size), found
 
 
-def shape(numbers: Numbers) -> Finding:
+def shape(numbers: Numbers) -> Found:
     """A loop that rises again keeps its shape in its first impact."""
     found = numbers["paper_shapes"]["impacts"]
-    names = ("area", "height", "width")
-    kept = {name: found[f"{name}_of_walks"] for name in names}
-    texts = [f"{name} {percent(kept[name]['quantiles'][1])}" for name in names]
-    within = [kept[name]["within_a_tenth"] for name in names]
-    count, without = found["walks"], found["without"]
-    every = count + without
-    text = (
-        f"medians of {count} loops that rise again: {', '.join(texts)}; within 10 % in "
-        f"{', '.join(map(str, within))} of them; {without} of all {every} do not rise again, so of all "
-        f"{', '.join(percent(each / every, sign=False) for each in within)} keep them"
-    )
-    return Finding(text, together([share(each, total) for each in within for total in (count, every)]))
+    kept = {name: found[f"{name}_of_walks"] for name in ("area", "height", "width")}
+    inside, count, without = [each["within_a_tenth"] for each in kept.values()], found["walks"], found["without"]
+    medians = (f"{name} {percent(each['quantiles'][1])}" for name, each in kept.items())
+    words = {"walks": count, "medians": ", ".join(medians), "inside": ", ".join(map(str, inside)), "without": without}
+    words |= {"every": count + without, "of_all": ", ".join(plain(each / (count + without)) for each in inside)}
+    return together([share(each, total) for each in inside for total in (count, count + without)]), words
 
 
-def speed(numbers: Numbers) -> Finding:
+def speed(numbers: Numbers) -> Found:
     """The speed along a loop that rises again falls slightly in the first impact."""
     found = numbers["paper_shapes"]["impacts"]
     of_walks, count, without = found["speed_of_walks"], found["walks"], found["without"]
-    low, median, high = (percent(each) for each in of_walks["quantiles"])
     slightly = of_walks["falls_by_less_than_a_fifth"]
-    text = (
-        f"median {median}, {low} to {high} in nine of ten loops that rise again; falls by up to 20 % in {slightly} of "
-        f"{count}, rises in {count - of_walks['falls']}; {without} more do not rise again: slightly in "
-        f"{percent(slightly / (count + without), sign=False)} of all"
-    )
-    return Finding(text, together([share(slightly, total) for total in (count, count + without)]))
+    words = dict(zip(("low", "median", "high"), map(percent, of_walks["quantiles"]), strict=True))
+    words |= {"slightly": slightly, "walks": count, "without": without}
+    words |= {"rises": count - of_walks["falls"], "of_all": plain(slightly / (count + without))}
+    return together([share(slightly, total) for total in (count, count + without)]), words
 
 
-def faster(numbers: Numbers) -> Finding:
+def faster(numbers: Numbers) -> Found:
     """Δx rises with the frequency."""
-    found = summary(effect_of(numbers["paper_claims"]["starts"]["rest"]["faster"]))
-    text = f"from one frequency to the next: {found.rises} of {found.cells} steps rise, {found.falls} fall"
-    return Finding(text, direction(found.rises, found.falls, found.cells))
+    return rising(Effect.of(numbers["paper_claims"]["starts"]["rest"]["faster"]), {})
 
 
-def longer(numbers: Numbers) -> Finding:
+def longer(numbers: Numbers) -> Found:
     """Δx falls with the number of links."""
-    found, ellipses = (
-        summary(effect_of(numbers["paper_claims"]["starts"][start]["longer"])) for start in ("rest", "ellipse")
-    )
-    text = (
-        f"from one number of links to the next: {found.falls} of {found.cells} steps fall, {found.rises} rise; as an "
-        f"ellipse {ellipses.falls} fall, {ellipses.rises} rise"
-    )
-    return Finding(text, direction(found.falls, found.rises, found.cells))
+    found, ellipses = (Effect.of(numbers["paper_claims"]["starts"][start]["longer"]) for start in ("rest", "ellipse"))
+    return direction(found.falls, found.rises, found.count), {"found": found, "ellipses": ellipses}
 
 
-def moderate(numbers: Numbers) -> Finding:
+def moderate(numbers: Numbers) -> Found:
     """Δx varies only moderately while links and frequency stay."""
-    rest = numbers["paper_claims"]["starts"]["rest"]
-    relative = np.array(rest["sd"], np.float64) / np.array(rest["mean"], np.float64)
-    within = int((relative <= bounds().moderate).sum())
-    text = (
-        f"standard deviation of a walk {percent(np.nanmin(relative), sign=False)} to "
-        f"{percent(np.nanmax(relative), sign=False)} of the mean, median "
-        f"{percent(float(np.nanmedian(relative)), sign=False)}"
-    )
-    return Finding(text, share(within, relative.size))
+    relative = of_start(numbers, "rest", "sd") / of_start(numbers, "rest", "mean")
+    words = dict(zip(("least", "median", "most"), map(plain, np.nanquantile(relative, [0, 0.5, 1])), strict=True))
+    return share(int((relative <= bounds().moderate).sum()), relative.size), words
 
 
-def _ellipse(numbers: Numbers) -> Effect:
-    return next(effect for value, effect in changes(numbers, "start") if value == "ellipse")
-
-
-def underestimate(numbers: Numbers) -> Finding:
+def underestimate(numbers: Numbers) -> Found:
     """From rest, long chains walk less far than as an ellipse."""
-    found = summary(part(_ellipse(numbers), long_chains(numbers)))
-    text = (
-        f"150 and 180 links: ellipses walk {1 + found.mean:.2f} times as far; {found.rises} of {found.cells} cells "
-        "differ so"
-    )
-    return Finding(text, direction(found.rises, found.falls, found.cells))
+    return rising(ellipse(numbers), {"ratio": 1 + ellipse(numbers).cells.mean})
 
 
-def _by_links(numbers: Numbers, start: str) -> list[Any]:
-    """What happens to loops, of each number of links of the long chains."""
-    return numbers["paper_strands"]["strands"]["starts"][start][long_chains(numbers)]
-
-
-def self_collision(numbers: Numbers) -> Finding:
+def self_collision(numbers: Numbers) -> Found:
     """Strands of long chains from rest meet right after their second collision with the floor."""
-    found = _by_links(numbers, "rest")
+    found = numbers["paper_strands"]["strands"]["starts"]["rest"][long_chains(numbers)]
     met, crease = (np.sum([each[event] for each in found], axis=0) for event in ("strands", "crease"))
-    first, second, third, later = (percent(each, sign=False) for each in met[1:5] / met.sum())
+    words = dict(zip(("first", "second", "third", "later"), map(plain, met[1:5] / met.sum()), strict=True))
     most = [bounce for each in found for bounce in each["most_frequent"]]
-    text = (
-        f"strands of 150 and 180 links from rest first meet after the first collision in {first} of the walks, after "
-        f"the second in {second}, the third in {third}, later in {later}; after the second most often in "
-        f"{most.count(2)} of {len(most)} cells. They first crease after the first collision in "
-        f"{percent(crease[1] / crease.sum(), sign=False)}"
-    )
-    return Finding(text, share(most.count(2), len(most)))
+    words |= {"crease": plain(crease[1] / crease.sum()), "twos": most.count(2), "cells": len(most)}
+    return share(most.count(2), len(most)), words
 
 
-def cause(numbers: Numbers) -> Finding:
+def cause(numbers: Numbers) -> Found:
     """Long chains whose links pass through one another walk further, and nearly as far as an ellipse."""
-    rest, control = (
-        summary(effect_of(numbers[name]["through"])) for name in ("paper_through", "paper_through_ellipse")
-    )
-    further = part(_ellipse(numbers), long_chains(numbers))
-    gap, tried = summary(further).mean, numbers["paper_through"]["cells"]["frequency"]
+    rest, control = (Effect.of(numbers[name]["through"]) for name in ("paper_through", "paper_through_ellipse"))
+    further, tried = ellipse(numbers), numbers["paper_through"]["cells"]["frequency"]
     there = further.relative[:, np.isin(numbers["paper_claims"]["cells"]["frequency"], tried)]
-    band = f"{tried[0]:g} to {tried[-1]:g} Hz"
+    content = numbers["paper_strands"]
     early = [
-        f"{links} links {percent(float(effect.relative), float(effect.half_width))}"
-        for links, effect in (
-            (links, effect_of(each["early_over_late"]))
-            for links, each in zip(
-                numbers["paper_strands"]["cells"]["links"],
-                numbers["paper_strands"]["strands"]["starts"]["rest"],
-                strict=True,
-            )
-            if "early_over_late" in each and links >= LONG - 30
-        )
+        f"{links} links {percent(each['early_over_late']['relative'], each['early_over_late']['half_width'])}"
+        for links, each in zip(content["cells"]["links"], content["strands"]["starts"]["rest"], strict=True)
+        if "early_over_late" in each and links >= LONG - 30
     ]
-    text = (
-        f"with links that pass through one another 150 and 180 links walk {percent(rest.mean, rest.half_width)} "
-        f"further from the sprocket, in {rest.rises} of {rest.cells} cells ({band}), as an ellipse "
-        f"{percent(control.mean, control.half_width)}; an ellipse walks {percent(gap, sign=False)} further than loops "
-        f"from rest, {percent(float(there.mean()), sign=False)} at {band}; "
-        f"within a cell, strands met by the second bounce against later: {', '.join(early)}"
+    words = {
+        "rest": over(rest),
+        "control": over(control),
+        "further": plain(further.cells.mean),
+        "early": ", ".join(early),
+    }
+    words |= {"band": f"{tried[0]:g} to {tried[-1]:g} Hz", "there": plain(there.mean())}
+    closes = (
+        Verdict.AGREES if rest.cells.mean - control.cells.mean >= bounds().most * further.cells.mean else Verdict.PART
     )
-    closes = Verdict.AGREES if rest.mean - control.mean >= bounds().most * gap else Verdict.PART
-    return Finding(text, together([direction(rest.rises, rest.falls, rest.cells), closes]))
+    verdict, words = rising(rest, words)
+    return together([verdict, closes]), words
 
 
-def losses(numbers: Numbers) -> Finding:
+def losses(numbers: Numbers) -> Found:
     """A chain loses most of its energy in collisions."""
-    found, ellipse = (_losses(numbers, start) for start in ("rest", "ellipse"))
-    collisions = found["floor"] + found["self_contact"]
-    damped, as_ellipse = (
+    found, as_ellipse = (
+        {name: np.array(each, float) for name, each in numbers["paper_claims"]["starts"][start]["losses"].items()}
+        for start in ("rest", "ellipse")
+    )
+    most = int((found["floor"] + found["self_contact"] > 0.5).sum())
+    damped = [
         int((each["floor"] + each["self_contact"] + each["joint_damping"] > each["joint_friction"]).sum())
-        for each in (found, ellipse)
-    )
-    means = {name: percent(float(np.nanmean(each)), sign=False) for name, each in found.items()}
-    text = (
-        f"from the release to rest: floor {means['floor']}, self-contacts {means['self_contact']}, friction of joints "
-        f"{means['joint_friction']}, damping of joints {means['joint_damping']}; collisions take more than half in "
-        f"{int((collisions > 0.5).sum())} of {collisions.size} cells, with damping of the joints more than friction of "
-        f"the joints in {damped} (as an ellipse {as_ellipse})"
-    )
-    return Finding(text, share(int((collisions > 0.5).sum()), collisions.size))
+        for each in (found, as_ellipse)
+    ]
+    words = {name: plain(np.nanmean(each)) for name, each in found.items()}
+    words |= {"most": most, "cells": found["floor"].size, "damped": damped}
+    return share(most, found["floor"].size), words
 
 
-def _losses(numbers: Numbers, start: str) -> dict[str, np.ndarray]:
-    """Shares of the energy at the release that each loss takes, (links, frequencies)."""
-    tables = numbers["paper_claims"]["starts"][start]["losses"]
-    return {name: np.array(each, np.float64) for name, each in tables.items()}
-
-
-def delay(numbers: Numbers) -> Finding:
+def delay(numbers: Numbers) -> Found:
     """Starting as an ellipse delays the meeting of the loop's strands."""
-    effect = part(effect_of(numbers["paper_strands"]["strands"]["delay"]), long_chains(numbers))
-    found = summary(effect)
-    fast = np.array(numbers["paper_claims"]["cells"]["frequency"]) > 20
-    slower = effect.relative[:, ~fast]
-    text = (
-        f"bounces before strands meet, ellipse against rest, pairs in which they do: {counted(effect)}; "
-        f"25 and 30 Hz carry it, from 5 to 20 Hz it is {percent(slower.min())} to {percent(slower.max())} in a cell"
-    )
-    return Finding(text, direction(found.rises, found.falls, found.cells))
+    found = Effect.of(numbers["paper_strands"]["strands"]["delay"])[long_chains(numbers)]
+    slower = found.relative[:, np.array(numbers["paper_claims"]["cells"]["frequency"]) <= 20]
+    return rising(found, {"mean": over(found), "least": percent(slower.min()), "most": percent(slower.max())})
 
 
-def single_walks(numbers: Numbers) -> Finding:
+def single_walks(numbers: Numbers) -> Found:
     """Single walks differ by up to 10 % between the tolerances."""
     found = numbers["paper_tolerance"]["tolerance"]
-    text = (
-        f"median {percent(found['median'], sign=False)}, greatest {percent(found['greatest'], sign=False)}; "
-        f"{found['within_a_tenth']} of {found['walks']} walks within 10 %"
-    )
-    return Finding(text, share(found["within_a_tenth"], found["walks"]))
+    words = {**found, "median": plain(found["median"]), "greatest": plain(found["greatest"])}
+    return share(found["within_a_tenth"], found["walks"]), words
 
 
-def means(numbers: Numbers) -> Finding:
+def means(numbers: Numbers) -> Found:
     """Means of 12 walks differ by less than a few per cent between the tolerances."""
-    effect = effect_of(numbers["paper_tolerance"]["tolerance"]["means"])
-    found, within = summary(effect), int((np.abs(effect.relative[effect.known]) <= bounds().unseen).sum())
-    greatest = float(np.abs(effect.relative[effect.known]).max(initial=0.0))
-    text = (
-        f"means of 12 by up to {percent(greatest, sign=False)}, within 5 % in {within} of {found.cells} cells; all "
-        f"together {percent(found.mean, found.half_width)}, {found.rises + found.falls} cells differ significantly"
-    )
-    return Finding(text, share(within, found.cells))
+    effect = Effect.of(numbers["paper_tolerance"]["tolerance"]["means"])
+    off = np.abs(effect.relative[effect.known])
+    inside = int((off <= bounds().unseen).sum())
+    words = {"greatest": plain(off.max(initial=0.0)), "inside": inside, "found": effect, "mean": over(effect)}
+    return share(inside, effect.count), words | {"significant": effect.rises + effect.falls}
 
 
 def falling(name: str) -> Check:
     """Δx falls as a quantity grows."""
-
-    def check(numbers: Numbers) -> Finding:
-        return monotonic(numbers, name, changes(numbers, name), -1)
-
-    return check
+    return lambda numbers: monotonic(numbers, name, steps(effects(numbers)[name]), -1)
 
 
-def floor_friction(numbers: Numbers) -> Finding:
+def floor_friction(numbers: Numbers) -> Found:
     """Δx falls as the friction of the floor grows: for all values, and for those beside Table 1's."""
-    steps = changes(numbers, "floor_friction")
-    reference = numbers["paper_claims"]["effects"]["floor_friction"]["reference"]
-    beside = [end(v for v, _ in steps if (v > reference) is above) for end, above in ((max, False), (min, True))]
-    every, near = (
-        monotonic(numbers, "floor_friction", chosen, -1)
-        for chosen in (steps, [(value, effect) for value, effect in steps if value in beside])
-    )
-    counts = near.text.rpartition("; ")[2]
-    text = f"{every.text}, by which alone it {every.verdict}; at {beside[0]:g} and {beside[1]:g} alone {counts}"
-    return Finding(text, together([every.verdict, near.verdict]))
+    content = effects(numbers)["floor_friction"]
+    every, reference = steps(content), content["reference"]
+    below = max(value for value, _ in every if value < reference)
+    above = min(value for value, _ in every if value > reference)
+    near = [(value, effect) for value, effect in every if value in (below, above)]
+    (first, words), (second, beside) = (monotonic(numbers, "floor_friction", each, -1) for each in (every, near))
+    words = {**words, "verdict": first, "below": below, "above": above, "near": beside["counts"]}
+    return together([first, second]), words
 
 
-def collapse(numbers: Numbers) -> Finding:
+def collapse(numbers: Numbers) -> Found:
     """Longer links lose their loop after fewer bounces."""
-    found = numbers["paper_claims"]["collapse"]
-    steps = [(each["value"], effect_of(each)) for each in found["values"]]
-    bounced = monotonic(numbers, "link_length", steps, -1, "bounces before the collapse")
-    distances = (f"{value:g}: {percent(summary(effect).mean)}" for value, effect in changes(numbers, "link_length"))
-    return Finding(f"{bounced.text}; Δx at {', '.join(distances)}", bounced.verdict)
+    verdict, words = monotonic(numbers, "link_length", steps(numbers["paper_claims"]["collapse"]), -1)
+    lengths = (f"{value:g}: {percent(effect.cells.mean)}" for value, effect in steps(effects(numbers)["link_length"]))
+    return verdict, {**words, "distances": ", ".join(lengths)}
 
 
-def lost_on_floor(numbers: Numbers) -> Finding:
+def lost_on_floor(numbers: Numbers) -> Found:
     """Less friction of the floor takes less energy in collisions with it."""
-    found = numbers["paper_claims"]["lost_on_floor"]
-    steps = [(each["value"], effect_of(each)) for each in found["values"]]
-    return monotonic(numbers, "floor_friction", steps, 1, "energy lost in collisions with the floor")
+    return monotonic(numbers, "floor_friction", steps(numbers["paper_claims"]["lost_on_floor"]), 1)
 
 
-def monotonic(
-    numbers: Numbers, name: str, steps: Sequence[tuple[float, Effect]], slope: int, what: str = "Δx"
-) -> Finding:
+def sliding(numbers: Numbers) -> Found:
+    """Less friction of the floor lets a chain slide for longer after its collapse."""
+    found = numbers["paper_more"]["more"]["sliding"].items()
+    return monotonic(numbers, "floor_friction", [(float(value), Effect.of(each["time"])) for value, each in found], -1)
+
+
+def monotonic(numbers: Numbers, name: str, steps: Sequence[tuple[float, Effect]], slope: int) -> Found:
     """Whether a quantity has a slope: a greater value changes it one way, a smaller one the other."""
     reference = numbers["paper_claims"]["effects"][name]["reference"]
-    agreeing = against = cells = 0
-    texts = []
-    for value, effect in steps:
-        found, expected = summary(effect), slope if value > reference else -slope
-        agreeing += found.rises if expected > 0 else found.falls
-        against += found.falls if expected > 0 else found.rises
-        cells += found.cells
-        texts.append(f"{value:g}: {percent(found.mean, found.half_width)}")
-    text = f"{what} at {'; '.join(texts)}; {agreeing} of {cells} comparisons as claimed, {against} the other way"
-    return Finding(text, direction(agreeing, against, cells))
+    ways = [(effect.rises, effect.falls)[:: slope if value > reference else -slope] for value, effect in steps]
+    agreeing, against = (sum(way) for way in zip(*ways, strict=True))
+    cells = sum(effect.count for _, effect in steps)
+    counts = f"{agreeing} of {cells} comparisons as claimed, {against} the other way"
+    texts = "; ".join(f"{value:g}: {over(effect)}" for value, effect in steps)
+    return direction(agreeing, against, cells), {"steps": texts, "counts": counts}
 
 
-def small(names: Mapping[str, str], kind: str) -> Check:
-    """Quantities have an effect smaller than a bound.
+def small(kind_and_names: str) -> Check:
+    """Quantities, given after the kind of bound that `verdicts.Bounds` has, have an effect smaller than it."""
+    kind, *names = kind_and_names.split()
 
-    Args:
-        names: quantity → its symbol.
-        kind: of bound, as `verdicts.Bounds` has it.
-    """
-
-    def check(numbers: Numbers) -> Finding:
-        texts, total, above, inside, bound = [], 0, 0, 0, getattr(bounds(), kind)
-        for name, symbol in names.items():
-            steps = changes(numbers, name)
-            worst = max((summary(effect) for _, effect in steps), key=lambda found: abs(found.mean))
-            texts.append(f"{symbol} {percent(worst.mean, worst.half_width)}")
-            above += sum(exceeding(effect, bound) for _, effect in steps)
-            inside += sum(within(effect, bound) for _, effect in steps)
-            total += sum(summary(effect).cells for _, effect in steps)
-        text = (
-            f"means of all cells at most {', '.join(texts)}; more than {bound:.0%} in {above} of {total} comparisons; "
-            f"shown to be within {bound:.0%} in {inside}"
+    def check(numbers: Numbers) -> Found:
+        known = {name: [effect for _, effect in steps(effects(numbers)[name])] for name in names}
+        greatest = {name: max(found, key=lambda each: abs(each.cells.mean)) for name, found in known.items()}
+        worst, bound = (f"{SYMBOLS[name]} {over(effect)}" for name, effect in greatest.items()), getattr(bounds(), kind)
+        every = [effect for found in known.values() for effect in found]
+        sizes, widths = (
+            np.concatenate([getattr(effect, each)[effect.known] for effect in every])
+            for each in ("relative", "half_width")
         )
-        return Finding(text.replace("%", " %").replace("  %", " %"), smallness(above, total))
+        above, inside = (int(np.sum(each)) for each in (abs(sizes) - widths > bound, abs(sizes) + widths <= bound))
+        words = {"worst": ", ".join(worst), "bound": 100 * bound, "above": above, "inside": inside, "total": len(sizes)}
+        return share(len(sizes) - above, len(sizes)), words
 
     return check
 
 
-def spread(numbers: Numbers) -> Finding:
+def spread(numbers: Numbers) -> Found:
     """Drawing the release as well spreads Δx further."""
-    found = {name: np.array(table, np.float64) for name, table in numbers["paper_claims"]["spread"].items()}
-    middle = {name: percent(float(np.nanmedian(table)), sign=False) for name, table in found.items()}
+    found = {name: np.array(table, float) for name, table in numbers["paper_claims"]["spread"].items()}
     greater = int((found["both"] > found["parameters"]).sum())
-    text = (
-        f"standard deviation of a walk, median over the cells: {middle['both']} with all drawn, {middle['parameters']} "
-        f"with Table 1's parameters alone, {middle['release']} with the release alone; greater with all in {greater} "
-        f"of {found['both'].size} cells"
-    )
-    return Finding(text, share(greater, found["both"].size))
+    words = {name: plain(np.nanmedian(table)) for name, table in found.items()}
+    return share(greater, found["both"].size), words | {"greater": greater, "cells": found["both"].size}
 
 
-def waves(numbers: Numbers) -> Finding:
+def waves(numbers: Numbers) -> Found:
     """Short fast waves influence the distance: from the drags of the study of waves, not from this page's sweeps.
 
     Its verdict is set by hand: a drag shows an effect, a small one.
     """
-    rows = read_rows(doses.RESULTS)
-    gentle, strong = (doses.changes(rows, "in flight", rate) for rate in (50.0, 250.0))
-    always = doses.changes(rows, "always", 50.0)
-    known = [int(np.sum(np.abs(values) > 1.96 * errors)) for values, errors in (gentle, strong, always)]
-    nothing, scatter = doses.changes(rows, "always", 1e-9)
-    beyond = int(np.sum(np.abs(gentle[0] - nothing) > 1.96 * np.hypot(gentle[1], scatter)))
-    ends = [f"{percent(values.min() / 100)} to {percent(values.max() / 100)}" for values, _ in (gentle, strong, always)]
-    count, waves = len(gentle[0]), read_rows(directions.RESULTS)
-    given = [directions.mean_of_cells(*directions.changes(waves, way, 0.05)[:2]) for way in ("fast", "slow")]
-    text = (
-        f"a drag of 50/s on fast waves of up to 24 links, in flight alone, changes Δx by {ends[0]}, significantly in "
-        f"{known[0]} of {count} cells ({beyond} against a drag of 1e-9/s); "
-        f"250/s by {ends[1]}, {known[1]} cells; 50/s in impacts as well by {ends[2]}, "
-        f"{known[2]} cells; waves of 12 links and 0.05 rad given at the release change it by {given[0]} on average if "
-        f"they are fast, by {given[1]} if slow"
-    )
-    return Finding(text, Verdict.PART, is_typed=True)
+    drags = [doses.changes(*drag) for drag in (("in flight", 50.0), ("in flight", 250.0), ("always", 50.0))]
+    (values, errors), (nothing, scatter) = drags[0], doses.changes("always", 1e-9)
+    words: dict[str, object] = {"cells": len(values)}
+    words["known"] = [int(np.sum(np.abs(each) > 1.96 * error)) for each, error in drags]
+    words["ends"] = [f"{percent(each.min() / 100)} to {percent(each.max() / 100)}" for each, _ in drags]
+    words["beyond"] = int(np.sum(np.abs(values - nothing) > 1.96 * np.hypot(errors, scatter)))
+    for way in ("fast", "slow"):
+        words[way] = minus(directions.change(way, 0.05).text())
+    return Verdict.PART, words
 
 
-def stated(text: str, verdict: Verdict) -> Check:
-    """What another page shows; nothing of this page's sweeps."""
+def gradual(numbers: Numbers) -> Found:
+    """A loop loses its shape gradually: nine of ten take longer than an impact lasts."""
+    found = numbers["paper_strands"]["strands"]["loss_of_shape"]["rest"]
+    low, median, high = found["seconds"]
+    impact = float(np.nanmedian(np.array(numbers["paper_shapes"]["impacts"]["duration"], float)))
+    words = {"low": low, "median": median, "high": high, "of_walk": plain(found["of_the_walk"][1]), "impact": impact}
+    return Verdict.AGREES if low > impact else Verdict.PART if median > impact else Verdict.DIFFERS, words
 
-    def check(numbers: Numbers) -> Finding:
-        return Finding(text, verdict, is_typed=True)
 
-    return check
+def nonlinear(numbers: Numbers) -> Found:
+    """Linear propagation of the uncertainties fails: linear terms explain less than half of the variance in a cell."""
+    texts, fails = [], []
+    for start, found in numbers["paper_footnote"]["nonlinear"].items():
+        shares = {name: np.maximum(np.array(each, float), 0.0) for name, each in found.items()}
+        linear, squares, products, repeated = (plain(np.median(each)) for each in shares.values())
+        least = shares["linear"]
+        texts.append(
+            f"{'as an ellipse' if start == 'ellipse' else 'from the sprocket'}: linear terms {linear} "
+            f"({plain(least.min())} to {plain(least.max())}), with squares {squares}, with products {products}, "
+            f"all but chaos {repeated}"
+        )
+        fails.append(share(int((least < bounds().most).sum()), least.size))
+    return together(fails), {"shares": "; ".join(texts)}
 
 
-ADJUSTED: Final = {
-    "joint_stiffness": "k",
-    "joint_damping": "b",
-    "friction_smoothing": "ω_c",
-    "tangential_restitution": "e_t",
-    "sprocket_restitution": "e_sc",
-    "sprocket_friction": "μ_sc",
-}
-"""Table 1's adjusted parameters and their symbols."""
+def figure5_shape(numbers: Numbers) -> Found:
+    """Curves of other cells bounce, change v_x in impacts only, and do not turn back."""
+    found = read_columns(FIGURE5)
+    alike = int(np.sum((found["rises"] > 0) & (found["changes_in_impacts"] > 0.9) & (found["backwards"] < 0.1)))
+    cells = zip(found["links"], found["frequency"], found["rises"], strict=True)
+    without = (f"{links:g} × {frequency:g} Hz" for links, frequency, rises in cells if rises == 0)
+    words = {"alike": alike, "cells": len(found["rises"]), "without": ", ".join(without)}
+    return share(alike, len(found["rises"])), words
 
-LITTLE_EFFECT: Final = small(ADJUSTED, "little")
-UNNOTICED_DAMPING: Final = small({"joint_damping": "b"}, "unseen")
-NO_RESTITUTION: Final = small({"floor_restitution": "e_fc"}, "unseen")
-MASSES: Final = small({"inner_mass": "m_inner", "outer_mass": "m_outer"}, "unseen")
-INERTIAS: Final = small({"inner_inertia": "I_inner", "outer_inertia": "I_outer"}, "unseen")
+
+def same_distributions(numbers: Numbers) -> Found:
+    """Δx is distributed alike at both tolerances."""
+    found = numbers["paper_distributions"]["distributions"]
+    alike, least = sum(each["p"] > 0.05 for each in found), min(each["p"] for each in found)
+    cells = ", ".join(f"{each['links']} × {each['frequency']:g} Hz" for each in found)
+    words = {"alike": alike, "count": len(found), "cells": cells, "walks": found[0]["walks"][0], "least": least}
+    return share(alike, len(found)), words

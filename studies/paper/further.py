@@ -1,18 +1,17 @@
 """Numbers of further sweeps: strands, what the paper leaves open, rest against long holds, its last sentences."""
 
-from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
+import xarray
 from scipy.stats import chi2, ks_2samp
 
-from studies.paper.statistics import Effect, mean, paired, spread, standard_error, unpaired
-from warpchain import Status
+from studies.common import DRAWN, Array, Block, at_rest, mean
+from studies.paper.statistics import paired, spread, unpaired
 
-Array = NDArray[np.float64]
+Cells = xarray.DataArray
+"""Values of walks at rest, axes links and frequency in front, samples last."""
 Numbers = dict[str, Any]
-Block = Any
 
 EVENTS: Final = {
     "crease": "bounces_before_self_contact",
@@ -23,78 +22,69 @@ EVENTS: Final = {
 CELLS: Final = ("links", "frequency")
 
 
-def at_rest(block: Block, quantity: str = "dx") -> Array:
-    """A column with the cells in front and the samples behind, NaN for walks that did not come to rest."""
-    order = [block.dims.index(name) for name in CELLS]
-    others = [number for number in range(len(block.dims)) if number not in order]
-    values = np.where(block.columns["status"] == Status.AT_REST, block.columns[quantity], np.nan)
-    return np.transpose(values, order + others)
+def values_of(table: Cells, axis: str, reference: Any) -> list[Numbers]:
+    """What each other value on an axis does to a quantity, in pairs with a reference on it."""
+    values = table[axis].values.tolist()
+    before = table.isel({axis: values.index(reference)})
+    return [
+        {"value": value, **paired(table.isel({axis: number}), before).plain}
+        for number, value in enumerate(values)
+        if value != reference
+    ]
 
 
-def plain(effect: Effect) -> Numbers:
-    """An effect as plain numbers."""
-    return {name: np.asarray(values).tolist() for name, values in vars(effect).items()}
+def extremes(block: Block) -> list[dict[str, float]]:
+    """The greatest and the least tolerance of a block, as places on its axis."""
+    return [{"tolerance": end(block.axes["tolerance"])} for end in (np.max, np.min)]
 
 
 # --- when strands meet ---
 
 
-def endings_by_links(block: Block, start: int) -> list[Numbers]:
+def endings_by_links(counts: dict[str, Cells], distance: Cells) -> list[Numbers]:
     """Of each number of links: after how many bounces loops crease, their strands meet, they collapse; early over late.
 
     Early is a walk whose strands met before its third bounce; walks are taken relative to the means of their cells.
     """
-    counts = {event: at_rest(block, column)[:, :, start] for event, column in EVENTS.items()}
-    distance = at_rest(block)[:, :, start]
-    relative = distance / mean(distance)[..., np.newaxis]
-    found = []
-    for links in range(len(distance)):
-        there = {event: values[links] for event, values in counts.items()}
-        content: Numbers = {event: histogram(values) for event, values in there.items()}
-        met = there["strands"]
+    relative, found = distance.values / mean(distance)[..., np.newaxis], []
+    for links, of_cells in enumerate(relative):
+        content: Numbers = {event: histogram(values.values[links]) for event, values in counts.items()}
+        met = counts["strands"].values[links]
         early = (met >= 0) & (met <= 2)
-        both = [relative[links][np.isfinite(relative[links]) & chosen] for chosen in (early, ~early)]
+        both = [of_cells[np.isfinite(of_cells) & chosen] for chosen in (early, ~early)]
         content |= {"early": len(both[0]), "late": len(both[1])}
         if min(map(len, both)) > 1:
-            content["early_over_late"] = plain(unpaired(*both))
-        second = [float((cell[np.isfinite(cell)] == 2).mean()) for cell in met]
-        content["second_by_cell"] = second
-        content["most_frequent"] = [histogram(cell).index(max(histogram(cell))) for cell in met]
+            content["early_over_late"] = unpaired(*both).plain
+        content["second_by_cell"] = [float((cell[np.isfinite(cell)] == 2).mean()) for cell in met]
+        content["most_frequent"] = [int(np.argmax(histogram(cell))) for cell in met]
         found.append(content)
     return found
 
 
 def histogram(bounces: Array) -> list[int]:
     """Numbers of walks with 0, 1, 2, 3 and more bounces before an event, and of those without the event."""
-    known = bounces[np.isfinite(bounces)]
-    counts = [int((known == number).sum()) for number in range(4)]
-    return [*counts, int((known > 3).sum()), int((known < 0).sum())]
+    known = np.where(bounces < 0, 5, np.minimum(bounces, 4))[np.isfinite(bounces)]
+    return np.bincount(known.astype(int), minlength=6).tolist()
 
 
 def strands(block: Block) -> Numbers:
     """When loops crease, their strands meet and they collapse, by start; how gradually they lose their area."""
-    values = block.axes["start"].tolist()
-    met = np.where((counts := at_rest(block, EVENTS["strands"])) < 0, np.nan, counts)
-    begin, end = (at_rest(block, name) for name in ("softened_at", "collapsed_at"))
-    lasts = end - begin
-    duration = at_rest(block, "walk_time")
-    return {
-        "starts": {start: endings_by_links(block, number) for number, start in enumerate(values)},
-        "delay": plain(paired(met[:, :, values.index("ellipse")], met[:, :, values.index("rest")])),
-        "loss_of_shape": {
-            start: {
-                "seconds": np.nanquantile(lasts[:, :, number], [0.1, 0.5, 0.9]).tolist(),
-                "of_the_walk": np.nanquantile((lasts / duration)[:, :, number], [0.1, 0.5, 0.9]).tolist(),
-            }
-            for number, start in enumerate(values)
-        },
-    }
+    counts = {event: at_rest(block, column) for event, column in EVENTS.items()}
+    met = counts["strands"].where(counts["strands"] >= 0)
+    lasts, duration = at_rest(block, "collapsed_at") - at_rest(block, "softened_at"), at_rest(block, "walk_time")
+    starts, loss = {}, {}
+    for start in block.axes["start"].tolist():
+        here = {event: values.sel(start=start) for event, values in counts.items()}
+        starts[start] = endings_by_links(here, at_rest(block).sel(start=start))
+        loss[start] = {
+            name: np.nanquantile(values.sel(start=start), [0.1, 0.5, 0.9]).tolist()
+            for name, values in (("seconds", lasts), ("of_the_walk", lasts / duration))
+        }
+    delay = paired(met.sel(start="ellipse"), met.sel(start="rest"))
+    return {"starts": starts, "delay": delay.plain, "loss_of_shape": loss}
 
 
 # --- linear or not ---
-
-DRAWN: Final = "_drawn"
-"""End of the names of columns with what a sample has drawn."""
 
 
 def nonlinear(block: Block) -> Numbers:
@@ -102,31 +92,24 @@ def nonlinear(block: Block) -> Numbers:
 
     Terms are fitted cell by cell. What two walks of a sample share that differ in their tolerance only, is not chaos.
     """
-    starts, tolerances = (block.axes[name].tolist() for name in ("start", "tolerance"))
-    loose, tight = tolerances.index(max(tolerances)), tolerances.index(min(tolerances))
+    loose, tight = extremes(block)
     distance = at_rest(block)
-    names = [name for name in block.columns if name.endswith(DRAWN)]
-    drawn = {name: at_rest(block, name)[..., loose, :] for name in names}
+    drawn = {name: at_rest(block, name).sel(loose) for name in block.columns if name.endswith(DRAWN)}
     found: Numbers = {}
-    for number, start in enumerate(starts):
-        one, two = (distance[:, :, number, which] for which in (loose, tight))
-        shares: dict[str, Array] = {}
+    for start in block.axes["start"].tolist():
+        one, two = (distance.sel({"start": start} | which).values for which in (loose, tight))
+        shares = {name: np.empty(one.shape[:2]) for name in ("linear", "squares", "products", "repeated")}
         for place in np.ndindex(one.shape[:2]):
             kept = np.isfinite(one[place]) & np.isfinite(two[place])
-            columns = {name: values[(*place, number)][kept] for name, values in drawn.items()}
-            shape = one.shape[:2]
+            columns = {name: values.sel(start=start).values[place][kept] for name, values in drawn.items()}
             known = {name: values for name, values in columns.items() if values.std() > 0}
             linear = [(values - values.mean()) / values.std() for values in known.values()]
             turning = [f(2 * np.pi * known[f"phase{DRAWN}"]) for f in (np.sin, np.cos)]
-            products = [one * two for k, one in enumerate(linear) for two in linear[: k + 1]]
-            for name, terms in (
-                ("linear", linear),
-                ("squares", linear + turning + [each**2 for each in linear]),
-                ("products", linear + turning + products),
-            ):
-                shares.setdefault(name, np.empty(shape))[place] = explained(one[place][kept], terms)
-            shared = np.corrcoef(one[place][kept], two[place][kept])[0, 1]
-            shares.setdefault("repeated", np.empty(shape))[place] = shared
+            products = [first * second for k, first in enumerate(linear) for second in linear[: k + 1]]
+            squares = [each**2 for each in linear]
+            for name, terms in (("linear", []), ("squares", turning + squares), ("products", turning + products)):
+                shares[name][place] = explained(one[place][kept], linear + terms)
+            shares["repeated"][place] = np.corrcoef(one[place][kept], two[place][kept])[0, 1]
         found[start] = {name: values.tolist() for name, values in shares.items()}
     return found
 
@@ -139,47 +122,43 @@ def explained(values: Array, terms: list[Array]) -> float:
     return float(1 - left / values.var(ddof=1))
 
 
+# --- loops at their release ---
+
+HEIGHT, ENERGY = "sprocket_height", "energy_kinetic_at_release"
+
+
+def every(block: Block, values: Array) -> Cells:
+    """Values of all walks of a block with named axes."""
+    return xarray.DataArray(values, block.axes, block.dims)
+
+
 def loops(block: Block) -> Numbers:
     """Height of the sprocket over the floor [µm] and kinetic energy [µJ] at the release, means over the phases."""
     further = [name for name in ("start", "further_hold") if name in block.dims]
-    order = [block.dims.index(name) for name in (*CELLS, *further)]
-    others = [number for number in range(len(block.dims)) if number not in order]
     found: Numbers = {name: block.axes[name].tolist() for name in further}
-    for name, column in (("height", "sprocket_height"), ("energy", "energy_kinetic_at_release")):
-        values = np.transpose(block.columns[column], order + others)
-        found[name] = np.rint(1e6 * values.mean(axis=tuple(range(len(order), values.ndim)))).astype(int).tolist()
+    for name, column in (("height", HEIGHT), ("energy", ENERGY)):
+        values = every(block, block.columns[column]).transpose(*CELLS, *further, ...).values
+        means = values.mean(axis=tuple(range(2 + len(further), values.ndim)))
+        found[name] = np.rint(1e6 * means).astype(int).tolist()
     return found
 
 
 def same_loops(block: Block) -> Numbers:
     """Loops at their release, from rest less spinning, pairs of samples: height and place [µm], energy, relative."""
-    order = [block.dims.index(name) for name in (*CELLS, "start", "sample")]
-    rest, spinning = (block.axes["start"].tolist().index(name) for name in ("rest", "spinning"))
     places = np.empty(block.columns["status"].shape)
     for at in np.ndindex(places.shape):
         places[at] = block.walk_motion(at).center[0, 0]
-    height, energy = (block.columns[name] for name in ("sprocket_height", "energy_kinetic_at_release"))
     found = {}
-    for name, values, unit in (("height", height, 1e6), ("place", places, 1e6), ("energy", energy, 1.0)):
-        table = np.transpose(values, order)
-        change = table[:, :, rest] - table[:, :, spinning]
-        change = (change / table[:, :, spinning] if name == "energy" else unit * change).ravel()
+    for name, values in (("height", block.columns[HEIGHT]), ("place", places), ("energy", block.columns[ENERGY])):
+        table = every(block, values).transpose(*CELLS, "start", "sample")
+        spinning = table.sel(start="spinning").values
+        change = table.sel(start="rest").values - spinning
+        change = (change / spinning if name == "energy" else 1e6 * change).ravel()
         found[name] = [float(each) for each in (change.mean(), change.std(ddof=1), np.abs(change).max())]
     return found | {"pairs": int(change.size)}
 
 
-# --- links that pass through one another ---
-
-
-def through(block: Block) -> Numbers:
-    """What it does to Δx if links pass through one another, cell by cell."""
-    table = at_rest(block)
-    touching = block.axes["self_contact"].tolist()
-    on, off = touching.index(True), touching.index(False)
-    return plain(paired(table[:, :, off], table[:, :, on]))
-
-
-# --- what the paper leaves open ---
+# --- links that pass through one another, and what else the paper leaves open ---
 
 REFERENCES: Final = {
     "sprocket_radius_is": "contact",
@@ -192,22 +171,21 @@ REFERENCES: Final = {
 """What is chosen here."""
 
 
-def left_open(blocks: Mapping[str, Block]) -> Numbers:
+def through(block: Block) -> Numbers:
+    """What it does to Δx if links pass through one another, cell by cell."""
+    (found,) = values_of(at_rest(block), "self_contact", True)
+    return {name: values for name, values in found.items() if name != "value"}
+
+
+def left_open(*blocks: Block) -> Numbers:
     """What each other choice does to Δx, cell by cell, beside the spread of a walk."""
     found: Numbers = {}
-    for block in blocks.values():
+    for block in blocks:
         (name,) = (axis for axis in block.axes if axis not in CELLS)
-        table, values = at_rest(block), block.axes[name].tolist()
-        here = values.index(REFERENCES[name])
-        found[name] = {
-            "reference": REFERENCES[name],
-            "spread": float(np.nanmedian(spread(table[:, :, here]))),
-            "values": [
-                {"value": value, **plain(paired(table[:, :, number], table[:, :, here]))}
-                for number, value in enumerate(values)
-                if number != here
-            ],
-        }
+        table, reference = at_rest(block), REFERENCES[name]
+        here = table.isel({name: block.axes[name].tolist().index(reference)})
+        content = {"reference": reference, "spread": float(np.nanmedian(spread(here)))}
+        found[name] = content | {"values": values_of(table, name, reference)}
     return found
 
 
@@ -216,101 +194,69 @@ def left_open(blocks: Mapping[str, Block]) -> Numbers:
 
 def rest_and_hold(block: Block) -> Numbers:
     """Differences of Δx between starts, and between holds, over the cells, with χ² of no difference at all."""
-    table = at_rest(block)
-    starts, holds = (block.axes[name].tolist() for name in ("start", "further_hold"))
-    order = [name for name in block.dims if name not in CELLS][:2]
-    if order != ["start", "further_hold"]:
-        raise ValueError(f"axes are {order}; the sweep has start and further_hold")
-    rest, spinning = starts.index("rest"), starts.index("spinning")
-    least, most = int(np.argmin(holds)), int(np.argmax(holds))
+    table, holds = at_rest(block), block.axes["further_hold"]
+    least, most = holds.min(), holds.max()
     pairs = {
-        f"rest, at once, over spinning, {holds[most]:g} s later": (
-            table[:, :, rest, least],
-            table[:, :, spinning, most],
-        ),
-        "rest over spinning, released at once": (table[:, :, rest, least], table[:, :, spinning, least]),
-        f"rest over spinning, both {holds[most]:g} s later": (table[:, :, rest, most], table[:, :, spinning, most]),
-        f"{holds[most]:g} s later over at once, rest": (table[:, :, rest, most], table[:, :, rest, least]),
-        f"{holds[most]:g} s later over at once, spinning": (table[:, :, spinning, most], table[:, :, spinning, least]),
+        f"rest, at once, over spinning, {most:g} s later": (("rest", least), ("spinning", most)),
+        "rest over spinning, released at once": (("rest", least), ("spinning", least)),
+        f"rest over spinning, both {most:g} s later": (("rest", most), ("spinning", most)),
+        f"{most:g} s later over at once, rest": (("rest", most), ("rest", least)),
+        f"{most:g} s later over at once, spinning": (("spinning", most), ("spinning", least)),
     }
-    return {name: compared(paired(*each)) for name, each in pairs.items()}
-
-
-def compared(effect: Effect) -> Numbers:
-    """Mean of the relative effects over the cells with its standard error, and χ² of no effect in any cell."""
-    known = effect.known
-    error = standard_error(effect)[known]
-    relative = effect.relative[known]
-    value = float(np.sum((relative / error) ** 2))
-    return {
-        **plain(effect),
-        "mean": float(relative.mean()),
-        "error": float(np.sqrt(np.sum(error**2)) / len(error)),
-        "chi2": value,
-        "cells": len(relative),
-        "p": float(chi2.sf(value, len(relative))),
-    }
+    found = {}
+    for name, pair in pairs.items():
+        effect = paired(*(table.sel(start=start, further_hold=hold) for start, hold in pair))
+        over = effect.cells
+        summary = {"mean": over.mean, "error": over.error, "chi2": over.chi2, "cells": len(over)}
+        found[name] = {**effect.plain, **summary, "p": float(chi2.sf(over.chi2, len(over)))}
+    return found
 
 
 # --- further sentences ---
 
-FRICTION: Final = 0.27
-"""Of the floor, in Table 1."""
+FRICTION, DAMPING = 0.27, 1000.0
+"""Of the floor and of joints, in Table 1."""
 OWN_LENGTH: Final = "links_of_12_7_mm"
 LENGTHS: Final = {"links_of_11_mm": 11.0, "links_of_15_mm": 15.0, "links_of_18_mm": 18.0}
 """Blocks with links of other lengths [mm], with the masses and inertias of their length."""
 
 
-def more(blocks: Mapping[str, Block]) -> Numbers:
+def more(*blocks: Block) -> Numbers:
     """Longer links of their mass, sliding with less friction, undamped joints, distributions at both tolerances."""
-    content: Numbers = {"lengths": {}, "sliding": {}, "undamped": {}}
-    for quantity in ("dx", "until_collapse"):
-        own = until_collapse(blocks[OWN_LENGTH]) if quantity != "dx" else at_rest(blocks[OWN_LENGTH])
-        for name, length in LENGTHS.items():
-            other = until_collapse(blocks[name]) if quantity != "dx" else at_rest(blocks[name])
-            content["lengths"].setdefault(f"{length:g}", {})[quantity] = plain(unpaired(other, own))
-    block = blocks["sliding"]
-    values = block.axes["floor_friction"].tolist()
+    known = {block.name: block for block in blocks}
+    lengths = {
+        f"{length:g}": {
+            quantity: unpaired(of(known[name]), of(known[OWN_LENGTH])).plain
+            for quantity, of in (("dx", at_rest), ("until_collapse", until_collapse))
+        }
+        for name, length in LENGTHS.items()
+    }
+    block, sliding = known["sliding"], {}
     slid = at_rest(block, "walk_time") - at_rest(block, "collapsed_at")
-    for number, value in enumerate(values):
-        if value != FRICTION:
-            content["sliding"][f"{value:g}"] = {
-                "time": plain(paired(slid[:, :, number], slid[:, :, values.index(FRICTION)])),
-                "dx": plain(paired(at_rest(block)[:, :, number], at_rest(block)[:, :, values.index(FRICTION)])),
-            }
-    block = blocks["undamped_joints"]
-    values = block.axes["joint_damping"].tolist()
-    for number, value in enumerate(values):
-        if value != 1000:
-            effect = paired(at_rest(block)[:, :, number], at_rest(block)[:, :, values.index(1000)])
-            content["undamped"][f"{value:g}"] = plain(effect)
-    return content
+    for name, table in (("time", slid), ("dx", at_rest(block))):
+        for each in values_of(table, "floor_friction", FRICTION):
+            sliding.setdefault(f"{each.pop('value'):g}", {})[name] = each
+    undamped = values_of(at_rest(known["undamped_joints"]), "joint_damping", DAMPING)
+    return {"lengths": lengths, "sliding": sliding, "undamped": {f"{each.pop('value'):g}": each for each in undamped}}
 
 
-def until_collapse(block: Block) -> Array:
+def until_collapse(block: Block) -> Cells:
     """Number of bounces before the loop collapses, or all bounces of a loop that never does."""
-    collapse, every = at_rest(block, EVENTS["collapse"]), at_rest(block, "bounces")
-    return np.where(collapse < 0, every, collapse)
+    collapse = at_rest(block, EVENTS["collapse"])
+    return xarray.where(collapse < 0, at_rest(block, "bounces"), collapse)
 
 
 def distributions(block: Block) -> list[Numbers]:
     """Of each cell: Δx at both tolerances, and whether it is of one distribution (Kolmogorov and Smirnov)."""
-    table, values = at_rest(block), block.axes["tolerance"]
-    loose, tight = int(np.argmax(values)), int(np.argmin(values))
-    found = []
-    for i, links in enumerate(block.axes["links"].tolist()):
-        for j, frequency in enumerate(block.axes["frequency"].tolist()):
-            one, two = (each[np.isfinite(each)] for each in (table[i, j, loose], table[i, j, tight]))
-            test = ks_2samp(one, two)
-            found.append(
-                {
-                    "links": links,
-                    "frequency": frequency,
-                    "distance": float(test.statistic),
-                    "p": float(test.pvalue),
-                    "means": [float(one.mean()), float(two.mean())],
-                    "sds": [float(one.std(ddof=1)), float(two.std(ddof=1))],
-                    "walks": [len(one), len(two)],
-                }
-            )
+    table, found = at_rest(block), []
+    for links in block.axes["links"].tolist():
+        for frequency in block.axes["frequency"].tolist():
+            cell = table.sel(links=links, frequency=frequency)
+            both = [cell.sel(each).dropna("sample").values for each in extremes(block)]
+            test = ks_2samp(*both)
+            content = {"links": links, "frequency": frequency}
+            content |= {"distance": float(test.statistic), "p": float(test.pvalue)}
+            content["means"] = [float(each.mean()) for each in both]
+            content["sds"] = [float(each.std(ddof=1)) for each in both]
+            found.append(content | {"walks": [len(each) for each in both]})
     return found

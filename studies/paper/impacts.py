@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Block = Any
-"""A block of `warpchain.SweepResult.blocks`."""
+from studies.common import Array, Block
+
 Motion = Any
 """The kept motion of a walk, as `Block.walk_motion` returns it."""
 

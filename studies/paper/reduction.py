@@ -10,51 +10,16 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from studies.paper.further import (
-    CELLS,
-    at_rest,
-    distributions,
-    left_open,
-    loops,
-    more,
-    nonlinear,
-    plain,
-    rest_and_hold,
-    same_loops,
-    strands,
-    through,
-    until_collapse,
-)
-from studies.paper.impacts import Block, impacts
-from studies.paper.statistics import Effect, mean, paired, spread, unpaired
+from studies.common import Block, at_rest, deviation, mean
+from studies.paper import further
+from studies.paper.further import CELLS, Cells, Numbers, extremes, until_collapse, values_of
+from studies.paper.impacts import impacts
+from studies.paper.statistics import paired, spread, unpaired
 from warpchain import InputError, Parameters, SweepResult, preset
-
-Array = NDArray[np.float64]
-Numbers = dict[str, Any]
 
 DIGITS: Final = 4
 """Significant digits that are kept."""
-
-WHOLE: Final[dict[str, tuple[str, Callable[[Mapping[str, Block]], Any]]]] = {
-    "paper_tolerance": ("tolerance", lambda blocks: tolerance(blocks["main"])),
-    "paper_shapes": ("impacts", lambda blocks: first_impacts(blocks["main"])),
-    "paper_strands": ("strands", lambda blocks: strands(blocks["start"])),
-    "paper_through": ("through", lambda blocks: through(blocks["main"])),
-    "paper_through_ellipse": ("through", lambda blocks: through(blocks["main"])),
-    "paper_open": ("left_open", left_open),
-    "paper_rest": ("rest_and_hold", lambda blocks: rest_and_hold(blocks["main"])),
-    "paper_loops": ("loops", lambda blocks: loops(blocks["main"])),
-    "paper_held": ("loops", lambda blocks: loops(blocks["main"])),
-    "paper_starts": ("same", lambda blocks: same_loops(blocks["main"])),
-    "paper_footnote": ("nonlinear", lambda blocks: nonlinear(blocks["main"])),
-    "paper_more": ("more", more),
-    "paper_distributions": ("distributions", lambda blocks: distributions(blocks["main"])),
-}
-"""Sweeps that one function reduces: name → key of its numbers, and the function."""
-SWEEPS: Final = ("paper_claims", "paper_joints", *WHOLE)
-"""Sweeps that the page is made of."""
 
 DEFAULTS: Final = {"clearance": 0.01, "phase": 0.0}
 """Scene of a walk that is not told otherwise: height of the release [m] and part of a loop period."""
@@ -84,7 +49,7 @@ def reduced(result: SweepResult) -> Numbers:
             content.setdefault("effects", {})[further[0]] = effects_of(result, block, further[0], at_rest(block))
     if result.name in WHOLE:
         key, reduce = WHOLE[result.name]
-        content[key] = reduce(result.blocks)
+        content[key] = reduce(*result.blocks.values())
     if result.name == "paper_claims":
         block, lengths = (result.blocks[name] for name in ("floor_friction", "link_length"))
         content["starts"], content["friction"] = starts(result.blocks["start"]), friction(block)
@@ -104,7 +69,7 @@ def content_digest(sweep: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
-def effects_of(result: SweepResult, block: Block, name: str, table: Array) -> Numbers:
+def effects_of(result: SweepResult, block: Block, name: str, table: Cells) -> Numbers:
     """What each value of a block's further axis `name` does to a quantity, against a reference on the axis.
 
     Raises:
@@ -113,41 +78,30 @@ def effects_of(result: SweepResult, block: Block, name: str, table: Array) -> Nu
     values, reference = block.axes[name].tolist(), _reference(result, block, name)
     if reference not in values:
         raise InputError(f"{name}: {reference} is not among {values}; give a sweep that has it")
-    before = table[:, :, values.index(reference)]
-    return {
-        "reference": reference,
-        "values": [
-            {"value": value, **plain(paired(table[:, :, number], before))}
-            for number, value in enumerate(values)
-            if value != reference
-        ],
-    }
+    return {"reference": reference, "values": values_of(table, name, reference)}
 
 
 def starts(block: Block) -> Numbers:
-    """Distances by start, their steps along both axes of the cells, and when loops first ran into themselves."""
-    table, values = at_rest(block), block.axes["start"].tolist()
-    losses = shares_of_losses(block)
-    content: Numbers = {}
-    for number, start in enumerate(values):
-        here = table[:, :, number]
-        content[start] = {
-            "count": np.isfinite(here).sum(axis=-1).tolist(),
-            "mean": mean(here).tolist(),
-            "sd": (spread(here) * mean(here)).tolist(),
-            "bounces": mean(at_rest(block, "bounces")[:, :, number]).tolist(),
-            "faster": plain(unpaired(here[:, 1:], here[:, :-1])),
-            "longer": plain(unpaired(here[1:], here[:-1])),
-        }
-        content[start]["losses"] = {name: value[:, :, number].tolist() for name, value in losses.items()}
-    return content
+    """Of each start means of Δx, bounces and losses, and the steps of Δx along both axes of the cells.
 
-
-def shares_of_losses(block: Block) -> dict[str, Array]:
-    """Mean share of each loss in the energy that a walk loses from its release to rest, cells in front."""
+    A loss is a share of the energy that a walk loses from its release to rest.
+    """
     lost = {name: at_rest(block, name) for name in block.columns if name.startswith("loss_")}
-    total = np.sum(list(lost.values()), axis=0)
-    return {name.removeprefix("loss_"): mean(each / total) for name, each in lost.items()}
+    total = np.sum([values.values for values in lost.values()], axis=0)
+    content: Numbers = {}
+    for start in block.axes["start"].tolist():
+        here, bounces = (at_rest(block, name).sel(start=start) for name in ("dx", "bounces"))
+        shares = {name.removeprefix("loss_"): mean((each / total).sel(start=start)) for name, each in lost.items()}
+        content[start] = {
+            "count": here.notnull().sum("sample").values.tolist(),
+            "mean": mean(here).tolist(),
+            "sd": deviation(here).tolist(),
+            "bounces": mean(bounces).tolist(),
+            "faster": unpaired(here.values[:, 1:], here.values[:, :-1]).plain,
+            "longer": unpaired(here.values[1:], here.values[:-1]).plain,
+            "losses": {name: share.tolist() for name, share in shares.items()},
+        }
+    return content
 
 
 def friction(block: Block) -> Numbers:
@@ -159,8 +113,7 @@ def friction(block: Block) -> Numbers:
 
 def spreads(blocks: Mapping[str, Block]) -> Numbers:
     """Relative standard deviation of Δx in each cell: everything drawn, the release alone, the parameters alone."""
-    gravity = blocks["gravity"]
-    everything = at_rest(gravity)[:, :, int(np.argmin(np.abs(gravity.axes["gravity"] - preset("soft").gravity)))]
+    everything = at_rest(blocks["gravity"]).sel(gravity=preset("soft").gravity, method="nearest")
     tables = {"both": everything, "release": at_rest(blocks["release_only"])}
     tables["parameters"] = at_rest(blocks["parameters_only"])
     return {name: spread(table).tolist() for name, table in tables.items()}
@@ -168,11 +121,10 @@ def spreads(blocks: Mapping[str, Block]) -> Numbers:
 
 def tolerance(block: Block) -> Numbers:
     """How far walks and means differ at two tolerances."""
-    table, values = at_rest(block), block.axes["tolerance"]
-    loose, tight = (table[:, :, int(end(values))] for end in (np.argmax, np.argmin))
+    values = block.axes["tolerance"]
+    loose, tight = (at_rest(block).sel(end).values for end in extremes(block))
     single = np.abs(loose / tight - 1)
     single = single[np.isfinite(single)]
-    means = paired(loose, tight)
     return {
         "loose": float(values.max()),
         "tight": float(values.min()),
@@ -181,7 +133,7 @@ def tolerance(block: Block) -> Numbers:
         "median": float(np.median(single)),
         "nine_of_ten": float(np.quantile(single, 0.9)),
         "greatest": float(single.max()),
-        "means": plain(means),
+        "means": paired(loose, tight).plain,
     }
 
 
@@ -220,17 +172,6 @@ def _reference(result: SweepResult, block: Block, name: str) -> float | str:
     return DEFAULTS[name]
 
 
-def effect_of(content: Mapping[str, Any]) -> Effect:
-    """The effect that `further.plain` wrote, with its numbers rounded; null stands for NaN."""
-    return Effect(
-        relative=np.array(content["relative"], np.float64),
-        half_width=np.array(content["half_width"], np.float64),
-        sign=np.array(content["sign"], np.int64),
-        pairs=np.array(content["pairs"], np.int64),
-        lost=int(content["lost"]),
-    )
-
-
 def rounded(content: Any) -> Any:
     """The same with floats of `DIGITS` significant digits, and None for what is no finite number."""
     if isinstance(content, Mapping):
@@ -246,3 +187,23 @@ def text_of(content: Mapping[str, Any]) -> str:
     """The numbers as a file: JSON with each list of numbers on one line."""
     text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False)
     return re.sub(r"\[[^\[\]{}]*\]", lambda match: re.sub(r"\s+", " ", match[0]), text) + "\n"
+
+
+WHOLE: Final[dict[str, tuple[str, Callable[..., Any]]]] = {
+    "paper_tolerance": ("tolerance", tolerance),
+    "paper_shapes": ("impacts", first_impacts),
+    "paper_strands": ("strands", further.strands),
+    "paper_through": ("through", further.through),
+    "paper_through_ellipse": ("through", further.through),
+    "paper_open": ("left_open", further.left_open),
+    "paper_rest": ("rest_and_hold", further.rest_and_hold),
+    "paper_loops": ("loops", further.loops),
+    "paper_held": ("loops", further.loops),
+    "paper_starts": ("same", further.same_loops),
+    "paper_footnote": ("nonlinear", further.nonlinear),
+    "paper_more": ("more", further.more),
+    "paper_distributions": ("distributions", further.distributions),
+}
+"""Sweeps that one function reduces, of its blocks: name → key of its numbers, and the function."""
+SWEEPS: Final = ("paper_claims", "paper_joints", *WHOLE)
+"""Sweeps that the page is made of."""

@@ -7,14 +7,14 @@ growth of an older one: no joint within 4 links of either has touched one within
 """
 
 from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 import warpchain
-from studies.common import read_rows, table, write_text
+from studies.common import Array, read_columns, table, write_rows
 
 RESULTS: Final = Path(__file__).parent / "results" / "separations.csv"
 LINKS: Final = (60, 90, 120, 150, 180)
@@ -37,7 +37,7 @@ def touches(walk: warpchain.WalkResult) -> Iterator[tuple[float, int, float]]:
     apart = np.abs(number[:, None] - number)
     apart = np.minimum(apart, links - apart)
     end = walk.collapsed_at if np.isfinite(walk.collapsed_at) else walk.walk_time
-    old: NDArray[np.bool_] = np.zeros((links, links), dtype=bool)
+    old: Array = np.zeros((links, links), dtype=bool)
     for time, joints in zip(walk.frame_time, walk.frame_joints, strict=True):
         if time > end:
             return
@@ -55,30 +55,17 @@ def touches(walk: warpchain.WalkResult) -> Iterator[tuple[float, int, float]]:
 def main() -> None:
     """Let all chains walk, and write each new touch."""
     rows = []
-    for links in LINKS:
-        for frequency in FREQUENCIES:
-            for phase, clearance in RELEASES:
-                walk = warpchain.walk(
-                    links=links,
-                    frequency=frequency,
-                    preset="soft",
-                    start="spinning",
-                    phase=phase,
-                    clearance=clearance,
-                    frame_interval=5e-4,
-                    walk_limit=2.5,
-                )
-                rows += [f"{links},{frequency:g},{phase:g},{t:.4f},{a},{h:.3f}" for t, a, h in touches(walk)]
-        print(f"{links} links", flush=True)
-    write_text(RESULTS, "\n".join(["links,frequency,phase,time,apart,height", *rows]) + "\n")
+    for links, frequency, (phase, clearance) in product(LINKS, FREQUENCIES, RELEASES):
+        scene = {"links": links, "frequency": frequency, "phase": phase, "clearance": clearance, "start": "spinning"}
+        walk = warpchain.walk(preset="soft", **scene, frame_interval=5e-4, walk_limit=2.5)
+        cell = {"links": links, "frequency": f"{frequency:g}", "phase": f"{phase:g}"}
+        rows += [cell | {"time": f"{t:.4f}", "apart": a, "height": f"{h:.3f}"} for t, a, h in touches(walk)]
+    write_rows(RESULTS, rows)
 
 
 def separations_tables() -> str:
     """New touches by links apart and height; and when links at least m apart first touch."""
-    rows = read_rows(RESULTS)
-    links, apart, height, time = (
-        np.array([float(row[name]) for row in rows]) for name in ("links", "apart", "height", "time")
-    )
+    links, *walk, time, apart, height = read_columns(RESULTS).values()
     groups = {
         f"at most {100 * HIGH:g} cm high": height <= HIGH,
         "higher, 60 and 90 links": (height > HIGH) & (links < 120),
@@ -89,13 +76,14 @@ def separations_tables() -> str:
         counts = (np.sum(chosen & (apart >= low) & (apart <= high)) / (high - low + 1) for low, high in BINS)
         lines.append((name, *(f"{count:.1f}" for count in counts)))
     first = table(["new touches per link apart", *(f"{low} to {high}" for low, high in BINS)], lines)
-    walks = np.array([f"{row['links']} {row['frequency']} {row['phase']}" for row in rows])
     lines = []
     for number in LINKS:
         texts = []
         for least in LEAST:
             chosen = (links == number) & (apart >= least)
-            firsts = [time[chosen & (walks == walk)].min() for walk in np.unique(walks[chosen])]
+            walks = zip(*(each[chosen] for each in walk), strict=True)
+            # touches of a walk are in order of time, so that the first of each walk is kept
+            firsts = list(dict(zip(list(walks)[::-1], time[chosen][::-1], strict=True)).values())
             most = len(firsts) > len(FREQUENCIES) * len(RELEASES) / 2
             texts.append(f"{np.median(firsts):.2f} ({len(firsts)})" if most else f"({len(firsts)})")
         lines.append((f"{number} links", *texts))

@@ -4,20 +4,19 @@ A cell is a number of links and a frequency. Values have the shape (..., samples
 NaN and take no part; what they leave is counted.
 """
 
-import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 from scipy.stats import t
 
-Array = NDArray[np.float64]
+from studies.common import Array, OverCells, deviation, mean, over_cells, standard_error
 
 CONFIDENCE: Final = 0.95
 """Confidence level of every test and interval."""
-
-_TAIL: Final = (1 + CONFIDENCE) / 2
 
 
 @dataclass(frozen=True)
@@ -34,156 +33,99 @@ class Effect:
 
     relative: Array
     half_width: Array
-    sign: NDArray[np.int64]
-    pairs: NDArray[np.int64]
+    sign: Array
+    pairs: Array
     lost: int
 
+    @classmethod
+    def of(cls, content: Mapping[str, Any]) -> "Effect":
+        """The effect that `plain` wrote, with its numbers rounded; null stands for NaN."""
+        kinds = {"relative": float, "half_width": float, "sign": int, "pairs": int}
+        return cls(**{name: np.array(content[name], kind) for name, kind in kinds.items()}, lost=int(content["lost"]))
+
     @property
-    def known(self) -> NDArray[np.bool_]:
+    def plain(self) -> dict[str, Any]:
+        """The effect as plain numbers."""
+        return {name: np.asarray(values).tolist() for name, values in vars(self).items() if name != "cells"}
+
+    def __getitem__(self, rows: Any) -> "Effect":
+        """The effect in some of the cells."""
+        return Effect(self.relative[rows], self.half_width[rows], self.sign[rows], self.pairs[rows], self.lost)
+
+    @property
+    def known(self) -> Array:
         """Cells that have an interval."""
         return np.isfinite(self.relative) & np.isfinite(self.half_width)
 
+    @cached_property
+    def cells(self) -> OverCells:
+        """All cells that could be compared together; the interval of their mean says nothing of other cells."""
+        return over_cells(self.relative, self.half_width / _factor(self.pairs - 1))
 
-@dataclass(frozen=True)
-class Summary:
-    """An effect over all cells.
+    @property
+    def count(self) -> int:
+        """Number of cells that could be compared."""
+        return len(self.cells)
 
-    Attributes:
-        cells: number of cells that could be compared.
-        rises: number of cells with a significant rise.
-        falls: number of cells with a significant fall.
-        mean: mean of the relative effects of the cells.
-        half_width: half of its 95 % interval, from the errors of the cells.
-        typical: root mean square of the relative effects without what their errors contribute.
-    """
+    @property
+    def rises(self) -> int:
+        """Number of cells with a significant rise."""
+        return int((self.sign[self.known] > 0).sum())
 
-    cells: int
-    rises: int
-    falls: int
-    mean: float
-    half_width: float
-    typical: float
+    @property
+    def falls(self) -> int:
+        """Number of cells with a significant fall."""
+        return int((self.sign[self.known] < 0).sum())
 
 
-def paired(values: Array, reference: Array) -> Effect:
+def paired(values: ArrayLike, reference: ArrayLike) -> Effect:
     """Compare the same samples after and before a change, `reference`.
 
     The sign is that of a t test of the mean difference; the interval of the ratio of the means follows from its
     linearisation.
     """
     both = np.isfinite(values) & np.isfinite(reference)
+    after, before = (np.where(both, each, np.nan) for each in (values, reference))
     pairs = both.sum(axis=-1)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        after, before = (np.where(both, each, 0.0).sum(axis=-1) / pairs for each in (values, reference))
-        ratio = after / before
-        error = _standard_error(values - reference, both)
-        ratio_error = _standard_error(values - ratio[..., np.newaxis] * reference, both) / np.abs(before)
-    factor = _factor(pairs - 1)
-    return Effect(
-        relative=np.where(pairs > 1, ratio - 1, np.nan),
-        half_width=factor * ratio_error,
-        sign=_sign(after - before, factor * error),
-        pairs=pairs,
-        lost=int((~both).sum()),
-    )
+
+    def error_of(ratio: Any) -> Any:
+        return standard_error(after - np.expand_dims(ratio, -1) * before)
+
+    return _effect(after, before, error_of, pairs - 1, pairs, int((~both).sum()))
 
 
-def unpaired(values: Array, reference: Array) -> Effect:
+@np.errstate(invalid="ignore", divide="ignore")
+def unpaired(values: ArrayLike, reference: ArrayLike) -> Effect:
     """Compare independent samples by Welch's t test."""
-    parts = []
-    with np.errstate(invalid="ignore", divide="ignore"):
-        for each in (values, reference):
-            there = np.isfinite(each)
-            count = there.sum(axis=-1)
-            parts.append((np.where(there, each, 0.0).sum(axis=-1) / count, _standard_error(each, there), count))
-        (after, after_error, after_count), (before, before_error, before_count) = parts
-        error = np.hypot(after_error, before_error)
-        freedom = error**4 / (after_error**4 / (after_count - 1) + before_error**4 / (before_count - 1))
-        ratio = after / before
-        ratio_error = np.hypot(after_error, ratio * before_error) / np.abs(before)
-    freedom = np.where(error == 0, np.minimum(after_count, before_count) - 1.0, freedom)
-    factor, pairs = _factor(freedom), np.minimum(after_count, before_count)
-    return Effect(
-        relative=np.where(pairs > 1, ratio - 1, np.nan),
-        half_width=factor * ratio_error,
-        sign=_sign(after - before, factor * error),
-        pairs=pairs,
-        lost=sum(int((~np.isfinite(each)).sum()) for each in (values, reference)),
-    )
+    both = np.asarray(values), np.asarray(reference)
+    errors, counts = [standard_error(each) for each in both], [np.isfinite(each).sum(axis=-1) for each in both]
+
+    def error_of(ratio: Any) -> Any:
+        return np.hypot(errors[0], ratio * errors[1])
+
+    pairs = np.minimum(*counts)
+    parts = (error**4 / (count - 1) for error, count in zip(errors, counts, strict=True))
+    freedom = np.where(error_of(1.0) == 0, pairs - 1.0, error_of(1.0) ** 4 / sum(parts))
+    return _effect(*both, error_of, freedom, pairs, sum(int((~np.isfinite(each)).sum()) for each in both))
 
 
-def summary(effect: Effect) -> Summary:
-    """An effect over all cells that could be compared.
-
-    The interval of the mean is that of these cells, from their walks; it says nothing of other cells.
-    """
-    known = effect.known
-    relative, sign = effect.relative[known], effect.sign[known]
-    cells = len(relative)
-    if not cells:
-        return Summary(0, 0, 0, math.nan, math.nan, math.nan)
-    error = standard_error(effect)[known]
-    return Summary(
-        cells=cells,
-        rises=int((sign > 0).sum()),
-        falls=int((sign < 0).sum()),
-        mean=float(relative.mean()),
-        half_width=float(1.96 * np.sqrt((error**2).sum()) / cells),
-        typical=float(np.sqrt(max(0.0, float((relative**2 - error**2).mean())))),
-    )
+@np.errstate(invalid="ignore", divide="ignore")
+def _effect(
+    after: Array, before: Array, error_of: Callable[[Any], Any], freedom: Array, pairs: Array, lost: int
+) -> Effect:
+    """An effect; `error_of` gives the standard error of the mean after the change less a ratio times that before it."""
+    means = mean(after), mean(before)
+    ratio, change, factor = means[0] / means[1], means[0] - means[1], _factor(freedom)
+    sign = np.where(np.abs(change) > factor * error_of(1.0), np.sign(np.nan_to_num(change)), 0).astype(np.int64)
+    half_width = factor * error_of(ratio) / np.abs(means[1])
+    return Effect(np.where(pairs > 1, ratio - 1, np.nan), half_width, sign, pairs, lost)
 
 
-def standard_error(effect: Effect) -> Array:
-    """Standard errors of the relative effects of paired comparisons."""
-    return effect.half_width / _factor(effect.pairs - 1)
-
-
-def exceeding(effect: Effect, bound: float) -> int:
-    """Number of cells whose effect is greater than a bound, up or down, with its whole interval."""
-    known = effect.known
-    return int((np.abs(effect.relative[known]) - effect.half_width[known] > bound).sum())
-
-
-def within(effect: Effect, bound: float) -> int:
-    """Number of cells whose effect is within a bound, up and down, with its whole interval."""
-    known = effect.known
-    return int((np.abs(effect.relative[known]) + effect.half_width[known] <= bound).sum())
-
-
-def mean(values: Array) -> Array:
-    """Mean over the samples of each cell, shape (...,); NaN without a walk."""
-    there = np.isfinite(values)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        means: Array = np.where(there, values, 0.0).sum(axis=-1) / there.sum(axis=-1)
-    return means
-
-
-def spread(values: Array) -> Array:
+def spread(values: ArrayLike) -> Array:
     """Standard deviation of a walk over the mean of its cell, shape (...,); NaN with fewer than two walks."""
-    there = np.isfinite(values)
-    count = there.sum(axis=-1)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        relative: Array = _standard_error(values, there) * np.sqrt(count) / mean(values)
-    return relative
-
-
-def _standard_error(values: Array, there: NDArray[np.bool_]) -> Array:
-    """Standard error of the mean of the values that are there; NaN with fewer than two."""
-    count = there.sum(axis=-1)
-    kept = np.where(there, values, 0.0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        deviation = np.where(there, kept - (kept.sum(axis=-1) / count)[..., np.newaxis], 0.0)
-        error: Array = np.sqrt((deviation**2).sum(axis=-1) / (count - 1) / count)
-    return np.where(count > 1, error, np.nan)
+    return np.asarray(deviation(values) / mean(values))
 
 
 def _factor(freedom: Any) -> Array:
     """Half-width of a 95 % interval over the standard error; NaN without a degree of freedom."""
-    return t.ppf(_TAIL, np.where(np.asarray(freedom) > 0, freedom, np.nan))
-
-
-def _sign(difference: Array, half_width: Array) -> NDArray[np.int64]:
-    """Sign of a difference that is significant, 0 of another and where there is no interval."""
-    with np.errstate(invalid="ignore"):
-        significant = np.abs(difference) > half_width
-    return np.where(significant, np.sign(np.nan_to_num(difference)), 0).astype(np.int64)
+    return t.ppf((1 + CONFIDENCE) / 2, np.where(np.asarray(freedom) > 0, freedom, np.nan))

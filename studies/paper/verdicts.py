@@ -66,11 +66,6 @@ def direction(with_claim: int, against: int, comparisons: int) -> Verdict:
     return Verdict.PART if in_part else Verdict.DIFFERS
 
 
-def smallness(exceeding: int, comparisons: int) -> Verdict:
-    """A claim that an effect is small; `exceeding` comparisons are greater than its bound with their whole interval."""
-    return share(comparisons - exceeding, comparisons)
-
-
 def share(fulfilled: int, cases: int) -> Verdict:
     """A claim about every case: agrees if nearly all fulfil it, in part if at least half do."""
     if not cases:

@@ -6,19 +6,20 @@ the diagram share their deviations. Everything is of ln Δx, every cell counts a
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from studies.common import Array, Columns
 from studies.common import table as markdown
 from studies.phase_diagram import laws, scales
 from studies.phase_diagram.laws import Points
 
-Array = NDArray[Any]
 Prediction = Callable[[Points], Array]
 """ln Δx of cells."""
+Fit = Callable[[Points], tuple[Array, Prediction]]
+"""Cells → the numbers of a law, and what it predicts."""
 
 TIME: Final = scales.NORMAL_TIME
 """τ = (R/g)^½ [s]."""
@@ -34,15 +35,15 @@ class Candidate:
     Attributes:
         name: in the table.
         numbers: how many are fitted.
-        fit: cells → its numbers, and what it predicts.
+        fit: of the law to cells.
     """
 
     name: str
     numbers: int
-    fit: Callable[[Points], tuple[Array, Prediction]]
+    fit: Fit
 
 
-def sum_of_powers(power: float | None) -> Callable[[Points], tuple[Array, Prediction]]:
+def sum_of_powers(power: float | None) -> Fit:
     """Fits Δx = a vτ + b nℓ (vτ/nℓ)^p, with p given or fitted; its numbers are a, b and p."""
 
     def distance(numbers: Array, speed: Array, length: Array) -> Array:
@@ -61,56 +62,60 @@ def sum_of_powers(power: float | None) -> Callable[[Points], tuple[Array, Predic
     return fit
 
 
-def spline(variable: float | None, power: float | None) -> Callable[[Points], tuple[Array, Prediction]]:
-    """Fits the spline of Δx/n^d over ν n^c; c and d given or fitted; its numbers are c and d."""
+def spline_of(variable: Prediction, unit: Prediction) -> Fit:
+    """Fits the spline of Δx in a unit over a variable; no further numbers."""
 
     def fit(points: Points) -> tuple[Array, Prediction]:
-        c, d = variable, power
-        if c is None and d is None:
-            c, d = laws.best_powers(points, (-1.1, 1.1))
-        elif c is None:
-            c = laws.best_variable(points)
-        assert c is not None and d is not None
-        curve = laws.master_curve(points.frequency * points.links**c, points.distance / points.links**d)
-        return np.array([c, d]), lambda others: curve(others.frequency * others.links**c) + d * np.log(others.links)
+        curve = laws.master_curve(variable(points), points.distance / unit(points))
+        return np.array([]), lambda others: curve(variable(others)) + np.log(unit(others))
 
     return fit
 
 
-def hanging_loop(points: Points) -> tuple[Array, Prediction]:
-    """Fits the spline of Δx/H over v²/(g H), H the height of the hanging loop; no further numbers."""
-    curve = laws.master_curve(points.speed**2 / points.hanging, points.distance / points.hanging)
-    return np.array([]), lambda others: curve(others.speed**2 / others.hanging) + np.log(others.hanging)
+def spline(c: float, d: float) -> Fit:
+    """Fits the spline of Δx/n^d over ν n^c."""
+    return spline_of(lambda points: points.frequency * points.links**c, lambda points: points.links**d)
+
+
+def fitted_spline(powers: Callable[[Points], tuple[float, float]]) -> Fit:
+    """Fits that spline with c and d that are found first; its numbers are c and d."""
+
+    def fit(points: Points) -> tuple[Array, Prediction]:
+        found = powers(points)
+        return np.array(found), spline(*found)(points)[1]
+
+    return fit
 
 
 def power_law(points: Points) -> tuple[Array, Prediction]:
     """Fits Δx ∝ ν^p n^q; its numbers are p and q."""
-    p, q = laws.power_law(points)
-    shift = float(np.mean(np.log(points.distance) - p * np.log(points.frequency) - q * np.log(points.links)))
+    p, q, shift = laws.power_law(points.distance, points.frequency, points.links)[0]
     return np.array([p, q]), lambda others: shift + p * np.log(others.frequency) + q * np.log(others.links)
 
 
-SQUARE, FREE = "a vτ + b (vτ)²/(nℓ)", "a vτ + b nℓ (vτ/nℓ)^p"
-TURNS = "spline of Δx/(nℓ) over v/(nℓ)"
+def residual(points: Points, candidate: Candidate) -> Array:
+    """ln Δx of cells less what a law says that is fitted to them."""
+    return np.log(points.distance) - candidate.fit(points)[1](points)
+
+
+HANGING: Final = spline_of(lambda points: points.speed**2 / points.hanging, lambda points: points.hanging)
+"""Of Δx/H over v²/(g H), H the height of the hanging loop."""
 CANDIDATES: Final = (
-    Candidate(SQUARE, 2, sum_of_powers(2.0)),
-    Candidate(FREE, 3, sum_of_powers(None)),
-    Candidate(TURNS, laws.NUMBERS, spline(-1.0, 1.0)),
-    Candidate("spline, c fitted", laws.NUMBERS + 1, spline(None, 1.0)),
-    Candidate("spline, c and d fitted", laws.NUMBERS + 2, spline(None, None)),
+    Candidate("a vτ + b (vτ)²/(nℓ)", 2, sum_of_powers(2.0)),
+    Candidate("a vτ + b nℓ (vτ/nℓ)^p", 3, sum_of_powers(None)),
+    Candidate("spline of Δx/(nℓ) over v/(nℓ)", laws.NUMBERS, spline(-1.0, 1.0)),
+    Candidate("spline, c fitted", laws.NUMBERS + 1, fitted_spline(lambda points: (laws.best_variable(points), 1.0))),
+    Candidate(
+        "spline, c and d fitted", laws.NUMBERS + 2, fitted_spline(lambda points: laws.best_powers(points, (-1.1, 1.1)))
+    ),
     Candidate("Δx ∝ ν^p n^q", 3, power_law),
     Candidate("spline of Δx/(nℓ) over v²/(g nℓ)", laws.NUMBERS, spline(-0.5, 1.0)),
     Candidate("spline of Δx/(nℓ) over ν²ℓ/g", laws.NUMBERS, spline(0.0, 1.0)),
-    Candidate("spline of Δx/H over v²/(g H)", laws.NUMBERS, hanging_loop),
+    Candidate("spline of Δx/H over v²/(g H)", laws.NUMBERS, HANGING),
     Candidate("spline of Δx/ℓ over v²/(g nℓ)", laws.NUMBERS, spline(-0.5, 0.0)),
     Candidate("spline of Δx/ℓ over ν²ℓ/g", laws.NUMBERS, spline(0.0, 0.0)),
 )
 """With a fixed drop h, its Froude number v²/(g h) is ν²ℓ/g but for a constant, and so is v²/(g R)."""
-
-
-def root_mean_square(left: Array) -> float:
-    """In per cent."""
-    return float(100 * np.sqrt(np.mean(left**2)))
 
 
 def left_out(points: Points, candidate: Candidate, block: str) -> Array:
@@ -133,7 +138,7 @@ def block_errors(points: Points, candidate: Candidate, block: str) -> Array:
     return np.std(found, axis=0, ddof=1)
 
 
-def ranges(cells: Mapping[str, Array]) -> dict[str, Points]:
+def ranges(cells: Columns) -> dict[str, Points]:
     """The cells whose law is asked for, by name."""
     points = laws.points_of(cells)
     return {
@@ -144,15 +149,15 @@ def ranges(cells: Mapping[str, Array]) -> dict[str, Points]:
     }
 
 
-def table(cells: Mapping[str, Array], varied: scales.Cells) -> str:
+def table(cells: Columns, varied: scales.Cells) -> str:
     """Markdown: what each law leaves, and what it leaves of blocks that it has not seen; then numbers with errors."""
     known = ranges(cells)
     rows = []
     for candidate in CANDIDATES:
         row = [candidate.name, str(candidate.numbers)]
         for points in known.values():
-            own = root_mean_square(np.log(points.distance) - candidate.fit(points)[1](points))
-            others = [root_mean_square(left_out(points, candidate, block)) for block in BLOCKS]
+            own = laws.root_mean_square(residual(points, candidate))
+            others = [laws.root_mean_square(left_out(points, candidate, block)) for block in BLOCKS]
             row.append(f"{own:.1f} / {others[0]:.1f} / {others[1]:.1f}")
         rows.append(row)
     heads = (f"{name} ({len(points.links)} cells)" for name, points in known.items())
@@ -189,24 +194,19 @@ def beyond(points: Points, varied: scales.Cells) -> str:
         a, b, p = candidate.fit(points)[0]
         left = np.log(varied.lengths) - np.log(a * reach / length + b * (reach / length) ** p)
         groups = ", ".join(
-            f"{root_mean_square(left[varied.varied(word)]):.0f} % ({name})" for word, (name, _) in scales.BLOCKS.items()
+            f"{laws.root_mean_square(left[varied.varied(word)]):.0f} % ({name})" for word, name in scales.BLOCKS.items()
         )
-        parts.append(f"{candidate.name} leaves {root_mean_square(left):.0f} %: {groups}")
+        parts.append(f"{candidate.name} leaves {laws.root_mean_square(left):.0f} %: {groups}")
     return f"Of the {len(length)} cells with other g, R and ℓ, to which nothing is fitted, {'; '.join(parts)}."
 
 
-def walking_time(cells: Mapping[str, Array]) -> str:
+def walking_time(cells: Columns) -> str:
     """Markdown: walking time and mean speed as powers of v and L = nℓ, with what they leave."""
-    used = (cells["at_rest"] > 0) & (cells["walks"] - cells["at_rest"] <= laws.MOST_FAILED * cells["walks"])
-    points = laws.points_of(cells)
-    duration = cells["walk_time_mean"][used & (cells["dx_mean"] > 0)]
-    rows = []
-    papers = laws.in_papers_range(points.links, points.frequency)
-    for name, chosen in (("all", points.links > 0), ("the paper's range", papers)):
-        design = np.stack([np.ones(chosen.sum()), np.log(points.speed[chosen]), np.log(points.length[chosen])], axis=1)
-        mean_speed = points.distance[chosen] / duration[chosen] / points.speed[chosen]
-        for quantity, values in (("walking time", duration[chosen]), ("mean speed over v", mean_speed)):
-            weights = np.linalg.lstsq(design, np.log(values), rcond=None)[0]
-            left = root_mean_square(np.log(values) - design @ weights)
-            rows.append((quantity, name, f"v^{weights[1]:.2f} L^{weights[2]:.2f}", f"{left:.1f} %"))
+    every, rows = laws.points_of(cells), []
+    papers = laws.in_papers_range(every.links, every.frequency)
+    for name, points in (("all", every), ("the paper's range", every[papers])):
+        mean_speed = points.distance / points.duration / points.speed
+        for quantity, values in (("walking time", points.duration), ("mean speed over v", mean_speed)):
+            (v, length, _), left = laws.power_law(values, points.speed, points.length)
+            rows.append((quantity, name, f"v^{v:.2f} L^{length:.2f}", f"{laws.root_mean_square(left):.1f} %"))
     return markdown(("quantity", "cells", "∝", "leaves"), rows)

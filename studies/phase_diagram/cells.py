@@ -1,18 +1,16 @@
 """Reduces parts of the sweep ``phase_diagram`` to statistics of its cells: the rows of results/cells.csv."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from studies.common import read_rows
+from studies.common import Array, Columns, deviation, mean, of_cells, standard_error
 from studies.phase_diagram.endings import Ending, endings
 from warpchain import InputError, Status, SweepResult
 
-Array = NDArray[Any]
 Cell = tuple[int, float]
 """Links, frequency [Hz]."""
 
@@ -48,12 +46,10 @@ def walks_by_cell(parts: Sequence[SweepResult], names: Sequence[str] = COLUMNS) 
         if part.sweep["seed"] in [other.sweep["seed"] for other in parts[:number]]:
             raise InputError(f"{part.name}: walks of another part, the seed is the same; leave one out")
         for block in part.blocks.values():
-            order = [list(block.axes).index(axis) for axis in ("links", "frequency")] + [2]
-            columns = {name: block.columns[name].transpose(order) for name in names}
-            for i, links in enumerate(block.axes["links"]):
-                for j, frequency in enumerate(block.axes["frequency"]):
-                    walks = {name: column[i, j] for name, column in columns.items()}
-                    found.setdefault((int(links), float(frequency)), []).append(walks)
+            for place, values in of_cells(block):
+                at = dict(zip(block.axes, values, strict=True))
+                walks = {name: block.columns[name][place] for name in names}
+                found.setdefault((int(at["links"]), float(at["frequency"])), []).append(walks)
     return {
         cell: {name: np.concatenate([walks[name] for walks in cells]) for name in cells[0]}
         for cell, cells in sorted(found.items())
@@ -70,55 +66,35 @@ def settings_of(result: SweepResult) -> str:
     return json.dumps([same, result.provenance["numerics_version"]], sort_keys=True)
 
 
-def reduced(links: int, frequency: float, walks: Mapping[str, Array]) -> dict[str, float]:
+def reduced(links: int, frequency: float, walks: Columns) -> dict[str, float]:
     """Statistics of one cell: a row of the file. NaN where there are too few walks."""
     status = walks["status"]
     rest = status == Status.AT_REST
     dx, codes = walks["dx"][rest].astype(float), endings(walks)[rest]
-    count = len(dx)
     attempts = (_known(walks["steps_accepted"]) + _known(walks["steps_rejected"]))[status != MISSING]
-    deciles = np.quantile(dx, [0.1, 0.5, 0.9]) if count else np.full(3, np.nan)
-    row: dict[str, float] = {
+    deciles = np.quantile(dx, [0.1, 0.5, 0.9]) if len(dx) else np.full(3, np.nan)
+    return {
         "links": links,
         "frequency": frequency,
         "walks": int((status != MISSING).sum()),
         "missing": int((status == MISSING).sum()),
-        "at_rest": count,
+        "at_rest": len(dx),
         **{code.label: int((status == code).sum()) for code in FAILURES},
         "told": int((codes != Ending.UNKNOWN).sum()),
         "flight_told": int(np.isfinite(walks["flight_before_collapse"][rest]).sum()),
         "inaccurate": int((walks["energy_error"][rest] > MOST_ENERGY_ERROR).sum()),
-        "dx_mean": _mean(dx),
-        "dx_sd": _sd(dx),
-        "dx_se": _sd(dx) / np.sqrt(count) if count > 1 else np.nan,
+        "dx_mean": float(mean(dx)),
+        "dx_sd": float(deviation(dx)),
+        "dx_se": float(standard_error(dx)),
         **dict(zip(("dx_10", "dx_50", "dx_90"), map(float, deciles), strict=True)),
-        **{f"{name}_mean": _mean(_known(walks[name])[rest]) for name in AVERAGED},
-        "bounces_sd": _sd(_known(walks["bounces"])[rest]),
-        "attempts_mean": _mean(attempts),
+        **{f"{name}_mean": float(mean(_known(walks[name])[rest])) for name in AVERAGED},
+        "bounces_sd": float(deviation(_known(walks["bounces"])[rest])),
+        "attempts_mean": float(mean(attempts)),
         **{way.label: int((codes == way).sum()) for way in WAYS},
-        **{f"dx_{way.label}": _mean(dx[codes == way]) for way in WAYS},
+        **{f"dx_{way.label}": float(mean(dx[codes == way])) for way in WAYS},
     }
-    return row
 
 
 def _known(values: Array) -> Array:
     """As floats, NaN where a number is missing."""
     return np.where(values == MISSING, np.nan, values)
-
-
-def _mean(values: Array) -> float:
-    """Mean of what is not NaN; NaN of nothing."""
-    known = values[np.isfinite(values)]
-    return float(known.mean()) if len(known) else float("nan")
-
-
-def _sd(values: Array) -> float:
-    """Standard deviation of what is not NaN; NaN of fewer than two."""
-    known = values[np.isfinite(values)]
-    return float(known.std(ddof=1)) if len(known) > 1 else float("nan")
-
-
-def read_csv(path: Path = CSV) -> dict[str, Array]:
-    """The columns of the file, shape (cells,) each."""
-    rows = read_rows(path)
-    return {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}

@@ -4,13 +4,12 @@ Every walk that is at rest has one ending. Its loop collapses when it first encl
 release; `bounces_before_collapse` says in which bounce, counted from 1.
 """
 
-from collections.abc import Mapping
 from enum import IntEnum
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studies.common import Array, Columns
 from warpchain import Status
 
 IN_FLIGHT: Final = 0.01
@@ -48,7 +47,7 @@ _MEANINGS: Final[dict[Ending, str]] = {
 }
 
 
-def endings(columns: Mapping[str, NDArray[Any]]) -> NDArray[np.int8]:
+def endings(columns: Columns) -> Array:
     """The ending of each walk, as codes of `Ending`.
 
     Args:

@@ -5,18 +5,16 @@ own power is a part of F. F is a cubic spline, fitted to ln Δx/(nℓ) by least 
 residual of the law, in per cent of Δx.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.optimize import minimize, minimize_scalar
 
+from studies.common import Array, Columns
 from warpchain import preset
-
-Array = NDArray[Any]
 
 PARAMETERS: Final = preset("soft")
 LINK_LENGTH: Final = PARAMETERS.link_length
@@ -45,16 +43,21 @@ def in_papers_range(links: Array, frequency: Array) -> Array:
 
 @dataclass(frozen=True)
 class Points:
-    """Cells as the laws take them, shape (cells,) each: links, speed of the loop [m/s], mean Δx [m]."""
+    """Cells as the laws take them, shape (cells,) each: links, frequency [Hz], mean Δx [m], walking time [s]."""
 
     links: Array
     frequency: Array
-    speed: Array
     distance: Array
+    duration: Array
 
     def __getitem__(self, chosen: Array) -> "Points":
         """Some of the cells."""
-        return Points(self.links[chosen], self.frequency[chosen], self.speed[chosen], self.distance[chosen])
+        return Points(*(values[chosen] for values in vars(self).values()))
+
+    @property
+    def speed(self) -> Array:
+        """Speed of the loop [m/s]."""
+        return 2 * np.pi * RADIUS * self.frequency
 
     @property
     def length(self) -> Array:
@@ -67,12 +70,11 @@ class Points:
         return 2 * RADIUS + np.maximum(self.length / 2 - np.pi * RADIUS, 0.0)
 
 
-def points_of(cells: Mapping[str, Array]) -> Points:
+def points_of(cells: Columns) -> Points:
     """The cells that have a mean, and few enough failures."""
     failed = cells["walks"] - cells["at_rest"]
     used = (cells["at_rest"] > 0) & (failed <= MOST_FAILED * cells["walks"]) & (cells["dx_mean"] > 0)
-    frequency = cells["frequency"][used]
-    return Points(cells["links"][used], frequency, 2 * np.pi * RADIUS * frequency, cells["dx_mean"][used])
+    return Points(*(cells[name][used] for name in ("links", "frequency", "dx_mean", "walk_time_mean")))
 
 
 def master_curve(x: Array, y: Array) -> Callable[[Array], Array]:
@@ -101,49 +103,34 @@ def rms_residual(x: Array, y: Array) -> float:
     return root_mean_square(residuals(x, y), NUMBERS)
 
 
-def best_variable(points: Points, power: float = 1.0) -> float:
-    """Exponent c of x = ν n^c with the least residual of Δx/n^power."""
-    y = points.distance / points.links**power
+def residual_of(points: Points, c: float, d: float) -> float:
+    """Residual of Δx/n^d over ν n^c."""
+    return rms_residual(points.frequency * points.links**c, points.distance / points.links**d)
 
-    def cost(c: float) -> float:
-        return rms_residual(points.frequency * points.links**c, y)
 
+def best_variable(points: Points) -> float:
+    """Exponent c of x = ν n^c with the least residual of Δx/n."""
     starts = np.linspace(-1.5, 1.0, 26)
-    first = starts[int(np.argmin([cost(c) for c in starts]))]
-    return float(minimize_scalar(cost, bounds=(first - 0.1, first + 0.1), method="bounded", options={"xatol": 1e-4}).x)
+    first = starts[int(np.argmin([residual_of(points, c, 1.0) for c in starts]))]
+    settings = {"bounds": (first - 0.1, first + 0.1), "method": "bounded", "options": {"xatol": 1e-4}}
+    return float(minimize_scalar(lambda c: residual_of(points, c, 1.0), **settings).x)
 
 
-def best_powers(points: Points, start: tuple[float, float] | None = None) -> tuple[float, float]:
-    """Exponents (c, d) of Δx/n^d over ν n^c with the least residual."""
-    if start is None:
-        powers = np.linspace(-1.0, 2.0, 13)
-        variables = [best_variable(points, power) for power in powers]
-        costs = [
-            rms_residual(points.frequency * points.links**c, points.distance / points.links**d)
-            for c, d in zip(variables, powers, strict=True)
-        ]
-        at = int(np.argmin(costs))
-        start = variables[at], float(powers[at])
-
-    def cost(exponents: Array) -> float:
-        c, d = exponents
-        return rms_residual(points.frequency * points.links**c, points.distance / points.links**d)
-
-    found = minimize(cost, start, method="Nelder-Mead", options={"xatol": 1e-4, "fatol": 1e-5})
+def best_powers(points: Points, start: tuple[float, float]) -> tuple[float, float]:
+    """Exponents (c, d) of Δx/n^d over ν n^c with the least residual near a start."""
+    options = {"xatol": 1e-4, "fatol": 1e-5}
+    found = minimize(lambda powers: residual_of(points, *powers), start, method="Nelder-Mead", options=options)
     return float(found.x[0]), float(found.x[1])
 
 
-def power_law(points: Points) -> tuple[float, float]:
-    """Exponents (p, q) of Δx ∝ ν^p n^q."""
-    _, p, q = np.linalg.lstsq(_logarithms(points), np.log(points.distance), rcond=None)[0]
-    return float(p), float(q)
+def power_law(values: Array, *factors: Array) -> tuple[Array, Array]:
+    """Exponents of the factors in values ∝ a product of powers, last the logarithm of what it is ∝ to; ln residuals."""
+    design = np.log(np.stack([*factors, np.full(len(values), np.e)], axis=1))
+    weights = np.linalg.lstsq(design, np.log(values), rcond=None)[0]
+    return weights, np.log(values) - design @ weights
 
 
-def _logarithms(points: Points) -> Array:
-    return np.stack([np.ones(len(points.links)), np.log(points.frequency), np.log(points.links)], axis=1)
-
-
-def root_mean_square(left: Array, numbers: int) -> float:
+def root_mean_square(left: Array, numbers: int = 0) -> float:
     """Root mean square in per cent of residuals that a fit of so many numbers leaves."""
     return float(100 * np.sqrt(np.sum(left**2) / max(len(left) - numbers, 1)))
 

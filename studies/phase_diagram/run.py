@@ -9,17 +9,102 @@ Parts are folders of ``warpchain sweep``. They have other seeds; they may be unf
 Without a folder it takes one to two minutes.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Final
 
+import numpy as np
 import typer
 
 import warpchain
-from studies.common import read_rows, run_study, write_rows, write_tables
-from studies.phase_diagram import candidates, cells, drawing, scales, strands
-from studies.phase_diagram.tables import TABLES
+from studies.common import Array, Columns, publish, read_columns, run_study, table, write_rows
+from studies.phase_diagram import candidates, cells, drawing, laws, scales, strands
+from studies.phase_diagram.cells import FAILURES, WAYS
+from studies.phase_diagram.endings import Ending
 
 FOLDER: Final = Path(__file__).parent
+FEW: Final = 100
+"""Walks that each of two groups has in a cell in which they are compared, at least."""
+
+
+def table_of_cells(cells: Columns) -> str:
+    """Markdown: Δx ± s.d. for some links and frequencies."""
+    shown_links, shown_frequencies = chosen(cells["links"]), chosen(cells["frequency"])
+    rows = []
+    for links in shown_links:
+        at = ((cells["links"] == links) & (cells["frequency"] == frequency) for frequency in shown_frequencies)
+        texts = (text_of_cell({name: float(column[here][0]) for name, column in cells.items()}) for here in at)
+        rows.append([f"{links:g}", *texts])
+    return table(("links", *(f"{frequency:g} Hz" for frequency in shown_frequencies)), rows)
+
+
+def text_of_cell(cell: Mapping[str, float]) -> str:
+    """Mean ± standard deviation, and the share that failed if any did."""
+    failed = 1 - cell["at_rest"] / cell["walks"]
+    text = "–" if np.isnan(cell["dx_mean"]) else f"{cell['dx_mean']:.3g} ± {cell['dx_sd']:.2g}"
+    return text if failed == 0 else f"{text} ({100 * failed:.3g} % failed)"
+
+
+def chosen(values: Array) -> Array:
+    """About six of the values that occur, evenly spread, the first and the last among them."""
+    known = np.unique(values)
+    return known[np.unique(np.linspace(0, len(known) - 1, 6).round().astype(int))]
+
+
+def over_others(cells: Columns, way: Ending) -> Array:
+    """Mean Δx of walks that ended in a way over that of the others of their cell; NaN where either are few."""
+    numbers = np.array([cells[each.label] for each in WAYS])
+    distances = numbers * np.nan_to_num([cells[f"dx_{each.label}"] for each in WAYS])
+    at = WAYS.index(way)
+    others, far = numbers.sum(axis=0) - numbers[at], np.delete(distances, at, axis=0).sum(axis=0)
+    compared = (numbers[at] >= FEW) & (others >= FEW)
+    ratio = np.full(len(compared), np.nan)
+    np.divide(distances[at] * others, far * numbers[at], out=ratio, where=compared)
+    return ratio
+
+
+def text_of_ratios(ratios: Array) -> str:
+    """Their mean over cells, and the least and the greatest."""
+    known = ratios[np.isfinite(ratios)]
+    if len(known) < 2:
+        return f"{known[0]:.3f} (one cell)" if len(known) else ""
+    return f"{known.mean():.3f} ({known.min():.2f} to {known.max():.2f}, {len(known)} cells)"
+
+
+def table_of_endings(cells: Columns) -> str:
+    """Markdown: share of each ending among all walks at rest, where it is the most frequent one, how far they went."""
+    counts = np.stack([cells[way.label] for way in WAYS], axis=1)
+    most = np.where(counts.sum(axis=1) > 0, counts.argmax(axis=1), -1)
+    inside, flights, rows = laws.in_papers_range(cells["links"], cells["frequency"]), cells["flight_told"].sum(), []
+    for number, way in enumerate(WAYS):
+        # without the time since the last impulse a collapse in flight counts as one of its bounce
+        share = counts[:, number].sum() / (flights if way is Ending.IN_FLIGHT else counts.sum())
+        ratios = over_others(cells, way)
+        texts = (text_of_ratios(ratios[where]) for where in (inside, ~inside))
+        rows.append([way.meaning, f"{100 * share:.2g} %", f"{np.sum(most == number)}", *texts])
+    text = f"{counts.sum():,.0f} walks of which this is known; a collapse in flight is known of {flights:,.0f} of them."
+    head = ("way of ending", "share", "cells where it is the most frequent", "Δx, paper's range", "elsewhere")
+    return "\n\n".join([table(head, rows), text])
+
+
+def table_of_failures(cells: Columns) -> str:
+    """Markdown: walks by status."""
+    walks = cells["walks"].sum()
+    rows = []
+    for name in ("at_rest", *(code.label for code in FAILURES), "missing"):
+        number = cells[name]
+        if number.sum() == 0 and name != "at_rest":
+            continue
+        there = number > 0
+        where = "" if there.all() else f"{span(cells['links'][there])} links, {span(cells['frequency'][there])} Hz"
+        rows.append((f"`{name}`", f"{number.sum():,.0f}", f"{there.sum()}", where))
+    return f"{table(('status', 'walks', 'cells', 'where'), rows)}\n\n{walks:,.0f} walks in {len(cells['links'])} cells."
+
+
+def span(values: Array) -> str:
+    """The least and the greatest of some values."""
+    least, greatest = (f"{value:g}" for value in (values.min(), values.max()))
+    return least if least == greatest else f"{least} to {greatest}"
 
 
 def make(
@@ -30,26 +115,19 @@ def make(
     """Reduce the sweeps that are given into the committed files; then draw and write all that is in them."""
     if parts:
         walks = cells.walks_by_cell([warpchain.load(path) for path in parts])
-        write_rows(cells.CSV, [cells.reduced(*cell, columns) for cell, columns in walks.items()])
+        write_rows(cells.CSV, (cells.reduced(*cell, columns) for cell, columns in walks.items()))
     if scaling is not None:
         write_rows(scales.CSV, scales.reduced(warpchain.load(scaling)))
     if meetings:
-        write_rows(strands.CSV, list(strands.reduced([warpchain.load(path) for path in meetings])))
-    found = cells.read_csv()
-    varied, curve = scales.Cells(read_rows(scales.CSV)), scales.Curve(found)
-    tables = (
-        {name: render(found) for name, render in TABLES.items()}
-        | {
-            "scales": scales.table(varied, curve),
-            "candidates": candidates.table(found, varied),
-            "walking time": candidates.walking_time(found),
-        }
-        | strands.tables(cells.read_csv(strands.CSV), found)
-    )
-    write_tables(FOLDER / "README.md", tables)
-    drawing.draw_maps(found, FOLDER / "figures" / "maps.png")
-    drawing.draw_laws(found, FOLDER / "figures" / "laws.png")
-    scales.draw(varied, curve, FOLDER / "figures" / "scales.png")
+        write_rows(strands.CSV, strands.reduced([warpchain.load(path) for path in meetings]))
+    found, varied = read_columns(cells.CSV), scales.Cells()
+    curve = scales.Curve(found)
+    tables = {"cells": table_of_cells(found), "failures": table_of_failures(found), "endings": table_of_endings(found)}
+    tables |= {"scales": scales.table(varied, curve), "candidates": candidates.table(found, varied)}
+    tables |= {"walking time": candidates.walking_time(found)}
+    tables |= strands.tables(read_columns(strands.CSV), found)
+    figures = {"maps": drawing.draw_maps(found), "laws": drawing.draw_laws(found), "scales": scales.draw(varied, curve)}
+    publish(FOLDER, tables, figures)
 
 
 if __name__ == "__main__":

@@ -4,22 +4,18 @@ Walks of one cell are compared: those whose strands met by their second bounce, 
 what is drawn held: Δx as a linear function of it, of sine and cosine of the phase, and of the early meeting.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from studies.common import DRAWN, drawn_terms
+from studies.common import DRAWN, Array, Columns, drawn_terms, mean, minus, over_cells, standard_error
 from studies.common import table as markdown
 from studies.phase_diagram import laws
 from studies.phase_diagram.cells import walks_by_cell
 from studies.phase_diagram.endings import Ending, endings
 from warpchain import Status, SweepResult
-
-Array = NDArray[Any]
-Cells = Mapping[str, Array]
 
 CSV: Final = Path(__file__).parent / "results" / "strands.csv"
 EVENTS: Final = {"crease": "self_contact", "strands": "strands_met", "collapse": "collapse"}
@@ -51,15 +47,10 @@ def reduced(parts: Sequence[SweepResult]) -> Iterator[dict[str, float | str]]:
         met, collapse = at_rest["bounces_before_strands_met"], at_rest["bounces_before_collapse"]
         before = at_rest["strands_met_at"] <= at_rest["collapsed_at"]
         when = np.where(before & (met < collapse), 0, np.where(before, 1, 2))
-        ways, dx = endings(at_rest), at_rest["dx"]
+        ways, dx, walked = endings(at_rest), at_rest["dx"], int((walks["status"] >= 0).sum())
         terms = drawn_terms(at_rest) if len(dx) else []
-        row: dict[str, float | str] = {
-            "links": links,
-            "frequency": frequency,
-            "walks": int((walks["status"] >= 0).sum()),
-        }
-        row |= {"at_rest": int(rest.sum()), "dx": float(dx.mean()) if len(dx) else np.nan}
-        row["se"] = float(dx.std(ddof=1) / np.sqrt(len(dx))) if len(dx) > 1 else np.nan
+        row: dict[str, float | str] = {"links": links, "frequency": frequency, "walks": walked}
+        row |= {"at_rest": int(rest.sum()), "dx": float(mean(dx)), "se": float(standard_error(dx))}
         row |= _early(dx, (met >= 0) & (met <= EARLY), terms)
         for bounce in OTHERWISE:
             found = _early(dx, (met >= 0) & (met <= bounce), terms)
@@ -91,19 +82,14 @@ def _early(dx: Array, early: Array, terms: Sequence[Array]) -> dict[str, float]:
 
 def _over_cells(values: Array, errors: Array, digits: int = 1) -> tuple[str, str, str, str]:
     """Mean over cells ± its standard error in per cent, χ² of none, of one difference, cells that rise, that fall."""
-    known = np.isfinite(values) & (errors > 0)
-    values, errors = values[known], errors[known]
-    if not len(values):
+    over = over_cells(100 * values, 100 * np.where(errors > 0, errors, np.nan))
+    if not len(over):
         return "", "", "", ""
-    weight = errors**-2
-    one = float(np.sum(weight * (values - np.sum(weight * values) / weight.sum()) ** 2))
-    mean, error, sizes = 100 * values.mean(), 100 * np.sqrt(np.sum(errors**2)) / len(values), values / errors
-    rise, fall = np.sum(sizes > 1.96), np.sum(sizes < -1.96)
-    texts = f"{mean:+.{digits}f} ± {error:.{digits}f} %", f"{np.sum(sizes**2):.0f} of {len(values)}"
-    return *texts, f"{one:.0f} of {len(values) - 1}", f"{rise}, {fall}"
+    texts = over.text(digits), f"{over.chi2:.0f} of {len(over)}", f"{over.chi2_of_one:.0f} of {len(over) - 1}"
+    return *texts, f"{over.rises}, {over.falls}"
 
 
-def shares(cells: Cells) -> str:
+def shares(cells: Columns) -> str:
     """Markdown: after how many bounces loops crease, strands meet and loops collapse, by links; early against late."""
     inside = (cells["frequency"] >= 5) & (cells["frequency"] <= 30)
     rows = []
@@ -119,14 +105,11 @@ def shares(cells: Cells) -> str:
                     compared = raw, *_over_cells(cells["held"][chosen], cells["held_se"][chosen])
                 rows.append((name, f"{low} to {high}", event, *texts, *compared))
     head = ("", "links", "", "before", "after 1", "after 2", "after 3", "later", "never")
-    return (
-        markdown((*head, "early over late", "what is drawn held", "χ² of none", "of one value", "rise, fall"), rows)
-        .replace("-", "−")
-        .replace("−−−", "---")
-    )
+    head = (*head, "early over late", "what is drawn held", "χ² of none", "of one value", "rise, fall")
+    return minus(markdown(head, rows))
 
 
-def by_bounces(cells: Cells) -> str:
+def by_bounces(cells: Columns) -> str:
     """Markdown: the difference from 5 to 30 Hz, with what is drawn held, for other bounds of what is early."""
     inside, rows = (cells["frequency"] >= 5) & (cells["frequency"] <= 30), []
     for low, high in GROUPS:
@@ -135,12 +118,12 @@ def by_bounces(cells: Cells) -> str:
             end = "" if bounce == EARLY else f"_{bounce}"
             values, errors = cells[f"held{end}"][chosen], cells[f"held_se{end}"][chosen]
             mean, _, _, ends = _over_cells(values, errors)
-            texts.append(f"{mean} ({np.isfinite(values).sum()}: {ends})".replace("-", "−"))
+            texts.append(minus(f"{mean} ({np.isfinite(values).sum()}: {ends})"))
         rows.append((f"{low} to {high}", *texts))
     return markdown(("links", "met by the first bounce", "by the second", "by the third"), rows)
 
 
-def ways(cells: Cells) -> str:
+def ways(cells: Columns) -> str:
     """Markdown: each way of ending by when strands met, of all walks, and where it is the most frequent."""
     counts = {(way, k): cells[f"{way.label}_{k}"] for way in WAYS for k in range(3)}
     total, most = sum(counts.values()), np.argmax(list(counts.values()), axis=0)
@@ -154,7 +137,7 @@ def ways(cells: Cells) -> str:
     return f"{markdown(head, rows)}\n\n{total.sum():,.0f} walks at rest of {cells['walks'].sum():,.0f}."
 
 
-def against_million(cells: Cells, million: Cells) -> str:
+def against_million(cells: Columns, million: Columns) -> str:
     """Whether these walks, of today's engine, go as far as those of the million, in words."""
     places = {key: i for i, key in enumerate(zip(million["links"], million["frequency"], strict=True))}
     at = np.array([places[key] for key in zip(cells["links"], cells["frequency"], strict=True)])
@@ -174,12 +157,10 @@ def against_million(cells: Cells, million: Cells) -> str:
     for name, chosen in choices.items():
         mean, chi2, _, ends = _over_cells(ratio[chosen], error[chosen], 2)
         texts.append(f"in {name} {mean} (χ² {chi2} cells; rise, fall: {ends})")
-    return f"Mean Δx of these walks over that of the million, less 1, mean over cells: {'; '.join(texts)}.".replace(
-        "-", "−"
-    )
+    return minus(f"Mean Δx of these walks over that of the million, less 1, mean over cells: {'; '.join(texts)}.")
 
 
-def tables(cells: Cells, million: Cells) -> dict[str, str]:
+def tables(cells: Columns, million: Columns) -> dict[str, str]:
     """The tables of the page by their markers."""
     return {
         "strands": shares(cells),

@@ -6,32 +6,29 @@
 Numbers are printed.
 """
 
-import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 from matplotlib.figure import Figure
 
 import warpchain
-from studies.common import DASHES, GREEN, RED, run_study, save_figure
-from studies.stationary_loop.balances import imbalances
-from studies.stationary_loop.catenary import catenary_of
-from studies.stationary_loop.kinks import draw_kinks
-from studies.stationary_loop.theory import MeanLoop, NoSolutionError, TheoreticalLoop, predict
+from studies.common import DASHES, FREQUENCY, GREEN, LINE_COLORS, RED, publish, run_study, tidy
+from studies.stationary_loop import theory
 
-FIGURES = Path(__file__).parent / "figures"
+FOLDER = Path(__file__).parent
 SHOWN = (120, 20.0)
 CELLS = ((60, 20.0), (120, 20.0), (120, 10.0), (180, 30.0), (60, 30.0))
-OTHERS: tuple[tuple[str, int, float, Mapping[str, float]], ...] = (
-    ("half of the inertia", 120, 20.0, {"inner_inertia": 8.45e-8, "outer_inertia": 6.46e-8}),
-    ("a tenth of the inertia", 120, 20.0, {"inner_inertia": 1.69e-8, "outer_inertia": 1.292e-8}),
-    ("three times the inertia", 120, 20.0, {"inner_inertia": 5.07e-7, "outer_inertia": 3.876e-7}),
-    ("a third of the viscous friction", 120, 20.0, {"viscous_friction": 3e-5}),
-    ("hardly any Coulomb friction", 120, 20.0, {"coulomb_friction": 1e-6}),
-)
+OTHERS: Mapping[str, Mapping[str, float]] = {
+    "half of the inertia": {"inner_inertia": 8.45e-8, "outer_inertia": 6.46e-8},
+    "a tenth of the inertia": {"inner_inertia": 1.69e-8, "outer_inertia": 1.292e-8},
+    "three times the inertia": {"inner_inertia": 5.07e-7, "outer_inertia": 3.876e-7},
+    "a third of the viscous friction": {"viscous_friction": 3e-5},
+    "hardly any Coulomb friction": {"coulomb_friction": 1e-6},
+}
+"""Changes of the chain whose loop is shown."""
 
 
 UNDAMPED = {"load_factor": 1.0, "steady_time": 0.0, "steady_tolerance": 1.0, "further_hold": 40.0}
@@ -43,7 +40,7 @@ def held(links: int, frequency: float, values: Mapping[str, float]) -> warpchain
     return warpchain.walk(links=links, frequency=frequency, preset="soft", start="spinning", **settings)
 
 
-def compare(name: str, ours: MeanLoop, theirs: MeanLoop) -> None:
+def compare(name: str, ours: theory.MeanLoop, theirs: theory.MeanLoop) -> None:
     """Prints how far two loops are apart."""
     middle = np.abs(ours.s) < 0.45 * (ours.free[1] - ours.free[0])
     s = ours.s[middle]
@@ -60,7 +57,7 @@ def compare(name: str, ours: MeanLoop, theirs: MeanLoop) -> None:
     )
 
 
-def row(name: str, loop: MeanLoop, theory: TheoreticalLoop | object) -> str:
+def row(name: str, loop: theory.MeanLoop, theory: theory.TheoreticalLoop) -> str:
     """Bottom curvature, peak and dip of a predicted curve, and how far it is from the simulated one."""
     near = np.abs(theory.s) < 0.35 * (loop.free[1] - loop.free[0])
     peak = int(np.argmax(np.where(near, theory.curvature, -np.inf)))
@@ -92,19 +89,20 @@ def show(name: str, walk: warpchain.WalkResult) -> None:
         f"least {kink.dip:6.2f} at {100 * kink.dip_at:5.1f} cm; "
         f"joints within {1e3 * loop.spread.max():.3f} mm"
     )
-    parameters = loop.parameters
-    for which, given in (
-        ("theory", parameters),
-        ("without Coulomb", dataclasses.replace(parameters, coulomb_friction=0.0)),
-        ("without friction", dataclasses.replace(parameters, coulomb_friction=0.0, viscous_friction=0.0)),
+    chain: dict[str, float] = {}
+    for which, less in (
+        ("theory", ""),
+        ("without Coulomb", "coulomb_friction"),
+        ("without friction", "viscous_friction"),
     ):
+        chain |= {less: 0.0} if less else {}
         try:
-            print(row(which, loop, predict(loop, given)))
-        except NoSolutionError as error:
+            print(row(which, loop, theory.predict(loop, chain)))
+        except theory.NoSolutionError as error:
             print(f"  {which:22} {error}")
-    print(row("catenary", loop, catenary_of(loop)))
+    print(row("catenary", loop, theory.catenary_of(loop)))
     balances = (
-        f"{key} {100 * found.rms:.1f} % ({100 * found.greatest:.1f} %)" for key, found in imbalances(loop).items()
+        f"{key} {100 * rms:.1f} % ({100 * greatest:.1f} %)" for key, (rms, greatest) in theory.imbalances(loop).items()
     )
     print("  balances, rms (greatest):", ", ".join(balances))
 
@@ -114,8 +112,8 @@ def draw(walk: warpchain.WalkResult) -> Figure:
     figure, loop = walk.plot("loop"), walk.mean_loop()
     shape, bend, pull = figure.axes
     for name, curve, style in (
-        ("theory", predict(loop), {"color": RED, "linewidth": 1.3, "linestyle": DASHES, "zorder": 4}),
-        ("catenary, as long", catenary_of(loop), {"color": GREEN, "linewidth": 1.2}),
+        ("theory", theory.predict(loop), {"color": RED, "linewidth": 1.3, "linestyle": DASHES, "zorder": 4}),
+        ("catenary, as long", theory.catenary_of(loop), {"color": GREEN, "linewidth": 1.2}),
     ):
         shape.plot(*(curve.position - loop.center).T, **style)
         bend.plot(curve.s, curve.curvature, label=name, **style)
@@ -124,18 +122,51 @@ def draw(walk: warpchain.WalkResult) -> Figure:
     return figure
 
 
+def draw_kinks(result: warpchain.SweepResult) -> Figure:
+    """Curvature and place of the kink against the frequency, a line for each number of links.
+
+    Raises:
+        InputError: no walk has frames of the time before its release.
+    """
+    kinks: dict[int, dict[float, list[Any]]] = {}
+    for block in result.blocks.values():
+        for place in np.argwhere(block.kept):
+            walk = block.walk_motion(tuple(int(index) for index in place))
+            if walk.before_release is not None:
+                scene = walk.setup.scene
+                kinks.setdefault(scene.links, {}).setdefault(scene.frequency, []).append(walk.mean_loop().kink())
+    if not kinks:
+        raise warpchain.InputError(
+            f"{result.name}: no walk has frames before its release; give a folder of the sweep kink"
+        )
+    figure = Figure(figsize=(9.6, 3.6), layout="constrained")
+    panels = figure.subplots(1, 3)
+    for axes, name, label, scale in (
+        (panels[0], "peak", "greatest curvature / m$^{-1}$", 1.0),
+        (panels[1], "dip", "curvature of the kink / m$^{-1}$", 1.0),
+        (panels[2], "dip_at", "kink from the lowest point / cm", 100.0),
+    ):
+        for (links, cells), color, marker in zip(sorted(kinks.items()), LINE_COLORS, "os^vDPX", strict=False):
+            means = [scale * np.mean([getattr(kink, name) for kink in cells[key]]) for key in sorted(cells)]
+            style = {"color": color, "marker": marker, "linewidth": 1.2, "markersize": 4.0}
+            axes.plot(sorted(cells), means, label=f"$n$ = {links}", **style)
+        tidy(axes, grid="both", xlabel=FREQUENCY, ylabel=label)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right upper", frameon=False)
+    return figure
+
+
 def main(kinks: Annotated[str | None, typer.Argument()] = None) -> None:
     """Print all tables and draw the figures."""
     if kinks is not None:
-        save_figure(draw_kinks(warpchain.load(kinks)), FIGURES / "kink.png", dpi=100)
+        publish(FOLDER, {}, {"kink": draw_kinks(warpchain.load(kinks))}, dpi=100)
     for links, frequency in CELLS:
         title, walk = f"{links} links, {frequency:g} Hz", held(links, frequency, {})
         show(title, walk)
         compare(title, walk.mean_loop(), held(links, frequency, UNDAMPED).mean_loop())
         if (links, frequency) == SHOWN:
-            save_figure(draw(walk), FIGURES / "loop.png", dpi=100)
-    for text, links, frequency, values in OTHERS:
-        show(f"{links} links, {frequency:g} Hz, {text}", held(links, frequency, values))
+            publish(FOLDER, {}, {"loop": draw(walk)}, dpi=100)
+    for text, values in OTHERS.items():
+        show(f"{SHOWN[0]} links, {SHOWN[1]:g} Hz, {text}", held(*SHOWN, values))
 
 
 if __name__ == "__main__":

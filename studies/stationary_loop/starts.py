@@ -10,12 +10,11 @@ from typing import Annotated, Any, Final
 
 import numpy as np
 import typer
-from numpy.typing import NDArray
 
 import warpchain
-from studies.common import DRAWN, drawn_terms, read_rows, run_study, table, write_rows, write_tables
+from studies import common
+from studies.common import DRAWN, Array
 
-Array = NDArray[np.float64]
 Key = tuple[str, int, float, float]
 """Block, links, frequency [Hz], time for which the loop was held on [s], 0 where that is no axis."""
 
@@ -51,11 +50,10 @@ def reduced(paths: list[str]) -> list[dict[str, Any]]:
     found: dict[Key, list[dict[str, Array]]] = {}
     for path in paths:
         for name, block in warpchain.load(path).blocks.items():
-            axes = [name for name in block.dims if name != "sample"]
             names = [name for name in block.columns if name in QUANTITIES or name.endswith(DRAWN)]
             columns = {name: np.asarray(block.columns[name], float) for name in names}
-            for place in np.ndindex(columns["dx"].shape[:-1]):
-                at = {axis: float(block.axes[axis][i]) for axis, i in zip(axes, place, strict=True)}
+            for place, numbers in common.of_cells(block):
+                at = dict(zip(block.axes, map(float, numbers), strict=True))
                 key = name, int(at["links"]), at["frequency"], at.get("further_hold", 0.0)
                 found.setdefault(key, []).append({name: values[place] for name, values in columns.items()})
     cells = {}
@@ -67,7 +65,7 @@ def reduced(paths: list[str]) -> list[dict[str, Any]]:
         row: dict[str, Any] = dict(zip(("block", "links", "frequency", "held_on"), key, strict=True))
         row["walks"] = len(walks["dx"])
         for quantity, each in ({name: walks[name] for name in QUANTITIES} | {"held": held[key]}).items():
-            row |= {quantity: float(each.mean()), f"{quantity}_se": float(each.std(ddof=1) / len(each) ** 0.5)}
+            row |= {quantity: float(common.mean(each)), f"{quantity}_se": float(common.standard_error(each))}
         rows.append(row)
     return rows
 
@@ -83,7 +81,7 @@ def with_draws_held(cells: Mapping[Key, Mapping[str, Array]]) -> dict[Key, Array
         walks = {name: np.concatenate([cells[key][name] for key in keys]) for name in cells[keys[0]]}
         ends = np.cumsum([len(cells[key]["dx"]) for key in keys])
         own = np.repeat(np.eye(len(keys)), np.diff(ends, prepend=0), axis=0)
-        terms = np.stack(drawn_terms(walks), axis=1)
+        terms = np.stack(common.drawn_terms(walks), axis=1)
         weights = np.linalg.lstsq(np.hstack([terms, own]), walks["dx"], rcond=None)[0][: terms.shape[1]]
         held |= dict(zip(keys, np.split(walks["dx"] - terms @ weights, ends[:-1]), strict=True))
     return held
@@ -91,18 +89,19 @@ def with_draws_held(cells: Mapping[Key, Mapping[str, Array]]) -> dict[Key, Array
 
 def read() -> dict[Key, dict[str, float]]:
     """The rows of the file by cell."""
-    return {
-        (row.pop("block"), int(row.pop("links")), float(row.pop("frequency")), float(row.pop("held_on"))): {
-            name: float(text) for name, text in row.items()
-        }
-        for row in read_rows(CSV)
-    }
+    names, columns = zip(*common.read_columns(CSV).items(), strict=True)
+    found = {}
+    for block, links, *numbers in zip(*columns, strict=True):
+        row = dict(zip(names[2:], map(float, numbers), strict=True))
+        found[str(block), int(links), row["frequency"], row["held_on"]] = row
+    return found
 
 
 def _ratio(one: dict[str, float], other: dict[str, float]) -> tuple[float, float]:
-    """Δx of one cell over that of the other, less 1, with its standard error; what is drawn is held."""
+    """Δx of one cell over that of the other, less 1, in per cent, with its standard error; what is drawn is held."""
     size = one["held"] / other["held"]
-    return size - 1, size * float(np.hypot(one["held_se"] / one["held"], other["held_se"] / other["held"]))
+    error = size * float(np.hypot(one["held_se"] / one["held"], other["held_se"] / other["held"]))
+    return 100 * (size - 1), 100 * error
 
 
 def _together(cells: dict[Key, dict[str, float]], loops: str, cell: tuple[int, float]) -> dict[str, float]:
@@ -119,9 +118,8 @@ def _together(cells: dict[Key, dict[str, float]], loops: str, cell: tuple[int, f
 
 def _mean(ratios: list[tuple[float, float]]) -> str:
     """Mean over cells ± standard error, with χ² of none in any."""
-    sizes, errors = np.array(ratios).T
-    mean, error = 100 * sizes.mean(), 100 * np.sqrt(np.sum(errors**2)) / len(sizes)
-    return f"{mean:+.2f} ± {error:.2f} % (χ² {np.sum((sizes / errors) ** 2):.1f} of {len(sizes)})"
+    found = common.over_cells(*zip(*ratios, strict=True))
+    return f"{found.text(2)} (χ² {found.chi2:.1f} of {len(found)})"
 
 
 def _with_error(cell: dict[str, float], quantity: str, scale: float = 1.0, digits: int = 4) -> str:
@@ -137,14 +135,14 @@ def starts(cells: dict[Key, dict[str, float]]) -> str:
         for start in OURS:
             pair = (_together(cells, name, (links, frequency)) for name in (start, "held 30 s"))
             size, error = _ratio(*pair)
-            texts.append(f"{100 * size:+.2f} ± {100 * error:.2f}")
+            texts.append(f"{size:+.2f} ± {error:.2f}")
         for quantity in ("release_center_x", "release_width"):
             each = (f"{1e3 * (own[start][quantity] - held[quantity]):+.2f}" for start in STARTS[:2])
             error = np.hypot(own["rest"][f"{quantity}_se"], held[f"{quantity}_se"])
             texts.append(f"{', '.join(each)} ± {1e3 * error:.2f}")
         rows.append((links, f"{frequency:g}", *texts))
     head = "links | Hz | `spinning` / m | `rest` / m | held 30 s / m | `spinning` − held / % | `rest` − held / %"
-    return table(f"{head} | place / mm | width / mm", rows)
+    return common.table(f"{head} | place / mm | width / mm", rows)
 
 
 def means(cells: dict[Key, dict[str, float]]) -> str:
@@ -160,7 +158,7 @@ def means(cells: dict[Key, dict[str, float]]) -> str:
             texts.append(_mean([_ratio(*pair) for pair in pairs if all(pair)]))
         rows.append((f"{one} over {other}", *texts))
     head = f"Δx | all cells | below {LONG} links | from {LONG} links on | those at 20 and 30 Hz"
-    return table(head, rows)
+    return common.table(head, rows)
 
 
 def over_time(cells: dict[Key, dict[str, float]], block: str, quantity: str, scale: float = 1, digits: int = 4) -> str:
@@ -171,13 +169,10 @@ def over_time(cells: dict[Key, dict[str, float]], block: str, quantity: str, sca
         own = [cells[block, links, frequency, time] for time in times]
         values = np.array([scale * cell[quantity] for cell in own])
         errors = np.array([scale * cell[f"{quantity}_se"] for cell in own])
-        weights = errors**-2
-        chi2 = float(np.sum(weights * (values - np.sum(weights * values) / weights.sum()) ** 2))
-        texts = (f"{value:.{digits}f}" for value in values)
-        rows.append(
-            (links, f"{frequency:g}", *texts, f"{errors.mean():.{digits}f}", f"{chi2:.1f}")[: None if tests else -1]
-        )
-    return table(("links", "Hz", *(f"{time:g} s" for time in times), "s.e.", *["χ²"] * tests), rows)
+        texts = [f"{value:.{digits}f}" for value in (*values, errors.mean())]
+        chi2 = [f"{common.over_cells(values, errors).chi2_of_one:.1f}"] if tests else []
+        rows.append((links, f"{frequency:g}", *texts, *chi2))
+    return common.table(("links", "Hz", *(f"{time:g} s" for time in times), "s.e.", *["χ²"] * tests), rows)
 
 
 def tables(cells: dict[Key, dict[str, float]]) -> dict[str, str]:
@@ -190,15 +185,15 @@ def tables(cells: dict[Key, dict[str, float]]) -> dict[str, str]:
         "swing": over_time(cells, "swing", "release_center_x", 1e3, 2),
         "swing in distance": over_time(cells, "swing", "dx"),
     }
-    return {name: text.replace("-", "−").replace("−−−", "---") for name, text in texts.items()}
+    return {name: common.minus(text) for name, text in texts.items()}
 
 
 def make(folders: Annotated[list[str] | None, typer.Argument()] = None) -> None:
     """Reduce the sweeps that are given into the committed file; then write all tables that are in it."""
     if folders:
-        write_rows(CSV, reduced(folders))
-    write_tables(PAGE, tables(read()))
+        common.write_rows(CSV, reduced(folders))
+    common.publish(PAGE.parent, tables(read()))
 
 
 if __name__ == "__main__":
-    run_study(make)
+    common.run_study(make)

@@ -17,19 +17,20 @@ with large ω_c and ends at `LEAST_SMOOTHING`. Joints turn at 60 rad/s where the
 loops of 60 to 180 links at 10 to 30 Hz change by at most 0.1 mm and 0.05 1/m.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_bvp
+from scipy.optimize import brentq
 
-Array = NDArray[np.float64]
+from studies.common import Array
+from warpchain import Parameters
+
 MeanLoop = Any
 """What `walk.mean_loop()` returns."""
-LoopParameters = Any
-"""Its `parameters`, a data class."""
 
 SMOOTHINGS: Final = (300.0, 100.0, 30.0, 10.0, 3.0, 1.0)
 """Smoothings ω_c [rad/s] for which the problem is solved before that of the chain."""
@@ -44,9 +45,23 @@ POINTS: Final = 801
 IN_LINKS: Final = 1.0
 """The theory begins and ends this many links inside of the free part: averages near it include links that touch."""
 
+EDGE: Final = 4.0
+"""Links at either end of the free part that balances leave out: averages there include links on the sprocket."""
+
 
 class NoSolutionError(ValueError):
     """The boundary value problem was not solved."""
+
+
+def bending_inertia(loop: MeanLoop) -> float:
+    """j = (Ī − m̄ ℓ²/6)/ℓ of the chain of a loop [kg m]; may be negative."""
+    p, length = loop.parameters, loop.parameters.link_length
+    return float((p.inner_inertia + p.outer_inertia) / 2 / length - loop.density * length**2 / 6)
+
+
+def moment(p: Parameters, spin: Array, smoothing: float) -> Array:
+    """Friction moment f(w) = β w + τ_c tanh(w / ω_c) [N m] of a joint that turns at w [rad/s]."""
+    return p.viscous_friction * spin + p.coulomb_friction * np.tanh(spin / smoothing)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -71,144 +86,53 @@ class TheoreticalLoop:
     shear: Array
     moment: Array
 
-    @property
-    def length(self) -> float:
-        """Length of the free part [m]."""
-        return float(self.s[-1] - self.s[0])
 
-
-@dataclass(frozen=True)
-class End:
-    """One end of a free part: x, y [m], φ [rad], κ [1/m]."""
-
-    x: float
-    y: float
-    angle: float
-    curvature: float
-
-    @classmethod
-    def of(cls, loop: MeanLoop, s: float) -> "End":
-        """The mean loop at the arc length s [m]."""
-        columns = (*loop.position.T, loop.angle, loop.curvature)
-        return cls(*(float(np.interp(s, loop.s, values)) for values in columns))
-
-
-def predict(loop: MeanLoop, parameters: LoopParameters | None = None) -> TheoreticalLoop:
+def predict(loop: MeanLoop, values: Mapping[str, float] | None = None) -> TheoreticalLoop:
     """The free part in theory, with the ends and the speed of a mean loop.
 
     Args:
         loop: the mean loop, which is also the first guess.
-        parameters: parameters of the chain; by default those of the loop.
+        values: of parameters that are others than those of the loop's chain.
 
     Raises:
         NoSolutionError: the solver has found no solution.
     """
+    p = loop.parameters.with_values(values or {})
     inset = IN_LINKS * loop.parameters.link_length
     first, last = loop.free[0] + inset, loop.free[1] - inset
     s = np.linspace(first, last, 401)
     columns = (loop.angle, loop.curvature, loop.bending, loop.effective_tension, loop.shear)
-    guess = np.stack([np.interp(s, loop.s, values) for values in (*loop.position.T, *columns)])
-    ends = End.of(loop, first), End.of(loop, last)
-    return solve(ends, guess, last - first, parameters or loop.parameters, loop.speed)
+    values = np.stack([np.interp(s, loop.s, values) for values in (*loop.position.T, *columns)])
+    ends, share = values[:4, [0, -1]].T, np.linspace(0.0, 1.0, len(s))
+    rubs = p.viscous_friction > 0 or p.coulomb_friction > 0
+    given = 3 if rubs else 2  # of x, y, φ at the touch-down
+    if not rubs:
+        values = np.delete(values, 4, axis=0)
+    length, spin, weight = last - first, p.link_length * loop.speed, loop.density * p.gravity
+    turning = bending_inertia(loop) * loop.speed**2
 
-
-def solve(
-    ends: tuple[End, End], guess: Array, length: float, parameters: LoopParameters, speed: float
-) -> TheoreticalLoop:
-    """The free part in theory between two ends.
-
-    Args:
-        ends: lift-off and touch-down; without friction not all of their values are used.
-        guess: x, y, φ, κ, κ', T_e, N at points evenly along the arc, shape (7, g).
-        length: length of the free part [m].
-        parameters: parameters of the chain.
-        speed: v along the loop [m/s].
-
-    Raises:
-        NoSolutionError: the solver has found no solution.
-    """
-    weight, turning = parameters.density * parameters.gravity, parameters.inertia * speed**2
-    points, nothing = np.linspace(0.0, 1.0, POINTS), np.zeros(POINTS)
-    share: Array = np.linspace(0.0, 1.0, guess.shape[1])
-    if parameters.viscous_friction > 0 or parameters.coulomb_friction > 0:
-        least = max(parameters.friction_smoothing, LEAST_SMOOTHING)
-        smoothings = [value for value in SMOOTHINGS if value > least] if parameters.coulomb_friction > 0 else []
-        for smoothing in (*smoothings, least):
-            smoothed = replace(parameters, friction_smoothing=smoothing)
-            found = _solve_bvp(_with_friction(smoothed, length, speed), _ends_meet(ends, 4, 3), share, guess)
-            share, guess = found.x, found.y
-        x, y, angle, curvature, bending, tension, shear = found.sol(points)
-        moment = smoothed.moment(parameters.link_length * speed * bending)
-        return _made(length, x, y, angle, curvature, tension, shear, moment)
-
-    def waving(share: Array, values: Array) -> Array:
-        _, _, angle, curvature, tension, shear = values
-        dx, dy, turn, *loads = _rates(angle, curvature, tension, shear, weight)
-        return length * np.stack((dx, dy, turn, shear / turning, *loads))
-
-    def hanging(share: Array, values: Array) -> Array:
-        _, _, angle, tension = values
-        dx, dy, turn, pull, _ = _rates(angle, weight * np.cos(angle) / tension, tension, 0.0 * angle, weight)
-        return length * np.stack((dx, dy, turn, pull))
-
-    if turning != 0:
-        found = _solve_bvp(waving, _ends_meet(ends, 4, 2), share, guess[[0, 1, 2, 3, 5, 6]])
-        x, y, angle, curvature, tension, shear = found.sol(points)
-        return _made(length, x, y, angle, curvature, tension, shear, nothing)
-    found = _solve_bvp(hanging, _ends_meet(ends, 2, 2), share, guess[[0, 1, 2, 5]])
-    x, y, angle, tension = found.sol(points)
-    return _made(length, x, y, angle, weight * np.cos(angle) / tension, tension, nothing, nothing)
-
-
-def _rates(angle: Array, curvature: Array, tension: Array, shear: Array, weight: float) -> tuple[Array, ...]:
-    """Derivatives of x, y, φ, T_e, N with respect to s."""
-    cosine, sine = np.cos(angle), np.sin(angle)
-    return -cosine, sine, curvature, shear * curvature + weight * sine, weight * cosine - tension * curvature
-
-
-def _with_friction(parameters: LoopParameters, length: float, speed: float) -> Callable[..., Array]:
-    """Derivatives of x, y, φ, κ, p, T_e, N with respect to the share of the length."""
-    spin, weight = parameters.link_length * speed, parameters.density * parameters.gravity
-    turning, smoothing = parameters.inertia * speed**2, parameters.friction_smoothing
-
-    def slope(share: Array, values: Array) -> Array:
-        _, _, angle, curvature, bending, tension, shear = values
-        tanh = np.tanh(spin * bending / smoothing)
-        friction = parameters.viscous_friction + parameters.coulomb_friction / smoothing * (1 - tanh**2)
-        dx, dy, turn, *loads = _rates(angle, curvature, tension, shear, weight)
-        return length * np.stack((dx, dy, turn, bending, (turning * bending - shear) / (spin * friction), *loads))
-
-    return slope
-
-
-def _ends_meet(ends: tuple[End, End], at_first: int, at_last: int) -> Callable[..., Array]:
-    """Boundary conditions: so many of x, y, φ, κ at the first end and at the last."""
-    first, last = (np.array([end.x, end.y, end.angle, end.curvature]) for end in ends)
+    def slope(smoothing: float, share: Array, values: Array) -> Array:
+        _, _, angle, curvature, *bending, tension, shear = values
+        cosine, sine, bend = np.cos(angle), np.sin(angle), bending[0] if rubs else shear / turning
+        rates = [-cosine, sine, curvature, bend]
+        if rubs:
+            tanh = np.tanh(spin * bend / smoothing)
+            friction = p.viscous_friction + p.coulomb_friction / smoothing * (1 - tanh**2)
+            rates.append((turning * bend - shear) / (spin * friction))
+        return length * np.stack([*rates, shear * curvature + weight * sine, weight * cosine - tension * curvature])
 
     def conditions(start: Array, end: Array) -> Array:
-        return np.concatenate([start[:at_first] - first[:at_first], end[:at_last] - last[:at_last]])
+        return np.concatenate([start[:4] - ends[0], end[:given] - ends[1, :given]])
 
-    return conditions
-
-
-def _solve_bvp(slope: Callable[..., Array], conditions: Callable[..., Array], share: Array, guess: Array) -> Any:
-    """Solve a boundary value problem by SciPy.
-
-    Raises:
-        NoSolutionError: SciPy has found no solution.
-    """
-    found = solve_bvp(slope, conditions, share, guess, tol=TOLERANCE, max_nodes=MOST_NODES)
-    if not found.success:
-        raise NoSolutionError(f"the boundary value problem was not solved ({found.message.lower().rstrip('.')})")
-    return found
-
-
-def _made(
-    length: float, x: Array, y: Array, angle: Array, curvature: Array, tension: Array, shear: Array, moment: Array
-) -> TheoreticalLoop:
-    """A loop from its values at evenly spaced points; s counts from where φ passes 0."""
-    s = length * np.linspace(0.0, 1.0, POINTS)
-    lowest = int(np.argmin(y))
+    least = max(p.friction_smoothing, LEAST_SMOOTHING)
+    for smoothing in (*(each for each in SMOOTHINGS if each > least and p.coulomb_friction > 0), least):
+        found = solve_bvp(partial(slope, smoothing), conditions, share, values, tol=TOLERANCE, max_nodes=MOST_NODES)
+        if not found.success:
+            reason = found.message.lower().rstrip(".")
+            raise NoSolutionError(f"the boundary value problem was not solved ({reason})")
+        share, values = found.x, found.y
+    x, y, angle, curvature, *bending, tension, shear = found.sol(np.linspace(0.0, 1.0, POINTS))
+    s, lowest = length * np.linspace(0.0, 1.0, POINTS), int(np.argmin(y))
     around = slice(max(lowest - 2, 0), lowest + 3)
     return TheoreticalLoop(
         s=s - float(np.interp(0.0, angle[around], s[around])),
@@ -217,5 +141,89 @@ def _made(
         curvature=curvature,
         effective_tension=tension,
         shear=shear,
-        moment=moment,
+        moment=moment(p, spin * (bending[0] if rubs else shear / turning), smoothing),
     )
+
+
+def catenary_of(loop: MeanLoop) -> TheoreticalLoop:
+    """The catenary between the ends of the free part of a mean loop and as long as it; errors as below."""
+    first, last = (np.array([np.interp(s, loop.s, column) for column in loop.position.T]) for s in loop.free)
+    weight = loop.density * loop.parameters.gravity
+    return catenary_between(first, last, loop.free[1] - loop.free[0], weight)
+
+
+def catenary_between(first: Array, last: Array, length: float, weight: float) -> TheoreticalLoop:
+    """The catenary of a given length between two ends, without shear and moment.
+
+    With the width w and the height difference h, a curve y = c cosh((x − x₀)/c) has 2 c sinh(w/2c) = √(L² − h²).
+
+    Args:
+        first: x, y [m] of the first end.
+        last: of the other one, which is farther left.
+        length: L [m].
+        weight: per length [N/m].
+
+    Raises:
+        ValueError: the length is not greater than the distance of the ends.
+    """
+    width, rise = float(first[0] - last[0]), float(last[1] - first[1])
+    square = length**2 - rise**2
+    if width <= 0 or square <= width**2:
+        raise ValueError("a catenary of this length does not reach from one end to the other; check both")
+    ratio = np.sqrt(square) / width
+    z = brentq(lambda z: np.sinh(z) / z - ratio, 1e-9, 2 + 2 * np.log(2 * ratio), xtol=1e-14)  # w/2c
+    c = width / (2 * z)
+    from_lowest = width / 2 - c * np.arctanh(rise / length)  # x of the first end, from the lowest point
+    s = -c * np.sinh(from_lowest / c) + np.linspace(0.0, length, POINTS)
+    lowest = first[0] - from_lowest, first[1] - c * (np.cosh(from_lowest / c) - 1)
+    return TheoreticalLoop(
+        s=s,
+        position=np.stack([lowest[0] - c * np.arcsinh(s / c), lowest[1] + np.hypot(s, c) - c], axis=1),
+        angle=np.arctan(s / c),
+        curvature=c / (s**2 + c**2),
+        effective_tension=weight * np.hypot(s, c),
+        shear=0 * s,
+        moment=0 * s,
+    )
+
+
+def imbalances(loop: MeanLoop) -> dict[str, tuple[float, float]]:
+    """How well balances close on the free part of a mean loop, `EDGE` links at its ends left out.
+
+    Returns:
+        Of each balance the error relative to its greatest term, root mean square and greatest value:
+
+        `force`: (T_e t + N n)(s), less its value at the lowest point and the weight in between, ρ g ŷ s.
+        `normal`: N' + T_e κ − ρ g cos φ.
+        `moment`: M' + N − j v² κ'.
+        `friction`: M − f(ℓ v κ'), where f is the moment of joints that turn like the mean curve.
+    """
+    p, edge = loop.parameters, EDGE * loop.parameters.link_length
+    weight_of_length = loop.density * p.gravity
+    inside = (loop.s > loop.free[0] + edge) & (loop.s < loop.free[1] - edge)
+    step = loop.length / len(loop.s)
+    tangent = np.stack([-np.cos(loop.angle), np.sin(loop.angle)], axis=1)
+    normal = np.stack([np.sin(loop.angle), np.cos(loop.angle)], axis=1)
+    force = loop.effective_tension[:, None] * tangent + loop.shear[:, None] * normal
+    bottom = np.array([np.interp(0.0, loop.s, force[:, axis]) for axis in (0, 1)])
+    weight = np.stack([np.zeros_like(loop.s), weight_of_length * loop.s], axis=1)
+    waves = 2j * np.pi * np.fft.rfftfreq(len(loop.s), step)
+    waves[-1] *= len(loop.s) % 2
+    shear_slope, moment_slope = (
+        np.fft.irfft(waves * np.fft.rfft(values), len(loop.s)) for values in (loop.shear, loop.moment)
+    )
+    bend, across = loop.effective_tension * loop.curvature, weight_of_length * np.cos(loop.angle)
+    turned = bending_inertia(loop) * loop.speed**2 * loop.bending
+    expected = moment(p, p.link_length * loop.speed * loop.bending, p.friction_smoothing)
+    terms = {
+        "force": (np.hypot(*(force - bottom - weight).T), [np.hypot(*force.T)]),
+        "normal": (shear_slope + bend - across, [shear_slope, bend, across]),
+        "moment": (moment_slope + loop.shear - turned, [moment_slope, loop.shear, turned]),
+        "friction": (loop.moment - expected, [loop.moment]),
+    }
+    found = {}
+    for name, (rest, parts) in terms.items():
+        scale = max(float(np.max(np.abs(part[inside]))) for part in parts)
+        share = np.abs(rest[inside]) / scale
+        found[name] = float(np.sqrt(np.mean(share**2))), float(share.max())
+    return found

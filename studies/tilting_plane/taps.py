@@ -5,7 +5,7 @@ python -m studies.tilting_plane.taps taps     # → results/taps.csv, tables of 
 python -m studies.tilting_plane.taps          # that file → tables of the page
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+import csv
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -13,10 +13,9 @@ import numpy as np
 import typer
 
 import warpchain
-from studies import common
+from studies.common import Columns, mean, minus, over_cells, publish, run_study, standard_error, table, write_rows
 
 FOLDER: Final = Path(__file__).parent
-RESULTS: Final = FOLDER / "results" / "taps.csv"
 UNITS: Final = {"tilt": "rad", "tilt_rate": "rad/s", "lateral_speed": "m/s", "yaw_rate": "rad/s"}
 STRAIGHT: Final = (0.1, 0.2)
 """Greatest |drift| over Δx of a walk that counts as straight."""
@@ -24,39 +23,45 @@ FEW: Final = 3
 """Walks of a cell that are enough for a mean."""
 
 
-def reduced(result: warpchain.SweepResult) -> Iterator[dict[str, object]]:
-    """Rows: what each tap does, over the cells and, of those of one number of links, alone."""
+def reduced(folder: str, needed: str) -> tuple[warpchain.SweepResult, list[dict[str, str]]]:
+    """A sweep, and rows: what each tap does, over the cells and, of those of one number of links, alone.
+
+    Raises:
+        InputError: it lacks the block `fixed` or the needed one.
+    """
+    result, found = warpchain.load(folder), []
+    if not {"fixed", needed} <= result.blocks.keys():
+        raise warpchain.InputError(f"{folder}: no blocks fixed and {needed}; give a folder of the page's sweep")
     fixed = result.blocks["fixed"].statistics()
+    settings = {each["name"]: each["scene"] for each in result.sweep["blocks"]}
     for name, block in result.blocks.items():
+        taps = [axis for axis in block.axes if axis not in ("links", "frequency")]
         if name == "fixed":
             continue
-        taps = [axis for axis in block.axes if axis not in ("links", "frequency")]
-        given = next(each for each in result.sweep["blocks"] if each["name"] == name)["scene"]
         for place in np.ndindex(*(len(block.axes[axis]) for axis in taps)):
             at = {axis: float(block.axes[axis][i]) for axis, i in zip(taps, place, strict=True)}
             columns = {key: values[(slice(None), slice(None), *place)] for key, values in block.columns.items()}
-            tap = {**{key: given[key] for key in UNITS if given.get(key)}, **at}
+            tap = {**{key: settings[name][key] for key in UNITS if settings[name].get(key)}, **at}
             text = ", ".join(f"{key} {value:g} {UNITS[key]}" for key, value in tap.items())
-            for links in (None, *block.axes["links"].tolist()):
-                rows = slice(None) if links is None else block.axes["links"] == links
-                yield {"tap": text.replace("_", " "), "links": links or "all", **_of_cells(columns, fixed, rows)}
+            for links in ("all", *block.axes["links"].tolist()):
+                rows = slice(None) if links == "all" else block.axes["links"] == links
+                found.append({"tap": text.replace("_", " "), "links": str(links), **_of_cells(columns, fixed, rows)})
+    return result, found
 
 
-def _of_cells(columns: Mapping[str, Any], fixed: Any, rows: Any) -> dict[str, object]:
+def _of_cells(columns: Columns, fixed: Any, rows: Any) -> dict[str, str]:
     """Numbers of one tap over some cells, (links, frequency, samples)."""
     rest = columns["status"][rows] == warpchain.Status.AT_REST
     dx, drift = (np.where(rest, columns[name][rows].astype(float), np.nan) for name in ("dx", "lateral_drift"))
-    mean, count = np.nanmean(dx, axis=-1), rest.sum(axis=-1)
-    ratio = mean / fixed.mean[rows]
-    errors = np.hypot(
-        np.nanstd(dx, axis=-1, ddof=1) / np.sqrt(count) / mean, fixed.standard_error[rows] / fixed.mean[rows]
-    )
-    found: dict[str, object] = {
-        "walks": int(rest.sum()),
+    ratio = mean(dx) / fixed.mean[rows]
+    own = standard_error(dx) / mean(dx)
+    over = over_cells(ratio, ratio * np.hypot(own, fixed.standard_error[rows] / fixed.mean[rows]))
+    found = {
+        "walks": str(rest.sum()),
         "fell": f"{100 * columns['fell_over'][rows].mean():.3g}",
         "early": f"{100 * columns['fell_before_collapse'][rows].mean():.3g}",
-        "ratio": f"{ratio.mean():.3f}",
-        "error": f"{np.sqrt(np.sum((ratio * errors) ** 2)) / ratio.size:.3f}",
+        "ratio": f"{over.mean:.3f}",
+        "error": f"{over.error:.3f}",
         "least": f"{ratio.min():.2f}",
         "greatest": f"{ratio.max():.2f}",
         "drift": f"{np.sqrt(np.nanmean(drift**2)):.3f}",
@@ -66,55 +71,44 @@ def _of_cells(columns: Mapping[str, Any], fixed: Any, rows: Any) -> dict[str, ob
     for bound in STRAIGHT:
         straight = np.abs(drift) <= bound * np.abs(dx)
         enough = straight.sum(axis=-1) >= FEW
-        kept = (
-            np.nanmean(np.where(straight, dx, np.nan)[enough], axis=-1) / mean[enough] if enough.any() else np.array([])
-        )
+        kept = mean(np.where(straight, dx, np.nan)[enough]) / mean(dx)[enough]
         found[f"straight_{bound:g}"] = f"{100 * straight.sum() / rest.sum():.0f}"
-        found[f"kept_{bound:g}"] = f"{kept.mean():.3f}" if len(kept) else "nan"
-        found[f"kept_cells_{bound:g}"] = int(enough.sum())
+        found[f"kept_{bound:g}"] = f"{mean(kept):.3f}"
+        found[f"kept_cells_{bound:g}"] = str(enough.sum())
     return found
 
 
-def table(rows: Sequence[Mapping[str, str]]) -> str:
+def taps_table(rows: list[dict[str, str]]) -> str:
     """What each tap does, means over the cells."""
-    head = ("tap at the release", "fell over", "before the loop collapsed", "Δx over that of a fixed plane")
-    lines = [
-        (
-            row["tap"].replace("-", "−"),
-            f"{row['fell']} %",
-            f"{row['early']} %",
-            f"{row['ratio']} ± {row['error']} ({row['least']} to {row['greatest']})",
-            row["drift"],
-            *(f"{row[f'straight_{bound:g}']} %, {row[f'kept_{bound:g}']}".replace("nan", "—") for bound in STRAIGHT),
-        )
-        for row in rows
-        if row["links"] == "all"
-    ]
-    straight = [f"straight to {bound:g}: walks, Δx over all" for bound in STRAIGHT]
-    return common.table((*head, "drift / m", *straight), lines)
+    head = "tap at the release | fell over | before the loop collapsed | Δx over that of a fixed plane | drift / m"
+    shown = ["{fell} %", "{early} %", "{ratio} ± {error} ({least} to {greatest})", "{drift}"]
+    lines = []
+    for row in rows:
+        if row["links"] == "all":
+            straight = (f"{row[f'straight_{bound:g}']} %, {row[f'kept_{bound:g}']}" for bound in STRAIGHT)
+            texts = [text.format(**row) for text in shown] + [text.replace("nan", "—") for text in straight]
+            lines.append((minus(row["tap"]), *texts))
+    heads = (f"straight to {bound:g}: walks, Δx over all" for bound in STRAIGHT)
+    return table(" | ".join([head, *heads]), lines)
 
 
-def by_links(rows: Sequence[Mapping[str, str]]) -> str:
+def by_links(rows: list[dict[str, str]]) -> str:
     """Share of walks that fell over before their loop collapsed, by tap and number of links."""
-    links = list(dict.fromkeys(row["links"] for row in rows if row["links"] != "all"))
-    taps = list(dict.fromkeys(row["tap"] for row in rows))
-    early = {(row["tap"], row["links"]): row["early"] for row in rows}
-    return common.table(
-        ("tap", *(f"{each} links" for each in links)),
-        ((tap.replace("-", "−"), *(f"{early[tap, each]} %" for each in links)) for tap in taps),
-    )
+    early: dict[str, dict[str, str]] = {}
+    for row in rows:
+        if row["links"] != "all":
+            early.setdefault(minus(row["tap"]), {})[f"{row['links']} links"] = f"{row['early']} %"
+    return table(("tap", *next(iter(early.values()))), ((tap, *texts.values()) for tap, texts in early.items()))
 
 
 def main(folder: Annotated[str | None, typer.Argument()] = None) -> None:
     """Reduce a folder if it is given; write the tables."""
+    path = FOLDER / "results" / "taps.csv"
     if folder is not None:
-        result = warpchain.load(folder)
-        if "fixed" not in result.blocks or "lateral_speed" not in result.blocks:
-            raise warpchain.InputError(f"{folder}: no blocks fixed and lateral_speed; give a folder of the sweep taps")
-        common.write_rows(RESULTS, list(reduced(result)))
-    rows = common.read_rows(RESULTS)
-    common.write_tables(FOLDER / "README.md", {"taps": table(rows), "taps by links": by_links(rows)})
+        write_rows(path, reduced(folder, "lateral_speed")[1])
+    rows = list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
+    publish(FOLDER, {"taps": taps_table(rows), "taps by links": by_links(rows)})
 
 
 if __name__ == "__main__":
-    common.run_study(main)
+    run_study(main)

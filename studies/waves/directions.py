@@ -9,21 +9,20 @@ Links turn by δθ cos(2πmj/n + φ), which bends the loop alike for both direct
 runs: a slow one stands in the room, against the motion of the links; a fast one runs with them. φ is drawn.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Final
 
 import numpy as np
 import typer
-from numpy.typing import NDArray
 
 import warpchain
-from studies.common import read_rows, run_study, table, write_rows, write_tables
-from studies.waves.drag import END, NEAR, PARAMETERS, released
+from studies import common
+from studies.common import Array, Columns, OverCells
+from studies.waves import wave_drag
+from studies.waves.drag import END, NEAR, released
 from studies.waves.fields import normal_velocities
-from studies.waves.wave_drag import RIGID, RUNNING, loop_motions, wave_motion
-
-Array = NDArray[np.float64]
+from studies.waves.wave_drag import RIGID, RUNNING, inertia_of, loop_motions, wave_motion
 
 FOLDER: Final = Path(__file__).parent
 RESULTS: Final = FOLDER / "results" / "directions.csv"
@@ -62,28 +61,19 @@ def with_wave(
     before = position[:, 2]
     turn = _closing(lambda turn: np.exp(1j * (before + turn)) - np.exp(1j * before), wave.real, before)
     angle = before + turn
-    rate = _closing(
-        lambda rate: 1j * ((velocity[:, 2] + rate) * np.exp(1j * angle) - velocity[:, 2] * np.exp(1j * before)),
-        back * speed / length * np.sin(2 * np.pi * number / links) * (1j * wave).real,
-        angle,
-    )
+
+    def ends_of(rate: Array) -> Array:
+        return 1j * ((velocity[:, 2] + rate) * np.exp(1j * angle) - velocity[:, 2] * np.exp(1j * before))
+
+    wanted = back * speed / length * np.sin(2 * np.pi * number / links) * (1j * wave).real
+    rate = _closing(ends_of, wanted, angle)
     places = _centers(length * (np.exp(1j * angle) - np.exp(1j * before)))
-    speeds = _centers(
-        length * 1j * ((velocity[:, 2] + rate) * np.exp(1j * angle) - velocity[:, 2] * np.exp(1j * before))
-    )
+    speeds = _centers(length * ends_of(rate))
     moved = position + np.column_stack([places.real, places.imag, turn])
     moved[:, :2] += np.average(position[:, :2] - moved[:, :2], axis=0, weights=inertia[:, 0])
     change = np.column_stack([speeds.real, speeds.imag, rate])
     rigid = loop_motions(moved[None], np.array([length]))[0][:, RIGID]
     return moved, velocity + wave_motion(rigid, change[None], inertia[None])[1][0]
-
-
-def inertia_of(links: int, parameters: warpchain.Parameters) -> Array:
-    """Mass, mass and moment of inertia of each link, (n, 3)."""
-    kinds = [
-        [getattr(parameters, f"{kind}_{name}") for name in ("mass", "mass", "inertia")] for kind in ("inner", "outer")
-    ]
-    return np.tile(kinds, (links // 2, 1))
 
 
 def running(position: Array, velocity: Array, parameters: warpchain.Parameters) -> float:
@@ -99,7 +89,7 @@ def lowest(position: Array, parameters: warpchain.Parameters) -> float:
     return float((position[:, 1] - half).min())
 
 
-def _closing(ends: Callable[[Array], NDArray[np.complex128]], values: Array, angle: Array) -> Array:
+def _closing(ends: Callable[[Array], Array], values: Array, angle: Array) -> Array:
     """Values changed as little as may be so that the ends of all links add up to nothing, by Newton's method."""
     basis = np.stack([-np.sin(angle), np.cos(angle)], axis=1)
     for _ in range(20):
@@ -108,7 +98,7 @@ def _closing(ends: Callable[[Array], NDArray[np.complex128]], values: Array, ang
     return values
 
 
-def _centers(ends: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def _centers(ends: Array) -> Array:
     """Middles of links, from what their ends are moved."""
     joints = np.cumsum(ends)
     return joints - ends / 2
@@ -119,17 +109,14 @@ def distances(links: int, frequency: float) -> tuple[Array, Array]:
     phases = 2 * np.pi * np.random.default_rng(SEED).random(SAMPLES)
     chains, states = [], []
     for sample in range(SAMPLES):
-        position, velocity, numbers = released(links, frequency, SEED + sample)
-        parameters = warpchain.Parameters(**dict(zip(PARAMETERS, map(float, numbers), strict=True)))
+        position, velocity, parameters = released(links, frequency, SEED + sample)
         for way, size in VARIANTS:
             chains.append(parameters)
             states.append(with_wave(position, velocity, parameters, way, size, phases[sample]))
     position, velocity = (np.array(each) for each in zip(*states, strict=True))
     walking = warpchain.Chains(chains, position, velocity)
     walking.run(END, to_rest=True)
-    mass = np.tile([[each.inner_mass, each.outer_mass] for each in chains], links // 2)
-    dx = np.sum(mass * walking.motions()[0][..., 0], axis=1) / mass.sum(axis=1)
-    dx[walking.status != warpchain.Status.AT_REST] = np.nan
+    dx = wave_drag.distances(walking, np.array([inertia_of(links, each) for each in chains]))
     return dx.reshape(SAMPLES, -1).T, phases
 
 
@@ -143,17 +130,10 @@ def reduced(dx: Array, phases: Array) -> list[dict[str, str]]:
         found, left, *_ = np.linalg.lstsq(design, change, rcond=None)
         variance = left[0] / (both.sum() - 3)
         explained = change.var() * both.sum() - left[0]
-        rows.append(
-            {
-                "wave": way,
-                "size": f"{size:g}",
-                "pairs": str(both.sum()),
-                "change": f"{change.mean():.3f}",
-                "error": f"{change.std(ddof=1) / np.sqrt(both.sum()):.3f}",
-                "by_phase": f"{np.hypot(*found[1:]):.3f}",
-                "f": f"{explained / 2 / variance:.3f}",
-            }
-        )
+        numbers = {"change": change.mean(), "error": change.std(ddof=1) / np.sqrt(both.sum())}
+        numbers |= {"by_phase": np.hypot(*found[1:]), "f": explained / 2 / variance}
+        words = {"wave": way, "size": f"{size:g}", "pairs": str(both.sum())}
+        rows.append(words | {name: f"{value:.3f}" for name, value in numbers.items()})
     return rows
 
 
@@ -164,33 +144,37 @@ def run() -> None:
         found = reduced(*distances(links, frequency))
         rows += [{"links": str(links), "frequency": f"{frequency:g}", **row} for row in found]
         print(links, frequency, found, flush=True)
-    write_rows(RESULTS, rows)
+    common.write_rows(RESULTS, rows)
 
 
-def changes(rows: Sequence[Mapping[str, str]], way: str, size: float) -> Array:
-    """Change of Δx and its error in per cent, its part that follows the phase, and F of that, (4, cells)."""
-    chosen = [row for row in rows if (row["wave"], float(row["size"])) == (way, size)]
-    return np.array([[float(row[name]) for name in ("change", "error", "by_phase", "f")] for row in chosen]).T
+def rows_of(way: str, size: float) -> Columns:
+    """The rows of a wave in the file: change of Δx, its error, its part that follows the phase, F of that."""
+    columns = common.read_columns(RESULTS)
+    chosen = (columns["wave"] == way) & (columns["size"] == size)
+    return {name: values[chosen] for name, values in columns.items()}
 
 
-def mean_of_cells(change: Array, error: Array) -> str:
-    """Mean over the cells ± its standard error."""
-    return f"{change.mean():+.1f} ± {np.sqrt(np.sum(error**2)) / len(error):.1f} %".replace("-", "−")
+def change(way: str, size: float) -> OverCells:
+    """What a wave changes of Δx, in per cent."""
+    rows = rows_of(way, size)
+    return common.over_cells(rows["change"], rows["error"])
 
 
-def summary(rows: Sequence[Mapping[str, str]]) -> str:
+def summary() -> str:
     """Each wave over the cells, in Markdown."""
     lines = []
     for way, size in VARIANTS[1:]:
-        change, error, by_phase, f = changes(rows, way, size)
-        typical = np.sqrt(max(0.0, float(np.mean(change**2 - error**2))))
-        ends = f"{change.min():+.0f} to {change.max():+.0f} %".replace("-", "−")
-        chi2 = f"{np.sum((change / error) ** 2):.0f} of {len(change)}"
-        texts = mean_of_cells(change, error), ends, f"{typical:.1f} %", chi2, f"{by_phase.mean():.1f} %"
-        lines.append([way, f"{size:g}", *texts, f"{f.mean():.1f}"])
-    return table(
-        "wave | amplitude / rad | Δx, mean of cells | cells | typical | χ² of none | ∝ cos φ | F of that", lines
-    )
+        over, rows = change(way, size), rows_of(way, size)
+        ends = f"{over.values.min():+.0f} to {over.values.max():+.0f} %"
+        texts = (
+            common.minus(over.text()),
+            common.minus(ends),
+            f"{over.typical:.1f} %",
+            f"{over.chi2:.0f} of {len(over)}",
+        )
+        lines.append([way, f"{size:g}", *texts, f"{rows['by_phase'].mean():.1f} %", f"{rows['f'].mean():.1f}"])
+    head = "wave | amplitude / rad | Δx, mean of cells | cells | typical | χ² of none | ∝ cos φ | F of that"
+    return common.table(head, lines)
 
 
 def about_impact(links: int, frequency: float) -> tuple[float, float]:
@@ -199,7 +183,7 @@ def about_impact(links: int, frequency: float) -> tuple[float, float]:
         links=links, frequency=frequency, preset="soft", start="spinning", frame_interval=2.5e-4, walk_limit=0.4
     )
     parameters, time, number = walk.setup.parameters, walk.frame_time, round(links / LENGTH)
-    masses = np.tile([parameters.inner_mass, parameters.outer_mass], links // 2)
+    masses = inertia_of(links, parameters)[:, 0]
     modes = np.abs(np.fft.rfft(normal_velocities(time, walk.frame_joints, masses), axis=1))[:, number - 1 : number + 2]
     angles = np.sqrt(np.sum((2 * modes / links) ** 2, axis=1)) / (4 * np.pi * frequency * RIDING)
     touches = np.flatnonzero(np.interp(time, walk.time, walk.lowest) < NEAR)
@@ -210,8 +194,7 @@ def about_impact(links: int, frequency: float) -> tuple[float, float]:
 
 def given(links: int, frequency: float) -> dict[tuple[str, float], Array]:
     """What waves of all phases change of a loop, (phases, 4): energy, angular momentum, run [%], lowest joint [mm]."""
-    position, velocity, numbers = released(links, frequency, SEED)
-    parameters = warpchain.Parameters(**dict(zip(PARAMETERS, map(float, numbers), strict=True)))
+    position, velocity, parameters = released(links, frequency, SEED)
     inertia = inertia_of(links, parameters)
 
     def numbers_of(at: Array, speeds: Array) -> Array:
@@ -237,19 +220,18 @@ def main(command: Annotated[str, typer.Argument()] = "") -> None:
         for links, frequency in CELLS:
             before, after = about_impact(links, frequency)
             print(f"{links} links, {frequency:g} Hz: {before:.4f} rad before the first impact, {after:.4f} after it")
-        return
-    if command == "given":
+    elif command == "given":
         cells = [given(links, frequency) for links, frequency in CELLS]
         for way, size in VARIANTS[1:]:
             every = np.concatenate([cell[way, size] for cell in cells])
             names = ("energy / %", "angular momentum / %", "run / %", "lowest joint / mm")
             for name, values in zip(names, every.T, strict=True):
                 print(f"{way} {size:g}: {name} {values.mean():+.2f} ({values.min():+.1f} to {values.max():+.1f})")
-        return
-    if command == "run":
-        run()
-    write_tables(FOLDER / "README.md", {"directions": summary(read_rows(RESULTS))})
+    else:
+        if command == "run":
+            run()
+        common.publish(FOLDER, {"directions": summary()})
 
 
 if __name__ == "__main__":
-    run_study(main)
+    common.run_study(main)

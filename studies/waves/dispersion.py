@@ -17,13 +17,13 @@ from itertools import permutations
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+from scipy.integrate import quad
 
+from studies.common import Array
 from warpchain import Parameters
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Factors = Callable[[Array, float], tuple[Complex, Complex, Array]]
+Factors = Callable[[Array, float], tuple[Array, Array, Array]]
 
 UPPER_BACKWARD, LOWER_BACKWARD, LOWER_FORWARD, UPPER_FORWARD = range(4)
 """Columns of `Waves.rate`: bands and directions. In the ring backward is the slow family, forward the fast one."""
@@ -31,8 +31,6 @@ FRICTION_STEPS: Final = 64
 """Friction rises from nothing in so many steps, while the branches are followed."""
 PHASE_STEP: Final = 1e-5
 """Step of a central difference with respect to the phase [rad]."""
-QUADRATURE_POINTS: Final = 2001
-"""Points of the integral of Coulomb friction over a period: good to 1e-5."""
 ROUNDING: Final = 1e-12
 """Damping below this part of a rate is rounding."""
 
@@ -49,8 +47,8 @@ class Waves:
     """
 
     phase: Array
-    rate: Complex
-    slope: Complex
+    rate: Array
+    slope: Array
 
     @property
     def frequency(self) -> Array:
@@ -85,7 +83,7 @@ class Waves:
 def straight_waves(parameters: Parameters, tension: float, phase: ArrayLike) -> Waves:
     """Transverse waves of a straight chain under the tension T [N], at phases κ per link in (0, π/2], shape (k,)."""
 
-    def factors(phases: Array, friction: float) -> tuple[Complex, Complex, Array]:
+    def factors(phases: Array, friction: float) -> tuple[Array, Array, Array]:
         squares = np.sin(phases / 2) ** 2, np.cos(phases / 2) ** 2
         first, second = (
             np.stack([tension * parameters.link_length * s, 4 * friction * s**2, inertia * s + quarter * c], axis=-1)
@@ -110,7 +108,7 @@ def ring_waves(parameters: Parameters, links: int, speed: float, number: ArrayLi
     spin = ring_spin(parameters, links, speed)
     eighth = mass * length**2 / 8
 
-    def factors(phases: Array, friction: float) -> tuple[Complex, Complex, Array]:
+    def factors(phases: Array, friction: float) -> tuple[Array, Array, Array]:
         forward, backward = phases / 2 + alpha, phases / 2 - alpha
         found, weights = [], []
         for bend, shift in ((np.sin(phases / 2) ** 2, 0.0), (np.cos(phases / 2) ** 2, np.pi / 2)):
@@ -127,7 +125,7 @@ def ring_waves(parameters: Parameters, links: int, speed: float, number: ArrayLi
     return _waves(parameters, 2 * alpha * np.asarray(number), factors)
 
 
-def continuous_ring(parameters: Parameters, links: int, speed: float, number: ArrayLike) -> Complex:
+def continuous_ring(parameters: Parameters, links: int, speed: float, number: ArrayLike) -> Array:
     """Rates of the continuous ring, slow and fast, in the frame that turns along: `ring_waves` for long waves.
 
     The ring has the length Nℓ.
@@ -144,21 +142,16 @@ def continuous_ring(parameters: Parameters, links: int, speed: float, number: Ar
     leading = 1 + n**2 + bend * rotary
     half = (bend * n**2 * friction - 4j * n * spin) / (2 * leading)
     root = np.sqrt(half**2 - n**2 * (n**2 - 3) * spin**2 / leading)
-    rates: Complex = np.stack([-half + root, -half - root], axis=-1)
-    return np.take_along_axis(rates, np.argsort(-rates.imag, axis=-1), axis=-1)
+    return _by_frequency(np.stack([-half + root, -half - root], axis=-1))
 
 
 def band_gap(parameters: Parameters, tension: float) -> tuple[float, float]:
     """Edges of the band gap of a straight chain at κ = π/2, without friction [rad/s]; equal if there is none."""
     length = parameters.link_length
-    crosswise = (
-        parameters.outer_mass + 4 * parameters.inner_inertia / length**2,
-        parameters.inner_mass + 4 * parameters.outer_inertia / length**2,
-    )
-    return (
-        float(np.sqrt(4 * tension / (length * max(crosswise)))),
-        float(np.sqrt(4 * tension / (length * min(crosswise)))),
-    )
+    one = parameters.outer_mass + 4 * parameters.inner_inertia / length**2
+    other = parameters.inner_mass + 4 * parameters.outer_inertia / length**2
+    low, high = (float(np.sqrt(4 * tension / (length * pick(one, other)))) for pick in (max, min))
+    return low, high
 
 
 def long_wave_speed(parameters: Parameters, tension: float) -> float:
@@ -178,13 +171,9 @@ def equivalent_friction(parameters: Parameters, amplitude: float) -> float:
     β + 4τ_c/πW for W far above ω_c and β + τ_c/ω_c far below.
     """
     ratio = amplitude / parameters.friction_smoothing
-    # By parts the mean of tanh(ratio · cos φ) cos φ is 2/π ∫ sin φ d tanh, over cos φ from 0, where it rises, to 1.
-    cosine = np.sinh(np.linspace(0.0, np.arcsinh(ratio), QUADRATURE_POINTS)) / ratio
-    cosine[-1] = 1.0
-    sine = np.sqrt(1 - cosine**2)
-    steps = np.diff(np.tanh(ratio * cosine))
-    mean = 2 / np.pi * float(np.sum((sine[1:] + sine[:-1]) / 2 * steps))
-    return parameters.viscous_friction + 2 * parameters.coulomb_friction * mean / amplitude
+    # tanh(ratio · cos φ) cos φ turns over in about 1/ratio from a quarter of the period on
+    mean = 2 / np.pi * quad(lambda x: np.tanh(ratio * np.sin(x)) * np.sin(x), 0, np.pi / 2, points=[3 / ratio])[0]
+    return float(parameters.viscous_friction + 2 * parameters.coulomb_friction * mean / amplitude)
 
 
 def _mean_mass(parameters: Parameters) -> float:
@@ -205,7 +194,7 @@ def _waves(parameters: Parameters, phases: Array, factors: Factors) -> Waves:
     other = (parameters.inner_inertia - parameters.outer_inertia) / 2
     coupling = other - difference * parameters.link_length**2 / 4
 
-    def quartic(phases: Array, friction: float) -> Complex:
+    def quartic(phases: Array, friction: float) -> Array:
         first, second, weight = factors(phases, friction)
         product = np.zeros((len(phases), 5), dtype=np.complex128)
         for power in range(3):
@@ -213,8 +202,7 @@ def _waves(parameters: Parameters, phases: Array, factors: Factors) -> Waves:
         product[:, 4] -= coupling**2 * weight
         return product
 
-    rates = _roots(quartic(phases, 0.0))
-    rates = np.take_along_axis(rates, np.argsort(-rates.imag, axis=1), axis=1)
+    rates = _by_frequency(_roots(quartic(phases, 0.0)))
     for friction in parameters.viscous_friction * np.linspace(0.0, 1.0, FRICTION_STEPS + 1)[1:]:
         rates = _matched(rates, _roots(quartic(phases, friction)))
     friction = parameters.viscous_friction
@@ -226,18 +214,22 @@ def _waves(parameters: Parameters, phases: Array, factors: Factors) -> Waves:
         return Waves(phase=phases, rate=rates, slope=-by_phase / by_rate)
 
 
-def _roots(coefficients: Complex) -> Complex:
-    """Roots of polynomials, (k, p) for coefficients (k, p + 1) from the constant on."""
+def _by_frequency(rates: Array) -> Array:
+    """Rates of each row, by falling imaginary part."""
+    return np.take_along_axis(rates, np.argsort(-rates.imag, axis=-1), axis=-1)
+
+
+def _roots(coefficients: Array) -> Array:
+    """Roots of polynomials, (k, p) for coefficients (k, p + 1) from the constant on: eigenvalues of companions."""
     degree = coefficients.shape[1] - 1
     scale = np.abs(coefficients[:, :1] / coefficients[:, -1:]) ** (1 / degree)  # of the roots, for conditioning
     scaled = coefficients * scale ** np.arange(degree + 1)
-    companion = np.zeros((len(scaled), degree, degree), dtype=np.complex128)
-    companion[:, np.arange(1, degree), np.arange(degree - 1)] = 1.0
+    companion = np.tile(np.eye(degree, k=-1, dtype=np.complex128), (len(scaled), 1, 1))
     companion[:, :, -1] = -scaled[:, :-1] / scaled[:, -1:]
     return scale * np.linalg.eigvals(companion)
 
 
-def _matched(before: Complex, after: Complex) -> Complex:
+def _matched(before: Array, after: Array) -> Array:
     """The roots `after`, each row in the order in which they are nearest to those `before`."""
     orders = np.array(list(permutations(range(before.shape[1]))))
     apart = np.abs(after[:, orders] - before[:, None, :]).sum(axis=2)

@@ -4,19 +4,18 @@ python -m studies.waves.doses drag60.npz drag90.npz …   # → results/doses.cs
 python -m studies.waves.doses                           # that file → tables of the page
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Final
 
 import numpy as np
 import typer
 
-from studies.common import read_rows, run_study, table, write_rows, write_tables
-from studies.waves.drag import CELLS, HALVES, RATES, SAMPLES, SEEDS, VARIANTS
+from studies.common import Array, minus, over_cells, publish, read_columns, run_study, table, write_rows
+from studies.waves.drag import CELLS, RATES, SAMPLES, SEEDS, VARIANTS
 
 FOLDER: Final = Path(__file__).parent
 RESULTS: Final = FOLDER / "results" / "doses.csv"
-Row = Mapping[str, str]
 
 
 def reduced(files: Sequence[Path]) -> Iterator[dict[str, object]]:
@@ -26,7 +25,7 @@ def reduced(files: Sequence[Path]) -> Iterator[dict[str, object]]:
         if f"dx{cell}" not in arrays:
             continue
         dx = arrays[f"dx{cell}"]
-        for k, variant in enumerate(VARIANTS):
+        for k, (when, rate) in enumerate(VARIANTS):
             for number, seed in enumerate(("both", *SEEDS)):
                 chosen = slice(None) if number == 0 else slice((number - 1) * SAMPLES, number * SAMPLES)
                 walks, plain = dx[k, chosen], dx[0, chosen]
@@ -35,8 +34,8 @@ def reduced(files: Sequence[Path]) -> Iterator[dict[str, object]]:
                 yield {
                     "links": links,
                     "frequency": frequency,
-                    "when": variant.when,
-                    "rate": f"{variant.rate:g}",
+                    "when": when,
+                    "rate": f"{rate:g}",
                     "seeds": seed,
                     "pairs": int(both.sum()),
                     "dx": f"{walks[both].mean():.5g}",
@@ -45,63 +44,49 @@ def reduced(files: Sequence[Path]) -> Iterator[dict[str, object]]:
                 }
 
 
-def changes(rows: Sequence[Row], when: str, rate: float, seeds: str = "both") -> tuple[np.ndarray, np.ndarray]:
-    """Changes of Δx in per cent and their standard errors, (cells,)."""
-    found = [
-        (float(row["change_percent"]), float(row["error_percent"]))
-        for row in rows
-        if (row["when"], float(row["rate"]), row["seeds"]) == (when, rate, seeds)
-    ]
-    values, errors = np.array(found).T
-    return values, errors
+def changes(when: str, rate: float, seeds: str = "both") -> tuple[Array, Array]:
+    """Changes of Δx in per cent and their standard errors, (cells,), from the file."""
+    rows = read_columns(RESULTS)
+    chosen = (rows["when"] == when) & (rows["rate"] == rate) & (rows["seeds"] == seeds)
+    return rows["change_percent"][chosen], rows["error_percent"][chosen]
 
 
-def _changes_table(rows: Sequence[Row], columns: Sequence[tuple[str, float]]) -> str:
-    cells = [(row["links"], row["frequency"]) for row in rows if row["seeds"] == "both" and row["rate"] == "0"]
-    known = [changes(rows, *column) for column in columns]
-    lines = [
-        [
-            f"{links}, {float(frequency):g}",
-            *(f"{values[i]:+.1f} ± {errors[i]:.1f}".replace("-", "−") for values, errors in known),
-        ]
-        for i, (links, frequency) in enumerate(cells)
-    ]
-    return table(["links, Hz", *(f"{rate:g}/s {when}" for when, rate in columns)], lines)
+def _changes_table(drags: Sequence[tuple[str, float]]) -> str:
+    known = [changes(*drag) for drag in drags]
+    lines = []
+    for i, (links, frequency) in enumerate(CELLS):
+        texts = (minus(f"{values[i]:+.1f} ± {errors[i]:.1f}") for values, errors in known)
+        lines.append([f"{links}, {frequency:g}", *texts])
+    return table(["links, Hz", *(f"{rate:g}/s {when}" for when, rate in drags)], lines)
 
 
-def summary_table(rows: Sequence[Row]) -> str:
+ALWAYS, PARTLY = VARIANTS[2 : 2 + len(RATES)], VARIANTS[2 + len(RATES) :]
+
+
+def summary_table() -> str:
     """Each drag over the cells: mean, root mean square less errors, significant cells, agreement of the two seeds."""
     lines = []
-    known = [("always", 1e-9), *(("always", rate) for rate in RATES)]
-    known += [(when, rate) for when in ("in flight", "in impacts") for rate in HALVES]
-    for when, rate in known:
-        values, errors = changes(rows, when, rate)
-        sets = [changes(rows, when, rate, str(seed)) for seed in SEEDS]
-        chi2 = float(np.sum((sets[0][0] - sets[1][0]) ** 2 / (sets[0][1] ** 2 + sets[1][1] ** 2)))
-        scatter = np.sqrt(max(0.0, float(np.mean(values**2 - errors**2))))
-        rises, falls = (int(np.sum(sign * values > 1.96 * errors)) for sign in (1, -1))
-        texts = f"{values.mean():+.1f} ± {np.sqrt(np.sum(errors**2)) / len(values):.1f} %", f"{scatter:.1f} %"
-        ends = f"{values.min():+.0f} to {values.max():+.0f} %"
-        lines.append([f"{rate:g}/s", when, *texts, ends, f"{rises}, {falls}", f"{chi2:.0f} of {len(values)}"])
+    for when, rate in VARIANTS[1:]:
+        values, errors = changes(when, rate)
+        (one, one_error), (two, two_error) = (changes(when, rate, str(seed)) for seed in SEEDS)
+        chi2 = over_cells(one - two, np.hypot(one_error, two_error)).chi2
+        over, ends = over_cells(values, errors), f"{values.min():+.0f} to {values.max():+.0f} %"
+        texts = over.text(), f"{over.typical:.1f} %", ends, f"{over.rises}, {over.falls}"
+        lines.append([f"{rate:g}/s", when, *texts, f"{chi2:.0f} of {len(over)}"])
     head = ["drag", "acts", "mean of cells", "typical", "least to greatest", "rise, fall", "χ² between seeds"]
-    return table(head, lines).replace("-", "−").replace("−−−", "---")
+    return minus(table(head, lines))
 
 
-def tables(rows: Sequence[Row]) -> dict[str, str]:
+def tables() -> dict[str, str]:
     """The tables of the page by their markers."""
-    halves = [(when, rate) for when in ("in flight", "in impacts") for rate in HALVES]
-    return {
-        "doses": _changes_table(rows, [("always", rate) for rate in RATES]),
-        "halves": _changes_table(rows, halves),
-        "all doses": summary_table(rows),
-    }
+    return {"doses": _changes_table(ALWAYS), "halves": _changes_table(PARTLY), "all doses": summary_table()}
 
 
 def main(files: Annotated[list[Path] | None, typer.Argument()] = None) -> None:
     """Reduce files that are given, and write the tables."""
     if files:
-        write_rows(RESULTS, list(reduced(files)))
-    write_tables(FOLDER / "README.md", tables(read_rows(RESULTS)))
+        write_rows(RESULTS, reduced(files))
+    publish(FOLDER, tables())
 
 
 if __name__ == "__main__":

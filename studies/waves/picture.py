@@ -10,27 +10,12 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
-from numpy.typing import NDArray
 
-from studies.common import INK, tidy
-from studies.waves.fields import (
-    Truths,
-    bin_means,
-    characteristic,
-    curvatures,
-    floor_contacts,
-    impacts,
-    in_room,
-    joints_below,
-    moving_average,
-    normal_velocities,
-    self_contacts,
-    tensions,
-    wave_speeds,
-)
+from studies.common import FAINT, INK, Array, tidy
+from studies.waves import fields
+from studies.waves.wave_drag import inertia_of
 from warpchain import WalkResult
 
-Array = NDArray[np.float64]
 Colour = Literal["curvature", "velocity"]
 Place = Callable[[Array, int], Array]
 """Joint numbers at consecutive frames, and the first frame → places on a panel, wrapped around the loop."""
@@ -82,28 +67,20 @@ def waves_figure(walk: WalkResult, *, colour: Colour = "curvature", window: tupl
     """
     if not len(walk.frame_forces):
         raise ValueError("walk: its joint forces were not recorded; run it again with record_loads")
-    look, parameters, links = _LOOKS[colour], walk.setup.parameters, walk.setup.scene.links
+    look, parameters, scene = _LOOKS[colour], walk.setup.parameters, walk.setup.scene
     shown = (walk.frame_time >= window[0]) & (walk.frame_time <= window[1])
-    time, joints, link = walk.frame_time[shown], walk.frame_joints[shown], parameters.link_length
-    masses = np.tile([parameters.inner_mass, parameters.outer_mass], links // 2)
-    tension = moving_average(time, tensions(joints, walk.frame_forces[shown]).mean(axis=1), AVERAGED)
-    speed, below = wave_speeds(tension, link, float(masses.mean())), joints_below(joints, masses)
-    values = curvatures(joints, link) if colour == "curvature" else normal_velocities(time, joints, masses)
-    floor, touch = (find(joints, parameters.circle_radius) for find in (floor_contacts, self_contacts))
-
-    figure = Figure(figsize=(9.0, 8.0), layout="constrained")
-    own, room = figure.subplots(2, 1, sharex=True)
-    length = links * link
-    times, still = bin_means(time, values, MOST_COLUMNS)
-    _, moved = bin_means(time, in_room(values, below, 2 * links), MOST_COLUMNS)
+    time, joints, links, link = walk.frame_time[shown], walk.frame_joints[shown], scene.links, parameters.link_length
+    masses, length = inertia_of(links, parameters)[:, 0], links * link
+    tension = fields.tensions(joints, walk.frame_forces[shown]).mean(axis=1)
+    speed = fields.wave_speeds(fields.moving_average(time, tension, AVERAGED), link, float(masses.mean()))
+    below = fields.joints_below(joints, masses)
+    velocity = colour == "velocity"
+    values = fields.normal_velocities(time, joints, masses) if velocity else fields.curvatures(joints, link)
+    floor, touch = (find(joints, parameters.circle_radius) for find in (fields.floor_contacts, fields.self_contacts))
+    still, moved = (fields.bin_means(each, MOST_COLUMNS) for each in (values, fields.in_room(values, below, 2 * links)))
     low, high = np.percentile(still, SHARE)
-    if colour == "velocity":
-        high = max(abs(low), abs(high))
-        low = -high
-    style: dict[str, Any] = {"cmap": look.cmap, "vmin": low, "vmax": high, "aspect": "auto"}
-    style |= {"origin": "lower", "interpolation": "nearest"}
-    image = own.imshow(still.T, extent=(times[0], times[-1], -0.5, links - 0.5), **style)
-    room.imshow(moved.T, extent=(times[0], times[-1], -length / 2, length / 2), **style)
+    if velocity:
+        low, high = -max(abs(low), abs(high)), max(abs(low), abs(high))
 
     def as_joint(path: Array, first: int) -> Array:
         return (path + 0.5) % links - 0.5
@@ -111,56 +88,59 @@ def waves_figure(walk: WalkResult, *, colour: Colour = "curvature", window: tupl
     def as_place(path: Array, first: int) -> Array:
         return ((path - below[first : first + len(path)] + links / 2) % links - links / 2) * link
 
-    for axes, place, half in ((own, as_joint, links / 2), (room, as_place, length / 2)):
-        _draw_characteristics(axes, look, time, speed / link, joints, floor, place, half)
-        _draw_contacts(axes, time, floor, place, half, "black")
-        _draw_contacts(axes, time, touch, place, half, look.touch)
-        axes.set(xlim=(times[0], times[-1]))
-        tidy(axes)
-    own.set(ylabel="number of the joint", ylim=(-0.5, links - 0.5))
-    frequency = f"{walk.setup.scene.frequency:g} Hz"
-    own.set_title(f"{links} links, {frequency}: in the frame of the chain", fontsize="medium", loc="left")
-    room.set(ylabel="arc length from below the centre\nof mass, along the motion / m", ylim=(-length / 2, length / 2))
-    room.set(xlabel="time since release $t$ / s")
-    room.set_title("in the frame of the room", fontsize="medium", loc="left")
-    figure.colorbar(image, ax=[own, room], extend="both", label=look.label, pad=0.02, aspect=40)
+    figure = Figure(figsize=(9.0, 8.0), layout="constrained")
+    own, room = figure.subplots(2, 1, sharex=True)
+    style: dict[str, Any] = {"cmap": look.cmap, "vmin": low, "vmax": high, "aspect": "auto"}
+    style |= {"origin": "lower", "interpolation": "nearest"}
+    for axes, image, place, low, high in (
+        (own, still, as_joint, -0.5, links - 0.5),
+        (room, moved, as_place, -length / 2, length / 2),
+    ):
+        shades = axes.imshow(image.T, extent=(time[0], time[-1], low, high), **style)
+        _draw_characteristics(axes, look, time, speed / link, joints, floor, place, (high - low) / 2)
+        _draw_contacts(axes, time, floor, place, (high - low) / 2, "black")
+        _draw_contacts(axes, time, touch, place, (high - low) / 2, look.touch)
+        axes.set(xlim=(time[0], time[-1]), ylim=(low, high))
+    tidy(own, f"{links} links, {scene.frequency:g} Hz: in the frame of the chain", ylabel="number of the joint")
+    along = "arc length from below the centre\nof mass, along the motion / m"
+    tidy(room, "in the frame of the room", ylabel=along, xlabel="time since release $t$ / s")
+    figure.colorbar(shades, ax=[own, room], extend="both", label=look.label, pad=0.02, aspect=40)
     _draw_legend(figure, look)
     return figure
 
 
 def _draw_characteristics(
-    axes: Axes, look: _Look, time: Array, speed: Array, joints: Array, floor: Truths, place: Place, half: float
+    axes: Axes, look: _Look, time: Array, speed: Array, joints: Array, floor: Array, place: Place, half: float
 ) -> None:
     """Both families from beginning and end of each of the first impacts, until the next one begins."""
-    found = impacts(time, joints, floor)
-    ends = [impact.frame for impact in found[1:]] + [len(time)]
+    found, lowest = fields.impacts(time, floor), np.argmin(joints[..., 1], axis=1)
+    ends = [first for first, _ in found[1:]] + [len(time)]
     halo = [withStroke(linewidth=1.8, foreground=look.halo, alpha=0.6)]
     for impact, end in zip(found[:FIRST_IMPACTS], ends, strict=False):
-        for frame, joint, line in ((impact.frame, impact.joint, "-"), (impact.last_frame, impact.last_joint, _DASHES)):
+        for frame, line in zip(impact, ("-", _DASHES), strict=True):
             for sign in (1.0, -1.0):
-                places = place(characteristic(time, sign * speed, frame, joint, 1.0)[: end - frame], frame)
+                path = fields.characteristic(time, sign * speed, frame, lowest[frame], 1.0)[: end - frame]
+                places = place(path, frame)
                 places = np.where(np.abs(np.diff(places, prepend=places[:1])) > half, np.nan, places)
                 times = time[frame : frame + len(places)]
                 axes.plot(times, places, color=look.wave, linewidth=0.8, linestyle=line, path_effects=halo)
 
 
-def _draw_contacts(axes: Axes, time: Array, touching: Truths, place: Place, half: float, color: str) -> None:
+def _draw_contacts(axes: Axes, time: Array, touching: Array, place: Place, half: float, color: str) -> None:
     """A line for as long as a joint touches, broken where it passes from one end of the panel to the other."""
     segments: list[Array] = []
     for joint in np.flatnonzero(touching.any(axis=0)):
         edges = np.flatnonzero(np.diff(touching[:, joint].astype(np.int8), prepend=0, append=0))
-        for first, last in zip(edges[::2], edges[1::2] - 1, strict=True):
-            y = place(np.full(last - first + 1, float(joint)), int(first))
-            path = np.stack([time[first : last + 1], y], axis=1)
-            if len(path) == 1:
-                path = np.repeat(path, 2, axis=0)
+        for first, end in zip(edges[::2], edges[1::2], strict=True):
+            path = np.stack([time[first:end], place(np.full(end - first, float(joint)), int(first))], axis=1)
+            path = np.repeat(path, 2, axis=0)  # a touch of one frame is a dot
             segments += np.split(path, np.flatnonzero(np.abs(np.diff(path[:, 1])) > half) + 1)
     axes.add_collection(LineCollection(segments, colors=color, linewidths=1.4, capstyle="projecting", zorder=4))
 
 
 def _draw_legend(figure: Figure, look: _Look) -> None:
     """What marks and lines mean, below the panels."""
-    halo = [withStroke(linewidth=2.2, foreground="#777777")]
+    halo = [withStroke(linewidth=2.2, foreground=FAINT)]
     begins = "±c from beginning of impact, $c = \\sqrt{T\\ell/\\bar{m}}$"
     lines = [
         Line2D([], [], color=look.wave, linewidth=1.0, path_effects=halo, label=begins),

@@ -1,34 +1,21 @@
-"""Prints the tables of the page on theory and rings and draws their figure: waves in theory and in tapped rings."""
+"""Waves in theory and in tapped rings: their tables, printed, and their figure.
 
-from collections.abc import Mapping
+A ring of links that turns like a rigid body is tapped; `warpchain.simulate` moves it on. Its motion is taken apart into
+modes, the decaying oscillations that they are made of, and packets.
+"""
+
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 import warpchain
-from studies.common import BLUE, FAINT, GREEN, GROUND, INK, RED, save_figure, tidy
-from studies.waves.dispersion import (
-    LOWER_BACKWARD,
-    LOWER_FORWARD,
-    UPPER_BACKWARD,
-    UPPER_FORWARD,
-    Waves,
-    band_gap,
-    continuous_ring,
-    equivalent_friction,
-    long_wave_speed,
-    ring_spin,
-    ring_waves,
-    straight_waves,
-)
-from studies.waves.mode_fit import find_packet, fit_rates, mode_amplitudes
-from studies.waves.tapped_ring import tapped_ring
+from studies.common import BLUE, FAINT, GREEN, GROUND, INK, RED, Array, publish, table, tidy
+from studies.waves import dispersion
+from studies.waves.dispersion import LOWER_BACKWARD, LOWER_FORWARD, UPPER_BACKWARD, UPPER_FORWARD, Waves
 from warpchain import Parameters, preset
-
-Array = NDArray[np.float64]
 
 CHAIN = preset("soft").with_values({"coulomb_friction": 0.0})
 """Table 1's chain with softened joints, without Coulomb friction."""
@@ -41,8 +28,8 @@ FREQUENCIES = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0)
 SPINS = (0.01, 0.1, 1.0, 10.0, 60.0)
 """Amplitudes of a joint's angular velocity [rad/s]; joints turn at 60 rad/s where a loop bends."""
 WAVELENGTHS = np.array([6.0, 12.0, 24.0])
-BOTH = [LOWER_BACKWARD, LOWER_FORWARD]
-FIGURE = Path(__file__).parent / "figures" / "dispersion.png"
+BOTH, FORWARD = [LOWER_BACKWARD, LOWER_FORWARD], [LOWER_FORWARD, UPPER_FORWARD]
+FOLDER = Path(__file__).parent
 INTERVAL = 2e-4
 """Time between two instants of a tapped ring [s]."""
 
@@ -53,14 +40,46 @@ def speed_at(frequency: float) -> float:
     return float(np.pi * frequency * LENGTH / half)
 
 
+def tapped_ring(links: int, parameters: Parameters, speed: float, spins: Array) -> tuple[Array, Array]:
+    """A turning ring whose springs are in equilibrium, with further angular velocities of its links by a tap.
+
+    With α = π/n the ring turns at Ω = speed · 2 sin α/ℓ. All links are tangential, inner ones at the distance ρ₁ from
+    the centre and outer ones at ρ₂; the springs supply the centripetal forces (without damping b) if
+
+        (m₁Ω²/k − 2) ρ₁ + 2 cos 2α ρ₂ = −ℓ sin 2α,    2 cos 2α ρ₁ + (m₂Ω²/k − 2) ρ₂ = −ℓ sin 2α.
+
+    The tap opens no joint: velocities of joints are sums of those across the links, less their mean. That closes the
+    ring only if the spins have no part ∝ exp(±2πij/n), so this part, which moves the ring without bending it, is left
+    out.
+
+    `speed` [m/s] is that of the joints of the closed ring before the tap, anticlockwise if positive; `spins` are
+    further angular velocities [rad/s], (n,). Returns position and velocity (n, 3): x, y [m], θ [rad] and their rates.
+    """
+    alpha, length = np.pi / links, parameters.link_length
+    spin, coupling = speed * 2 * np.sin(alpha) / length, 2 * np.cos(2 * alpha)
+    inner, outer = (m * spin**2 / parameters.joint_stiffness for m in (parameters.inner_mass, parameters.outer_mass))
+    balance = np.array([[inner - 2, coupling], [coupling, outer - 2]])
+    distance = np.tile(np.linalg.solve(balance, np.full(2, -length * np.sin(2 * alpha))), links // 2)
+    angle = 2 * np.pi * np.arange(links) / links
+    outwards, ahead = (np.stack([np.cos(each), np.sin(each)], axis=1) for each in (angle, angle + np.pi / 2))
+    first = np.exp(1j * angle)
+    kept = spins - 2 / links * np.real(np.sum(spins * first.conj()) * first)
+    turning = -length * kept[:, None] * outwards  # velocity of a link's end relative to its beginning
+    joints = np.cumsum(turning, axis=0)
+    joints -= joints.mean(axis=0)
+    position = np.column_stack([distance[:, None] * outwards, angle + np.pi / 2])
+    across = spin * distance[:, None] * ahead + joints - turning / 2
+    return position, np.column_stack([across, spin + kept])
+
+
 def tapped(links: int, speed: float, spins: Array, times: Array, chain: Parameters = CHAIN) -> Array:
     """Angles (t, n) [rad] of the links of a tapped ring, less those of the ring that turns on."""
     position, velocity = tapped_ring(links, chain, speed, spins)
-    scene: Mapping[str, bool] = {"floor": False, "gravity": False, "self_contact": False}
-    motion = warpchain.simulate(chain, position, velocity, float(times[-1]), times=times, tolerance=1e-8, **scene)
+    scene: dict[str, Any] = {"floor": False, "gravity": False, "self_contact": False, "tolerance": 1e-8}
+    motion = warpchain.simulate(chain, position, velocity, float(times[-1]), times=times, **scene)
     if motion.status != warpchain.Status.FINISHED:
         raise RuntimeError(f"the tapped ring ended as {motion.status.label}")
-    return motion.position[:, :, 2] - position[:, 2] - ring_spin(chain, links, speed) * times[:, None]
+    return motion.position[:, :, 2] - position[:, 2] - dispersion.ring_spin(chain, links, speed) * times[:, None]
 
 
 def from_tap(links: int) -> Array:
@@ -68,7 +87,78 @@ def from_tap(links: int) -> Array:
     return (np.arange(links) + links / 2) % links - links / 2
 
 
-def measured(angles: Array, waves: Waves, numbers: Array, columns: list[int]) -> NDArray[np.complex128]:
+def mode_amplitudes(angles: Array, number: int) -> Array:
+    """Fourier components of links' angles [rad], shape (t, n), of inner and outer links apart.
+
+    Returns:
+        2/n Σ ϑ_j exp(−2πi · number · j/n) over even and over odd j [rad], shape (t, 2).
+    """
+    links = angles.shape[1]
+    wave = 2 / links * np.exp(-2j * np.pi * number * np.arange(links) / links)
+    return np.stack([angles[:, part::2] @ wave[part::2] for part in (0, 1)], axis=1)
+
+
+def fit_rates(signals: Array, interval: float, count: int) -> Array:
+    """Rates λ of the sum of `count` exponentials Σ a exp(λt) that signals, shape (t, s), have in common.
+
+    ESPRIT (Roy and Kailath, IEEE Trans. ASSP 37 (1989) 984): stretches of the signals span a space that is the same one
+    sample later but for the factors exp(λ · interval), which are the eigenvalues of the map between both.
+
+    Returns:
+        λ [1/s], by falling imaginary part, shape (count,).
+
+    Raises:
+        ValueError: there are too few instants.
+    """
+    instants = len(signals)
+    stretch = 2 * instants // 3
+    if instants < 3 * count:
+        raise ValueError(f"{instants} instants do not tell {count} exponentials apart; give at least {3 * count}")
+    rows = np.concatenate([np.lib.stride_tricks.sliding_window_view(column, stretch) for column in signals.T])
+    space = np.linalg.svd(rows, full_matrices=False)[2][:count].T
+    shift = np.linalg.lstsq(space[:-1], space[1:], rcond=None)[0]
+    rates = np.log(np.linalg.eigvals(shift).astype(np.complex128)) / interval
+    return np.asarray(rates[np.argsort(-rates.imag)])
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Packet:
+    """A packet of waves at one instant.
+
+    Attributes:
+        place: centre of its squared envelope [links].
+        amplitude: root of the sum of its squared envelope [rad].
+        shares: of the modes 0, 1, … in the sum of its squared spectrum, shape (n/2,).
+    """
+
+    place: float
+    amplitude: float
+    shares: Array
+
+    def mean(self, values: Array) -> float:
+        """The mean of values of the modes from 2 on, as many as are given, by their shares."""
+        shares = self.shares[2 : 2 + len(values)]
+        return float(shares @ values / shares.sum())
+
+
+def find_packet(angles: Array, link: float, width: float) -> Packet:
+    """The packet of a ring's angles (n,) at most `width` links from the place `link`, on an endless count of links.
+
+    The envelope is that of the waves with n > 0 in exp(2πinj/N), twice their absolute value.
+    """
+    links = len(angles)
+    spectrum = np.fft.fft(angles)
+    spectrum[0] = 0.0
+    spectrum[links // 2 :] = 0.0
+    offset = (np.arange(links) - link + links / 2) % links - links / 2
+    signal = np.where(np.abs(offset) <= width, 2 * np.fft.ifft(spectrum), 0.0)
+    energy = np.abs(signal) ** 2
+    total = float(energy.sum())
+    shares = np.abs(np.fft.fft(signal))[: links // 2] ** 2
+    return Packet(place=link + float(energy @ offset) / total, amplitude=total**0.5, shares=shares / shares.sum())
+
+
+def measured(angles: Array, waves: Waves, numbers: Array, columns: list[int]) -> Array:
     """Rates of modes of a tapped ring, fitted to its motion; of the four that are found those nearest to theory."""
     found = []
     for number, rates in zip(numbers, waves.rate[:, columns], strict=True):
@@ -80,112 +170,109 @@ def measured(angles: Array, waves: Waves, numbers: Array, columns: list[int]) ->
 
 def show_bands() -> None:
     """The band gap, and the waves that friction keeps from swinging."""
-    print("Bands of the straight chain under T = ρv²")
-    phases = np.linspace(0.01, np.pi / 2, 500)
+    rows, phases = [], np.linspace(0.01, np.pi / 2, 500)
     for frequency in FREQUENCIES:
         speed = speed_at(frequency)
         tension = DENSITY * speed**2
-        low, high = band_gap(CHAIN, tension)
-        waves = straight_waves(CHAIN, tension, phases)
-        edge = waves.damping[-1, [LOWER_FORWARD, UPPER_FORWARD]]
-        swings = np.abs(waves.frequency[:, [LOWER_FORWARD, UPPER_FORWARD]]) > 1e-6
-        extended = np.concatenate([phases, np.pi - phases[::-1]])[np.concatenate([swings[:, 0], swings[::-1, 1]])]
-        print(
-            f"  {frequency:4.0f} Hz: v {speed:6.3f} m/s, T {tension:6.2f} N, gap {low / 2 / np.pi:6.1f} to "
-            f"{high / 2 / np.pi:6.1f} Hz ({100 * (high / low - 1):.1f} %), damping there {edge[0]:.0f} and "
-            f"{edge[1]:.0f} 1/s ({edge.mean() / low:.2f} of ω); waves shorter than "
-            f"{2 * np.pi / extended.max():.2f} links creep"
-        )
+        low, high = dispersion.band_gap(CHAIN, tension)
+        waves = dispersion.straight_waves(CHAIN, tension, phases)
+        edge = waves.damping[-1, FORWARD]
+        swings = np.abs(waves.frequency[:, FORWARD]) > 1e-6
+        swinging = np.concatenate([phases, np.pi - phases[::-1]])[np.concatenate([swings[:, 0], swings[::-1, 1]])]
+        gap = f"{low / 2 / np.pi:.1f} to {high / 2 / np.pi:.1f} ({100 * (high / low - 1):.1f} %)"
+        damping = f"{edge[0]:.0f} and {edge[1]:.0f} ({edge.mean() / low:.2f} of ω)"
+        shortest = f"{2 * np.pi / swinging.max():.2f}"
+        rows.append((f"{frequency:g}", f"{speed:.3f}", f"{tension:.2f}", gap, damping, shortest))
+    print("Bands of the straight chain under T = ρv²")
+    print(table("Hz | v, m/s | T, N | gap, Hz | damping there, 1/s | links of a wave below which it creeps", rows))
 
 
 def show_reach() -> None:
     """How far waves run, and how fast in the room."""
-    print("Waves of the straight chain under T = ρv²: reach in links, decay, speeds in the room in m/s (packet; crest)")
+    rows = []
     for frequency in FREQUENCIES:
         speed = speed_at(frequency)
-        waves = straight_waves(CHAIN, DENSITY * speed**2, 2 * np.pi / WAVELENGTHS)
+        waves = dispersion.straight_waves(CHAIN, DENSITY * speed**2, 2 * np.pi / WAVELENGTHS)
         for k, wavelength in enumerate(WAVELENGTHS):
             packets, crests = (speed + LENGTH * speeds[k, BOTH] for speeds in (waves.group_speed, waves.phase_speed))
+            rate = f"{waves.frequency[k, LOWER_FORWARD]:.1f}", f"{waves.damping[k, LOWER_FORWARD]:.3f}"
             reach = waves.reach[k, LOWER_FORWARD]
-            print(
-                f"  {frequency:4.0f} Hz, {wavelength:3.0f} links: ω {waves.frequency[k, LOWER_FORWARD]:7.1f} 1/s, "
-                f"γ {waves.damping[k, LOWER_FORWARD]:7.3f} 1/s, reach {reach:8.1f} links, of the loop "
-                f"{reach / 60:6.2f} (60) {reach / 120:6.2f} (120); slow {packets[0]:5.2f} ({crests[0]:5.2f}), "
-                f"fast {packets[1]:6.2f} ({crests[1]:6.2f})"
-            )
+            loops = f"{reach:.1f}", f"{reach / 60:.2f}", f"{reach / 120:.2f}"
+            both = (f"{packet:.2f} ({crest:.2f})" for packet, crest in zip(packets, crests, strict=True))
+            rows.append((f"{frequency:g}", f"{wavelength:.0f}", *rate, *loops, *both))
         for pull in (1.0, 2.0):
-            c = long_wave_speed(CHAIN, DENSITY * speed**2 + pull)
-            print(f"  {frequency:4.0f} Hz, T = ρv² + {pull} N: long waves at {speed - c:5.2f} and {speed + c:6.2f} m/s")
+            c = dispersion.long_wave_speed(CHAIN, DENSITY * speed**2 + pull)
+            rows.append(
+                (f"{frequency:g}", f"long, T = ρv² + {pull} N", *[""] * 5, *(f"{speed + v:.2f}" for v in (-c, c)))
+            )
+    print("Waves of the straight chain under T = ρv²; speeds in the room in m/s: packet (crest)")
+    print(table("Hz | links | ω, 1/s | γ, 1/s | reach, links | of 60 | of 120 | slow | fast", rows))
 
 
 def show_coulomb() -> None:
     """Coulomb friction as viscous friction of joints that swing about rest."""
+    rows = []
     for name in ("soft", "paper"):
         chain = preset(name)
-        frictions = (equivalent_friction(chain, spin) / chain.viscous_friction for spin in SPINS)
-        pairs = ", ".join(f"{friction:.2f} at {spin:g} rad/s" for spin, friction in zip(SPINS, frictions, strict=True))
-        print(f"Joint friction of {name} in units of β where joints swing about rest: {pairs}")
+        rows.append(
+            [name, *(f"{dispersion.equivalent_friction(chain, spin) / chain.viscous_friction:.2f}" for spin in SPINS)]
+        )
+    print("Joint friction in units of β where joints swing about rest")
+    print(table(["", *(f"{spin:g} rad/s" for spin in SPINS)], rows))
 
 
 def show_ring(speed: float, angles: Array, numbers: Array) -> None:
     """Modes of the ring: exact, simulation, straight chain, continuous ring, string."""
-    waves = ring_waves(CHAIN, LINKS, speed, numbers)
-    straight = straight_waves(CHAIN, DENSITY * speed**2, waves.phase)
-    found = measured(angles, waves, numbers, BOTH)
-    continuous = continuous_ring(CHAIN, LINKS, speed, numbers)
-    spin = ring_spin(CHAIN, LINKS, speed)
-    print(f"Ring of {LINKS} links, v = {speed:.3f} m/s, T = {DENSITY * speed**2:.2f} N; ω and γ in 1/s, slow and fast")
-    worst = []
+    waves = dispersion.ring_waves(CHAIN, LINKS, speed, numbers)
+    spin = dispersion.ring_spin(CHAIN, LINKS, speed)
+    exact, found = waves.rate[:, BOTH], measured(angles, waves, numbers, BOTH)
+    string = 1j * spin * np.stack([numbers, -numbers * (numbers**2 - 3.0) / (numbers**2 + 1)], axis=1)
+    known = {
+        "exact": exact,
+        "simulated": found,
+        "straight": dispersion.straight_waves(CHAIN, DENSITY * speed**2, waves.phase).rate[:, BOTH],
+        "continuous": dispersion.continuous_ring(CHAIN, LINKS, speed, numbers),
+        "string": string,
+    }
+    rows = []
     for k, number in enumerate(numbers):
-        theory = waves.rate[k, BOTH]
-        worst.append([np.abs(found[k].imag / theory.imag - 1), np.abs(found[k].real / theory.real - 1)])
-        room = (number * spin + waves.frequency[k, BOTH]) / number / spin
-        groups = 1 + waves.group_speed[k, BOTH] * LENGTH / speed
-        n = float(number)
-        string = -spin * n, spin * n * (n**2 - 3) / (n**2 + 1)
-        print(
-            f"  n {number:2d}: {LINKS / number:5.1f} links a wave\n"
-            f"    exact      {row(theory)}; in the room crests {room[0]:6.3f} v, {room[1]:6.3f} v, packets "
-            f"{groups[0]:6.3f} v, {groups[1]:6.3f} v\n"
-            f"    simulated  {row(found[k])}\n"
-            f"    straight   {row(straight.rate[k, BOTH])}\n"
-            f"    continuous {row(continuous[k])}\n"
-            f"    string     ω {string[0]:8.2f}             ω {string[1]:8.2f}"
-        )
-    greatest = 100 * np.array(worst).max(axis=(0, 2))
-    print(f"  simulated against exact: ω within {greatest[0]:.3f} %, γ within {greatest[1]:.2f} %")
-
-
-def row(rates: NDArray[np.complex128]) -> str:
-    """Frequencies and damping of the slow and the fast wave."""
-    return ", ".join(f"ω {-rate.imag:8.2f} γ {-rate.real:7.3f}" for rate in rates)
+        crests = (number * spin + waves.frequency[k, BOTH]) / number / spin
+        packets = 1 + waves.group_speed[k, BOTH] * LENGTH / speed
+        for name, rates in known.items():
+            texts = (text for rate in rates[k] for text in (f"{-rate.imag:.2f}", f"{-rate.real:.3f}"))
+            room = (f"{each:.3f}" for each in (*crests, *packets)) if name == "exact" else [""] * 4
+            rows.append((number, f"{LINKS / number:.1f}", name, *texts, *room))
+    print(f"Ring of {LINKS} links, v = {speed:.3f} m/s, T = {DENSITY * speed**2:.2f} N; 1/s, in the room in v")
+    head = "n | links a wave |  | slow ω | γ | fast ω | γ | slow crests | fast | slow packets | fast"
+    print(table(head, rows))
+    off = [100 * np.abs(one / other - 1).max() for one, other in ((found.imag, exact.imag), (found.real, exact.real))]
+    print(f"simulated against exact: ω within {off[0]:.3f} %, γ within {off[1]:.2f} %")
 
 
 def packets(links: int, number: int, width: float, speed: float) -> list[tuple[float, float]]:
     """Prints speeds and damping of two packets; returns their mean phases and speeds in the room in units of v."""
-    waves = ring_waves(CHAIN, links, speed, np.arange(2, links // 4 + 1))
+    waves = dispersion.ring_waves(CHAIN, links, speed, np.arange(2, links // 4 + 1))
     place, quickest = from_tap(links), waves.group_speed[number - 2, LOWER_FORWARD]
     times = np.linspace(0.17, 0.3, 41) * links / quickest
     envelope = np.exp(-(place**2) / (2 * width**2))
     angles = tapped(links, speed, 0.1 * np.cos(2 * np.pi * number * place / links) * envelope, times)
-    in_room = []
+    in_room, rows = [], []
     for name, column in (("slow", LOWER_BACKWARD), ("fast", LOWER_FORWARD)):
         speeds, damping = waves.group_speed[:, column], waves.damping[:, column]
         guess = speeds[number - 2] * times
         reach = np.minimum(np.abs(guess), links / 2 - np.abs(guess))
         found = [find_packet(*each) for each in zip(angles, guess, reach, strict=True)]
-        measured_speed = np.polyfit(times, [packet.place for packet in found], 1)[0]
+        along = np.polyfit(times, [packet.place for packet in found], 1)[0]
         expected = np.polyfit(times, [packet.mean(speeds) * t for packet, t in zip(found, times, strict=True)], 1)[0]
         falls = -np.polyfit(times, np.log([packet.amplitude for packet in found]), 1)[0]
         decay = float(np.mean([packet.mean(damping) for packet in found]))
-        room = 1 + measured_speed * LENGTH / speed
+        room = 1 + along * LENGTH / speed
         in_room.append((float(np.mean([packet.mean(waves.phase) for packet in found])), room))
-        print(
-            f"  {links} links, {links / number:.0f} a wave, {name}: {LENGTH * measured_speed:7.4f} m/s along the "
-            f"chain, theory {LENGTH * expected:7.4f} ({100 * (measured_speed / expected - 1):+.2f} %; of n = {number} "
-            f"{LENGTH * speeds[number - 2]:7.4f}); damping {falls:.3f} 1/s, theory {decay:.3f} "
-            f"({100 * (falls / decay - 1):+.2f} %); in the room {speed * room:.3f} m/s = {room:.3f} v"
-        )
+        of_n = f"{LENGTH * speeds[number - 2]:.4f}"
+        one = f"{LENGTH * along:.4f}", f"{LENGTH * expected:.4f} ({100 * (along / expected - 1):+.2f} %)", of_n
+        other = f"{falls:.3f}", f"{decay:.3f} ({100 * (falls / decay - 1):+.2f} %)"
+        rows.append((f"{links}", f"{links / number:.0f}", name, *one, *other, f"{speed * room:.3f} m/s = {room:.3f} v"))
+    print(table("links | a wave |  | along the chain, m/s | theory | of n | damping, 1/s | theory | in the room", rows))
     return in_room
 
 
@@ -199,83 +286,60 @@ def draw(speed: float, angles: Array, numbers: Array, room: list[tuple[float, fl
     """Frequency, damping and speed in the room against the phase per link."""
     tension = DENSITY * speed**2
     phases = np.linspace(0.02, np.pi / 2, 300)
-    rubbing, smooth = (straight_waves(chain, tension, phases) for chain in (CHAIN, SMOOTH))
+    rubbing, smooth = (dispersion.straight_waves(chain, tension, phases) for chain in (CHAIN, SMOOTH))
+    gap = [edge / 2 / np.pi for edge in dispersion.band_gap(CHAIN, tension)]
     figure = Figure(figsize=(11.0, 4.0), layout="constrained")
     left, middle, right = figure.subplots(1, 3)
-    draw_bands(left, rubbing, smooth, band_gap(CHAIN, tension))
-    for axes in (left, middle):
-        axes.set_xlim(0, np.pi)
-        axes.set_xticks([0, np.pi / 4, np.pi / 2, 3 * np.pi / 4, np.pi], ["0", "π/4", "π/2", "3π/4", "π"])
-        axes.set_xlabel("phase per link $κ$ / rad")
+    left.axhspan(*gap, color=GROUND, linewidth=0.0)
+    left.text(2.4, gap[1] + 3, "band gap", fontsize="small", color=INK, va="bottom")
+    for straight, dashes in ((rubbing, "-"), (smooth, ":")):
+        line = extended(straight, np.abs(straight.frequency) / (2 * np.pi), *FORWARD)
+        left.plot(*line, color=INK, linewidth=1.2, linestyle=dashes)
     for pick in (np.minimum, np.maximum):  # of both directions, which creep at different rates
         values = pick(rubbing.damping, rubbing.damping[:, ::-1])
-        middle.semilogy(*extended(rubbing, values, LOWER_FORWARD, UPPER_FORWARD), color=INK, linewidth=1.2)
-    middle.set(ylabel="damping $γ$ / s$^{-1}$", ylim=(0.01, 3000))
-    alone = np.zeros(LINKS)
-    alone[0] = 0.1
-    times, all_numbers = INTERVAL * np.arange(400), np.arange(2, LINKS // 4 + 1)
-    for chain, motion, shown, columns, filled in (
-        (CHAIN, angles, numbers, BOTH, True),
-        (SMOOTH, tapped(LINKS, speed, alone, times, SMOOTH), all_numbers, list(range(4)), False),
+        middle.semilogy(*extended(rubbing, values, *FORWARD), color=INK, linewidth=1.2)
+    alone = 0.1 * np.eye(LINKS)[0]
+    rung = tapped(LINKS, speed, alone, INTERVAL * np.arange(400), SMOOTH)
+    for chain, motion, shown, columns, more, face in (
+        (CHAIN, angles, numbers, BOTH, "", None),
+        (SMOOTH, rung, np.arange(2, LINKS // 4 + 1), list(range(4)), ", β/100", "none"),
     ):
-        waves = ring_waves(chain, LINKS, speed, shown)
-        rates = measured(motion, waves, shown, columns)
-        for which, column in enumerate(columns):
-            slow = column in (LOWER_BACKWARD, UPPER_BACKWARD)
-            place = waves.phase if column in BOTH else np.pi - waves.phase
-            colour = BLUE if slow else RED
-            style = {"marker": "o", "linestyle": "none", "markersize": 4.0, "color": colour, "zorder": 4}
-            style |= {} if filled else {"markerfacecolor": "none"}
-            label = ("slow" if slow else "fast") + ("" if filled else ", β/100")
-            left.plot(
-                place, np.abs(rates[:, which].imag) / (2 * np.pi), label=label if column in BOTH else None, **style
-            )
-            if filled:
-                middle.plot(place, -rates[:, which].real, **style)
-    left.legend(
-        frameon=False, fontsize="small", loc="upper left", title="modes of a tapped ring", title_fontsize="small"
-    )
+        waves = dispersion.ring_waves(chain, LINKS, speed, shown)
+        for rates, column in zip(measured(motion, waves, shown, columns).T, columns, strict=True):
+            slow, lower = column in (LOWER_BACKWARD, UPPER_BACKWARD), column in BOTH
+            place = waves.phase if lower else np.pi - waves.phase
+            label = ("slow" if slow else "fast") + more if lower else None
+            style: dict[str, Any] = {"marker": "o", "linestyle": "none", "markersize": 4.0, "zorder": 4}
+            style |= {"color": BLUE if slow else RED, "markerfacecolor": face, "label": label}
+            left.plot(place, np.abs(rates.imag) / (2 * np.pi), **style)
+            if face is None:
+                middle.plot(place, -rates.real, **style)
+    title = {"title": "modes of a tapped ring", "title_fontsize": "small"}
+    left.legend(frameon=False, fontsize="small", loc="upper left", **title)
     for wavelength in WAVELENGTHS:
         phase = 2 * np.pi / wavelength
-        one = straight_waves(CHAIN, tension, [phase])
-        middle.annotate(
-            f"{wavelength:.0f} links:\nreach {one.reach[0, LOWER_FORWARD]:.0f}",
-            (phase, one.damping[0, LOWER_FORWARD]),
-            xytext=(26, -6),
-            textcoords="offset points",
-            fontsize="small",
-            arrowprops={"arrowstyle": "-", "color": FAINT},
-        )
-    draw_room(right, speed, room)
-    for axes in (left, middle, right):
-        tidy(axes, grid="y")
-    return figure
-
-
-def draw_bands(axes: Axes, rubbing: Waves, smooth: Waves, gap: tuple[float, float]) -> None:
-    """Frequencies of the straight chain with its friction and hardly any, and the band gap."""
-    axes.axhspan(gap[0] / 2 / np.pi, gap[1] / 2 / np.pi, color=GROUND, linewidth=0.0)
-    for waves, style in ((rubbing, "-"), (smooth, ":")):
-        line = extended(waves, np.abs(waves.frequency) / (2 * np.pi), LOWER_FORWARD, UPPER_FORWARD)
-        axes.plot(*line, color=INK, linewidth=1.2, linestyle=style)
-    axes.text(2.4, gap[1] / 2 / np.pi + 3, "band gap", fontsize="small", color=INK, va="bottom")
-    axes.set(ylabel="frequency $|ω|/2π$ / Hz", ylim=(0, None))
-
-
-def draw_room(axes: Axes, speed: float, room: list[tuple[float, float]]) -> None:
-    """Speeds of packets in the room, of the ring of 180 links, the straight chain and measured."""
-    numbers = np.arange(2, 46)
-    ring = ring_waves(CHAIN, 180, speed, numbers)
-    straight = straight_waves(CHAIN, DENSITY * speed**2, np.linspace(0.01, np.pi / 2, 300))
-    for waves, style, label in ((ring, "-", "ring of 180 links"), (straight, ":", "straight chain")):
-        for column, colour in ((LOWER_BACKWARD, BLUE), (LOWER_FORWARD, RED)):
+        one = dispersion.straight_waves(CHAIN, tension, [phase])
+        text = f"{wavelength:.0f} links:\nreach {one.reach[0, LOWER_FORWARD]:.0f}"
+        way = {"xytext": (26, -6), "textcoords": "offset points", "arrowprops": {"arrowstyle": "-", "color": FAINT}}
+        middle.annotate(text, (phase, one.damping[0, LOWER_FORWARD]), fontsize="small", **way)
+    ring = dispersion.ring_waves(CHAIN, 180, speed, np.arange(2, 46))
+    for waves, dashes, label in ((ring, "-", "ring of 180 links"), (rubbing, ":", "straight chain")):
+        for column, colour in zip(BOTH, (BLUE, RED), strict=True):
             value = 1 + waves.group_speed[:, column] * LENGTH / speed
-            axes.plot(waves.phase, value, color=colour, linestyle=style, linewidth=1.2, label=label)
+            right.plot(waves.phase, value, color=colour, linestyle=dashes, linewidth=1.2, label=label)
             label = None
-    axes.plot(*np.array(room).T, "o", color=GREEN, markersize=5.0, label="packets, simulated", zorder=4)
-    axes.set(xlim=(0, np.pi / 2), ylim=(-0.2, 2.6), xlabel="phase per link $κ$ / rad", ylabel="speed in the room / $v$")
-    axes.set_xticks([0, np.pi / 4, np.pi / 2], ["0", "π/4", "π/2"])
-    axes.legend(frameon=False, fontsize="small", loc="center left")
+    right.plot(*np.array(room).T, "o", color=GREEN, markersize=5.0, label="packets, simulated", zorder=4)
+    right.legend(frameon=False, fontsize="small", loc="center left")
+    ticks = ["0", "π/4", "π/2", "3π/4", "π"]
+    for axes, quarters, label, limits in (
+        (left, 4, "frequency $|ω|/2π$ / Hz", (0, None)),
+        (middle, 4, "damping $γ$ / s$^{-1}$", (0.01, 3000)),
+        (right, 2, "speed in the room / $v$", (-0.2, 2.6)),
+    ):
+        axes.set_xticks(np.arange(quarters + 1) * np.pi / 4, ticks[: quarters + 1])
+        end = quarters * np.pi / 4
+        tidy(axes, grid="y", xlabel="phase per link $κ$ / rad", xlim=(0, end), ylabel=label, ylim=limits)
+    return figure
 
 
 def main() -> None:
@@ -292,4 +356,4 @@ def main() -> None:
     places = []
     for how_many, wave_number, spread in ((160, 20, 12.0), (180, 15, 10.0), (360, 15, 20.0)):
         places += packets(how_many, wave_number, spread, at_20)
-    save_figure(draw(at_20, ring_angles, ring_numbers, places), FIGURE)
+    publish(FOLDER, {}, {"dispersion": draw(at_20, ring_angles, ring_numbers, places)})

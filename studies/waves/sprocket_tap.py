@@ -13,6 +13,7 @@ import numpy as np
 import warpchain
 from studies.common import table
 from studies.waves.fields import curvatures, in_room, joints_below, normal_velocities
+from studies.waves.wave_drag import inertia_of
 
 LINKS: Final = 120
 FREQUENCIES: Final = (15.0, 20.0, 25.0)
@@ -30,24 +31,16 @@ def dipping(frequency: float, clearance: float) -> warpchain.WalkResult:
     """A loop of `LINKS` on a sprocket that dips within 0.06 s and stays for 0.12 s more."""
     shares = np.linspace(0, 1, 13)[1:]
     dip = [[0.05 + 0.06 * s, 0, -DIP * np.sin(np.pi * s) ** 2, frequency] for s in shares.tolist()]
-    return warpchain.walk(
-        links=LINKS,
-        frequency=frequency,
-        preset="soft",
-        start="spinning",
-        further_hold=4,
-        clearance=clearance,
-        release=[[0.05, 0, 0, frequency], *dip, [0.22, 0, 0, frequency]],
-        walk_until=0.2,
-        frame_interval=INTERVAL,
-    )
+    scene = {"links": LINKS, "frequency": frequency, "start": "spinning", "further_hold": 4, "clearance": clearance}
+    release = [[0.05, 0, 0, frequency], *dip, [0.22, 0, 0, frequency]]
+    return warpchain.walk(preset="soft", **scene, release=release, walk_until=0.2, frame_interval=INTERVAL)
 
 
 def found(frequency: float) -> list[str]:
     """A row of the table: where and how fast is what the tap leaves, least and greatest over the time after it."""
     plain, tapped = dipping(frequency, 0.5), dipping(frequency, 0.005)
     parameters, time = plain.setup.parameters, plain.frame_time
-    length, masses = parameters.link_length, np.tile([parameters.inner_mass, parameters.outer_mass], LINKS // 2)
+    length, masses = parameters.link_length, inertia_of(LINKS, parameters)[:, 0]
     below = joints_below(plain.frame_joints, masses)
     run = abs(np.polyfit(time, below, 1)[0]) * length
     bend, across = (

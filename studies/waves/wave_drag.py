@@ -12,9 +12,9 @@ The drag is an experiment, no physics of the chain: with it one asks whether the
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from studies.common import Array
+from warpchain import Chains, Parameters, Status
 
 TWELFTH: Final = 1.0 / 12.0
 """A link is a chord: its direction is that of the path at its middle less this share of the second difference of θ."""
@@ -23,6 +23,19 @@ RUNNING: Final = [0, 1, 3]
 """Motions of `loop_motions` that leave the path in its shape and direction."""
 RIGID: Final = [0, 1, 2]
 """Motions of `loop_motions` that hold momentum and angular momentum."""
+
+
+def inertia_of(links: int, parameters: Parameters) -> Array:
+    """Mass, mass [kg] and moment of inertia [kg m²] of each link, (n, 3)."""
+    inner, outer = (parameters.inner_mass, parameters.inner_inertia), (parameters.outer_mass, parameters.outer_inertia)
+    return np.tile([[mass, mass, inertia] for mass, inertia in (inner, outer)], (links // 2, 1))
+
+
+def distances(chains: Chains, inertia: Array) -> Array:
+    """Δx [m] of chains, NaN of one that did not come to rest; `inertia` (W, n, 3) as of `wave_motion`."""
+    mass = inertia[..., 0]
+    dx: Array = np.sum(mass * chains.motions()[0][..., 0], axis=1) / mass.sum(axis=1)
+    return np.where(chains.status == Status.AT_REST, dx, np.nan)
 
 
 def loop_motions(position: Array, link_length: Array) -> tuple[Array, Array]:

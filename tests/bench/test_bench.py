@@ -6,15 +6,12 @@ import numpy as np
 import pytest
 
 from tests.oracle_model import motion_equations
-from tests.support import command_line
 from tests.support.command_line import Command
 from warpchain.bench import measurements, numpy_model
 from warpchain.inputs.parameters import preset
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels.methods.method import method_names
 from warpchain.run.simulation import simulate
-
-command = command_line.command
 
 PAPER = preset("paper")
 

@@ -7,16 +7,12 @@ from typing import NoReturn
 import pytest
 
 import warpchain
-from tests.support import command_line
 from tests.support.command_line import Command
 from warpchain.inputs.sections import SECTION_OF
 from warpchain.store.folder import SweepFolder
 from warpchain.sweeps.plan import Sweep, load_sweep
 from warpchain.sweeps.sweep_file import sweep_schema
 
-command = command_line.command
-
-QUICK = "--links 32 --preset soft --method dp5 --start ellipse --set walk_limit=1e-6 --json".split()
 ROOT = Path(__file__).parents[2]
 
 

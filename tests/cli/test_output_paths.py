@@ -8,24 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.support import command_line
+from tests.run.test_sweep_run import TINY
 from tests.support.command_line import Answer, Command
 from tests.support.made_sweeps import TOLERANCE, make_sweep
 from tests.support.made_walks import make_walk
-
-command = command_line.command
-
-QUICK = "--links 32 --preset soft --method dp5 --start ellipse --frequency 5".split()
-SWEEP = """\
-version: 1
-name: some
-seed: 1
-preset: soft
-samples: 2
-scene: {links: 32, start: ellipse, walk_limit: 0.001}
-options: {method: dp5}
-grid: {frequency: [5, 6]}
-"""
 
 OUTPUTS = {
     "report swept -o {}": "page.html",
@@ -69,16 +55,6 @@ def assert_refused(answer: Answer, status: int, *words: str) -> None:
         assert word in answer.err
 
 
-@pytest.mark.parametrize("line", [*OUTPUTS, "walk -o {}", "sweep some.yaml -o {}"])
-def test_an_empty_path_is_refused(command: Command, line: str) -> None:
-    """It is not taken for the current folder; status 2, one line, nothing written."""
-    prepare()
-    before = content()
-    answer = command(*("" if word == "{}" else word for word in line.split()))
-    assert_refused(answer, 2, "a path is empty; name a file or folder")
-    assert answer.out == "" and content() == before
-
-
 @pytest.mark.parametrize("line", OUTPUTS)
 def test_a_pipe_in_the_way_is_refused(command: Command, line: str) -> None:
     """No command waits for a pipe or replaces it; status 2, one line, nothing written."""
@@ -104,7 +80,7 @@ def test_a_full_disk_gives_one_line(command: Command, line: str) -> None:
 
 def test_a_sweep_goes_on_after_a_full_disk(command: Command) -> None:
     """A shard that has no room: status 1, one line, no part; then the same bytes as without."""
-    Path("some.yaml").write_text(SWEEP, encoding="utf-8")
+    Path("some.yaml").write_text(str(TINY | {"samples": 2}), encoding="utf-8")
     expected = command("sweep", "some.yaml", "-o", "whole")
     assert expected.status == 1, "the time limit of the walks"
     command("sweep", "some.yaml", "-o", "results")

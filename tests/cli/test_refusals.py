@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from tests.run.test_sweep_run import TINY
-from tests.support import command_line
 from tests.support.command_line import Command
 from tests.support.made_sweeps import make_sweep
 from tests.support.made_walks import make_walk
@@ -16,44 +15,25 @@ from warpchain.cli.terminal import print_sweep
 from warpchain.inputs.yaml_files import parse_yaml
 from warpchain.sweeps.shipped import shipped_sweeps
 
-command = command_line.command
-
 ESCAPE = "\x1b]0;owned\x07\x1b[2J"
 
 REFUSED = {
     "walk -o new --links 61": "scene.links: 61 is odd",
-    "walk -o new --frequency -5": "scene.frequency: Input should be greater than or equal to 0, in Hz; given -5",
-    "walk -o new --method rk4": "options.method: 'rk4' is unknown",
-    "walk -o new --preset hard": "preset: 'hard' is unknown; presets are paper, soft",
-    "walk -o new --seed -1": "seed: Input should be greater than or equal to 0; given -1",
-    "walk --set parameters.gravity=yes": "parameters.gravity: Input should be a valid number, in m/s²; given True",
-    "walk --set clearance=[1": "scene.clearance, line 1: ",
     "walk --set clearance": "--set: 'clearance' gives no value",
-    "walk --set clearence=0.01": "--set 'clearence': unknown name; did you mean scene.clearance?",
     "walk --set scene.gravity=1": "--set 'scene.gravity': unknown name; give it in parameters",
-    "walk --set links=62 --links 64": "scene.links: given twice on the command line; give it once",
     "walk --set mu_fc=0.3 --set floor_friction=0.3": "parameters.floor_friction: given twice on the command line;",
     "walk -o new --device cuda:98": "options.device: there is no cuda:98 on this machine",
     "walk --config nowhere.yaml": "nowhere.yaml: No such file",
-    "walk -o new --frame-interval 0": "frame_interval: 0 is no positive time in s",
-    "walk --animate gif": "--animate: there is no folder to write to; add -o DIR",
-    "walk -o new --animate avi": "Invalid value for '--animate'",
-    "walk --frobnicate": "No such option: --frobnicate (Possible options: --animate); see warpchain walk --help",
+    "walk --frobnicate": "No such option: --frobnicate; see warpchain walk --help",
+    "walk --animate walk.gif": "No such option: --animate; give -o DIR, then run `warpchain animate DIR`",
     "walk extra": "Got unexpected extra argument(s) (extra); see warpchain walk --help",
     "walk -o walk.h5": "walk.h5: cannot be written (Not a directory); give a folder that is there",
-    "walk -o walk.h5/below": "walk.h5/below: cannot be written (Not a directory)",
     f"walk -o {'x' * 300}": "xxx",
-    "walk --like nowhere.h5": "nowhere.h5: cannot be read (No such file or directory)",
     "walk --like walk.h5 --seed 3": "--seed: given together with --like",
-    "walk --like walk.h5 --links 61": "scene.links: 61 is odd",
-    "walk --index 3": "--index: names a walk of a sweep, but --like is missing",
-    "plot nowhere.h5": "nowhere.h5: cannot be read (No such file or directory)",
     "plot text.h5": "text.h5: not an HDF5 file",
     "plot walk.h5 --quantity dx": "--quantity: a saved walk has no columns",
     "plot walk.h5 -o text.h5": "text.h5: cannot be written (File exists); give a folder",
     "animate nowhere.h5": "nowhere.h5: cannot be read (No such file or directory)",
-    "animate walk.h5 -o walk.avi": "walk.avi: unknown kind of picture",
-    "animate walk.h5 --fps 0": "fps: 0.0 is not a positive number",
     "animate walk.h5 -o nowhere/walk.gif": "nowhere/walk.gif: cannot be written",
     "foo": "No such command 'foo'; see warpchain --help",
     "info": "Missing argument 'DIR'; see warpchain info --help",
@@ -61,19 +41,12 @@ REFUSED = {
     "schema -o no/schema.json": "no/schema.json: cannot be written",
     "sweep": "FILE.yaml: missing; give a sweep file, or --new FILE.yaml",
     "sweep figure6": "--output: missing; give a folder for the results with -o DIR",
-    "sweep figur6 -o new": "figur6: neither a file nor a shipped sweep; did you mean figure6?",
     "sweep x -o new": f"x: neither a file nor a shipped sweep; give one of {', '.join(shipped_sweeps())}",
     "sweep --new no/new.yaml": "--new: no/new.yaml: cannot be written (No such file or directory); give",
     "sweep --new new.yaml -o new": "--new: given together with other arguments; leave them out",
-    "sweep tiny.yaml -o new --gpus 0": "Invalid value for '--gpus'",
     "sweep tiny.yaml -o new --gpus 2 --workers 3": "--workers: given together with --gpus; leave one out",
-    "sweep tiny.yaml -o new --gpus 2 --scheduler tcp://a:1": "--scheduler: given together with --gpus; leave one out",
     "sweep tiny.yaml -o new --gpus 2 --device cpu": "--device: cpu is given together with --gpus; give cuda",
-    "sweep tiny.yaml -o new --gpus 2": "--gpus: 2 wanted, but CUDA_VISIBLE_DEVICES is '3'; give at most 1",
-    "sweep tiny.yaml -o new --device cuda:97": "options.device: there is no cuda:97 on this machine",
     "bench --links 61": "bench.links: 61 is odd",
-    "bench --links 60 --links 2": "bench.links: Input should be greater than or equal to 4",
-    "bench --device gpu": "bench.device: 'gpu' is no device",
     "bench --device cuda:99 --links 2000": "bench.links: 2000 links are more than a GPU's block has threads",
 }
 """Arguments → how the line of refusal begins."""
@@ -99,11 +72,8 @@ HOSTILE = [
 
 
 @pytest.mark.parametrize("arguments", [*map(str.split, REFUSED), *HOSTILE], ids=lambda words: " ".join(words)[:60])
-def test_bad_input_is_refused_in_one_line(
-    command: Command, tmp_path: Path, arguments: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_bad_input_is_refused_in_one_line(command: Command, tmp_path: Path, arguments: list[str]) -> None:
     """On stderr; nothing on stdout, and no folder; no walk is run before."""
-    monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "3")
     make_walk().save("walk.h5")
     Path("text.h5").write_text("no walk", encoding="utf-8")
     Path("tiny.yaml").write_text(str(TINY), encoding="utf-8")
@@ -126,7 +96,7 @@ def test_names_of_files_are_printed_without_control_characters(command: Command,
 
 
 def test_a_folder_cannot_hide_its_name(command: Command, tmp_path: Path) -> None:
-    """The name in a folder's sweep.json may have been changed; the table of the sweep writes escapes."""
+    """The name in a folder may have been changed; the table of the sweep writes escapes."""
     result = make_sweep(tmp_path / "s", content())
     result.sweep["name"] = ESCAPE
     with contextlib.redirect_stdout(io.StringIO()) as out:

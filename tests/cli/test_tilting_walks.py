@@ -1,6 +1,5 @@
 """A chain whose plane tilts, from the command line to files: walks, sweeps, and what is refused."""
 
-import json
 from pathlib import Path
 
 import h5py
@@ -8,11 +7,8 @@ import numpy as np
 import pytest
 
 import warpchain
-from tests.support import command_line
 from tests.support.command_line import Command
 from warpchain.status import Status
-
-command = command_line.command
 
 SHORT = ["--links", "20", "--preset", "soft", "--start", "ellipse", "--frequency", "8", "--method", "explicit"]
 TAPPED = ["--set", "plane=tilting", "--set", "tilt=0.3"]
@@ -32,29 +28,6 @@ def test_a_walk_that_falls_over_tells_and_draws_it(tmp_path: Path, command: Comm
     radius, width = walk.setup.parameters.circle_radius, walk.setup.parameters.half_width
     assert -2e-4 < room[..., 1].min() - min(radius, width) < 2e-3  # joints stay above the floor by a rim at least
     np.testing.assert_allclose(np.linalg.norm(walk.frame_axes, axis=2), 1.0, rtol=1e-12)
-
-
-def test_a_planar_walk_has_no_plane(tmp_path: Path, command: Command) -> None:
-    """Its table, its folder and its columns say nothing of one; an older picture of a plane goes."""
-    (tmp_path / "tilt.png").write_bytes(b"of another walk")
-    found = json.loads(command("walk", *SHORT, "--json", "-o", str(tmp_path)).out)
-    assert found["fell_over"] == -1 and found["lateral_drift"] is None
-    assert not (tmp_path / "tilt.png").exists()
-    assert warpchain.load_walk(tmp_path / "walk.h5").joints_in_room is None
-
-
-@pytest.mark.parametrize(
-    ("words", "line"),
-    [
-        (["--set", "tilt=0.1"], "scene.tilt: 0.1 moves the plane of the chain, which is fixed; give plane: tilting"),
-        ([*TAPPED, "--method", "hybrid"], "options.method: 'hybrid' keeps the plane of a chain fixed; give explicit"),
-        (["--set", "plane=tilting", "--set", "tilt=1.6"], "scene.tilt: "),
-    ],
-)
-def test_what_cannot_tilt_is_refused(words: list[str], line: str, command: Command) -> None:
-    """One line, exit status 2."""
-    answer = command("walk", *[word for word in SHORT if word not in ("--method", "explicit")], *words)
-    assert answer.status == 2 and line in answer.err and answer.err.count("\n") == 1
 
 
 def test_a_sweep_keeps_planes(tmp_path: Path, command: Command) -> None:

@@ -3,16 +3,14 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import warpchain
-from tests.support import command_line
 from tests.support.command_line import Command
+from tests.support.made_walks import assert_same
+from warpchain.inputs.options import Options
 from warpchain.inputs.validation import InputError
-from warpchain.walks.walk_result import STORED, WalkResult
-
-command = command_line.command
+from warpchain.walks.walk_result import WalkResult
 
 TINY = {
     "links": 20,
@@ -66,15 +64,6 @@ def test_plot_of_a_walk_that_never_was_released_fails(command: Command) -> None:
     assert [path.name for path in Path().iterdir()] == ["walk.h5"]
 
 
-def test_loads_are_recorded(command: Command) -> None:
-    """`--record-loads` takes frames 0.1 ms apart, with forces."""
-    line = "--links 20 --frequency 8 --preset soft --start ellipse --set walk_limit=0.03 --set clearance=0.002"
-    command("walk", *line.split(), "--record-loads", "-o", "fine")
-    walk = warpchain.load_walk("fine/walk.h5")
-    assert walk.setup.options.method == "os32"
-    assert walk.frame_forces.shape == (len(walk.frame_time), 20, 2) and len(walk.frame_time) > 290
-
-
 @pytest.mark.parametrize(("suffix", "beginning"), [("gif", b"GIF89a"), ("html", b"<!DOCTYPE html>")])
 def test_animate_writes_a_moving_picture(command: Command, saved: Path, suffix: str, beginning: bytes) -> None:
     """The file is of the kind that its suffix says."""
@@ -88,10 +77,7 @@ def test_like_repeats_a_walk_to_the_bit(command: Command, tiny_walk: WalkResult,
     answer = command("walk", "--like", str(saved.parent), "-o", "again")
     assert answer.status == 1  # of the time limit, as the saved walk
     again = warpchain.load_walk("again/walk.h5")
-    assert (again.setup, again.seed, again.status) == (tiny_walk.setup, 7, tiny_walk.status)
-    for name in STORED:
-        if name != "wall_time":
-            np.testing.assert_equal(getattr(again, name), getattr(tiny_walk, name), err_msg=name)
+    assert_same(again, tiny_walk, "wall_time")
 
 
 def test_like_changes_single_values(command: Command, tiny_walk: WalkResult, saved: Path) -> None:
@@ -118,8 +104,6 @@ def test_a_method_beside_like_brings_its_settings(
     command: Command, saved: Path, monkeypatch: pytest.MonkeyPatch, line: str, expected: dict[str, object]
 ) -> None:
     """A method means the same as in a new walk."""
-    from warpchain.inputs.options import Options
-
     seen = []
 
     def run_walk(setup: object, **_: object) -> None:

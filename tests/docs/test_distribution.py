@@ -1,4 +1,4 @@
-"""The package works when it is installed from its distributions, outside the repository."""
+"""The package works when it is installed from its distributions, outside the repository, and when it is not."""
 
 import json
 import os
@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+import warpchain
 from tests.docs.code_blocks import ROOT
 from warpchain.sweeps.plan import load_sweep
 
@@ -68,10 +69,30 @@ def test_wheel_walks_outside_the_repository(sdist: Path, tmp_path: Path) -> None
     words = "walk --start ellipse --links 10 --frequency 3 --preset soft --json"
     walk = json.loads(run(command, *words.split(), cwd=tmp_path))
     assert walk["status"] == "at_rest" and walk["scene"]["links"] == 10
-    run(command, *words.replace("--json", "-o film --animate html").split(), cwd=tmp_path)
+    run(command, *words.replace("--json", "-o film").split(), cwd=tmp_path)
+    run(command, "animate", "film", "-o", "film/walk.html", cwd=tmp_path)
     assert (tmp_path / "film/walk.html").is_file()
     assert run(command, "sweep", "--new", "new.yaml", cwd=tmp_path) == "new.yaml\n"
     for name in ("new.yaml", *(path.stem for path in (ROOT / "sweeps").iterdir())):
         program = f"from warpchain.sweeps.plan import load_sweep; print(load_sweep({name!r}).digest())"
         expected = load_sweep(tmp_path / name if name == "new.yaml" else name).digest()
         assert run(python, "-c", program, cwd=tmp_path) == f"{expected}\n"
+
+
+def test_a_checkout_without_metadata_runs() -> None:
+    """Version and provenance need no installed warpchain."""
+    program = (
+        f"import sys\nsys.path.insert(0, {str(ROOT)!r})\n"
+        "import importlib.metadata as metadata\n"
+        "found = metadata.version\n"
+        "def version(name):\n"
+        "    if name == 'warpchain':\n"
+        "        raise metadata.PackageNotFoundError(name)\n"
+        "    return found(name)\n"
+        "metadata.version = version\n"
+        "import warpchain\n"
+        "walk = warpchain.walk(links=30, frequency=5.0, preset='soft', start='ellipse', walk_limit=0.01)\n"
+        "print(warpchain.__version__, walk.versions['warpchain'])\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, encoding="utf-8")
+    assert done.stdout.split() == [warpchain.__version__] * 2, done.stderr

@@ -45,12 +45,3 @@ def anchors(page: Path) -> set[str]:
     """Anchors of a page's headings, as GitHub makes them."""
     headings = re.findall(r"^#+ (.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
-
-
-def test_ci_runs_the_command_of_the_readme() -> None:
-    """The README's test command is the one that .ci/run runs, but for the place of the environment."""
-    script = (ROOT / ".ci/run").read_text(encoding="utf-8")
-    run = next(line for line in script.splitlines() if line.startswith("python3 -m venv"))
-    assert run.replace('"$venv/', '"$venv"/').replace('"$venv"', ".venv-test").replace('"', "") in (
-        ROOT / "README.md"
-    ).read_text(encoding="utf-8")

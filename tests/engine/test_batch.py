@@ -1,15 +1,15 @@
 """Batches side by side, their memory, and the copies of their arrays on the host; what of it needs no GPU."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import pytest
-import warp as wp
 
 from tests.run.test_sweep_run import brief_setup, outcomes
 from warpchain.engine.batch import Batch
-from warpchain.engine.devices import start_device
-from warpchain.engine.memory import CAPACITY_FRAMES, CAPACITY_SAMPLES, world_bytes
+from warpchain.engine.devices import Fibers
 from warpchain.inputs.options import Options
+from warpchain.inputs.setup import Setup
 from warpchain.walks import scheduler
 
 
@@ -24,9 +24,10 @@ class SlowBatch(Batch):
         return self.asked % 3 == 0
 
 
-def several_batches(options: Options, links: Sequence[int], *_: object) -> tuple[list[Batch], int]:
+def several_batches(setups: Sequence[Setup], *_: object) -> tuple[list[Batch], int]:
     """As many as a GPU gets, one larger than the others."""
-    return [SlowBatch(worlds, max(links), options) for worlds in (1, 3, 1, 1)], 6
+    longest = max(setup.scene.links for setup in setups)
+    return [SlowBatch(worlds, longest, setups[0].options) for worlds in (1, 3, 1, 1)], 6
 
 
 def test_walks_do_not_depend_on_the_batches_they_are_spread_over(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -39,17 +40,21 @@ def test_walks_do_not_depend_on_the_batches_they_are_spread_over(monkeypatch: py
     assert outcomes(setups) == alone
 
 
-@pytest.mark.parametrize(("keeps_samples", "frame_every"), [(False, None), (True, 2)])
-def test_memory_of_a_world_is_what_a_batch_takes(keeps_samples: bool, frame_every: int | None) -> None:
-    """What is planned for a world is what the arrays of a batch take for it, and at most 1 % more."""
-    options, device = Options(method="dp5"), start_device("cpu")
+@pytest.mark.parametrize("kept", [{}, {"keeps_samples": True, "frame_every": 2, "keeps_loads": True}])
+def test_a_gpu_carries_as_many_chains_as_fit(kept: dict[str, Any]) -> None:
+    """A batch knows what its arrays take, in proportion to its worlds; half of the free memory is enough for all."""
+    taken = [Batch(worlds, 60, Options(method="dp5"), **kept).bytes for worlds in (40, 80)]
+    assert taken[1] == pytest.approx(2 * taken[0], rel=0.01) and taken[0] > 40 * 60 * 8 * 20
+    options = Options(method="dp5", device="fibers")
+    worlds = scheduler.most_worlds(60, options=options, **kept)
+    free = Fibers.free_memory
+    assert 1 <= worlds and Batch(worlds, 60, options, **kept).bytes <= free / 2
 
-    def taken(worlds: int) -> int:
-        batch = Batch(worlds, 60, options, keeps_samples=keeps_samples, frame_every=frame_every)
-        parts = [batch.model, batch.drive, batch.state, batch.record]
-        arrays = [getattr(part, name) for part in parts for name in part._cls.vars]
-        return sum(array.capacity for array in [*arrays, batch.scratch, batch.lists] if isinstance(array, wp.array))
 
-    samples, frames = CAPACITY_SAMPLES * keeps_samples, CAPACITY_FRAMES * (frame_every is not None)
-    planned = world_bytes(60, options, samples, frames, device)
-    assert 0.99 * planned <= (taken(80) - taken(40)) / 40 <= planned
+def test_a_gpu_that_is_nearly_full_carries_one_chain_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However little memory is free, a walk is begun; twice the memory carries twice the chains."""
+    options = Options(method="dp5", device="fibers")
+    one = Batch(1, 60, options).bytes
+    for free, worlds in ((0, 1), (7 * one, 3), (15 * one, 7)):
+        monkeypatch.setattr(Fibers, "free_memory", free)
+        assert scheduler.most_worlds(60, options=options) == worlds

@@ -11,12 +11,13 @@ from warpchain.engine import kernel_entries
 from warpchain.engine.kernel_entries import kernel_entry, step_module
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
+from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
 
 FEATURES = Features("dp5", layout.padded_width(60), "floor", True)
 
 
 def test_what_would_be_compiled_anew_has_another_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Features, block, registers, device, sources, Warp, Python and options of the compiler each change the name."""
+    """Features, block, registers, sources, a method's numbers, Warp, Python, options of the compiler each change it."""
 
     def name(features: Features = FEATURES, threads: int = 1, registers: int | None = None) -> str:
         return kernel_entry.__wrapped__(features, threads, registers).module.name
@@ -33,6 +34,10 @@ def test_what_would_be_compiled_anew_has_another_name(monkeypatch: pytest.Monkey
         with monkeypatch.context() as patch:
             patch.setattr(target, attribute, value)
             names.append(name())
+    tableau = TABLEAUS["dp5"]
+    monkeypatch.setitem(TABLEAUS, "dp5", replace(tableau, embedded=tableau.weights))
+    names.append(name())
+    monkeypatch.setitem(TABLEAUS, "dp5", tableau)
     assert len(set(names)) == len(names)
     assert name() == names[0]
 

@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import warpchain
 from tests.support.made_films import motion
 from warpchain import InputError, films
 
@@ -106,25 +105,3 @@ def test_an_unknown_unit_or_a_missing_file_is_refused(tmp_path: Path) -> None:
     path.unlink()
     with pytest.raises(OSError, match=r"film\.txt"):
         films.read(tmp_path / "film.txt", links=60, frequency=20.0)
-
-
-def test_from_a_table_to_the_friction(tmp_path: Path) -> None:
-    """A walk to the left in slow motion, spun long before its release, in a German table: μ within its error.
-
-    With a wrong unit or frame rate one line says what to check.
-    """
-    chain, random, camera = {"floor_friction": 0.31}, np.random.default_rng(8), films.Camera()
-    walk = warpchain.walk(links=60, frequency=20.0, start="spinning", preset="soft", walk_limit=0.6, **chain)
-    film = films.film_of(walk, camera, seed=3)
-    spun = film.center[film.time < 0].mean(axis=0) + random.normal(size=(300, 2)) * camera.noise
-    center = np.concatenate([spun, film.center]) * [-100, 100] + [31.7, -12.4]
-    rows = table(np.arange(len(center)) / 30, center, ";").replace(".", ",").splitlines()
-    rows[::97] = [f"{row.split(';')[0]};;" for row in rows[::97]]
-    path = write(tmp_path, "\n".join(["mass A", "t;x;y", *rows]))
-    given = {"links": 60, "frequency": 20.0, "origin": (31.7, -12.4), "direction": "left"}
-    line = films.friction_line(films.read(path, unit="cm", fps=240, **given))
-    assert abs(line.friction - 0.31) < 3 * line.error < 0.02
-    with pytest.raises(InputError, match="check unit and fps"):
-        films.read(path, unit="mm", fps=240, **given)
-    with pytest.raises(InputError, match=r"camera\.fps: .* slow motion"):
-        films.friction_line(films.read(path, unit="cm", **given))

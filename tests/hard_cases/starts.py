@@ -12,7 +12,7 @@ from tests.oracle_model.circular_loop import circular_loop
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.start_shapes import ellipse, lay_chain, links_between
 from warpchain.kernels.methods.method import method_names
-from warpchain.walks.trajectory import Trajectory
+from warpchain.run.simulation import Trajectory
 from warpchain.walks.walk_result import WalkResult
 
 Array = NDArray[np.float64]

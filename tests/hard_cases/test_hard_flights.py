@@ -267,8 +267,8 @@ def test_elastic_bouncing_keeps_the_energy_for_a_second(method, tolerance, bound
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["os32", "hybrid"])
 def test_long_chains(method):
-    """1000 links hit the floor like any other number; other explicit methods differ in coefficients alone."""
-    fall = Flight(SOFT, partial(dropped_circle, 1000), 5e-3)
+    """590 links hit the floor like any other number; other explicit methods differ in coefficients alone."""
+    fall = Flight(SOFT, partial(dropped_circle, 590), 5e-3)
     flight = fall.simulate(method)
     assert_sound(flight, SOFT, fall.start())
     assert flight.impulses["floor"] > 100

@@ -4,10 +4,9 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 import pytest
 
-from tests.hard_cases.starts import METHODS, SOFT, UNDISSIPATIVE, every_method, ledger_error, quick_with
+from tests.hard_cases.starts import METHODS, SOFT, every_method, ledger_error, quick_with
 from tests.support.setups import setup_walk
 from warpchain import Status, WalkResult
 from warpchain.inputs.methods import METHODS_BY_NEED
@@ -118,16 +117,6 @@ def test_standing_sprocket(start: str, method: str) -> None:
     assert done.sprocket_center is not None
     # it hangs: the centre is one loop's height above the floor
     assert done.sprocket_center[1] < 60 * SOFT.link_length / 2
-
-
-@every_method_walks
-def test_endless_bouncing_meets_the_time_limit(method: str) -> None:
-    """A chain that nothing brings to rest ends with time_limit at that time, and has no Δx."""
-    settings = {"links": 6, "frequency": 2.0, "start": "ellipse", "walk_limit": 0.3, **UNDISSIPATIVE}
-    done = Walk(settings, status=Status.TIME_LIMIT).end(method, 5e-3)
-    assert done.walk_time == done.time[-1] == 0.3
-    assert np.isnan(done.dx)
-    assert done.bounces >= 2
 
 
 @every_method_walks

@@ -12,7 +12,7 @@ from tests.oracle_model import motion_equations
 from warpchain import Status
 
 DURATION = 1e-3
-STARTS = [struck_loop(2 * np.pi * number / 320) for number in range(8)]
+STARTS = [struck_loop(2 * np.pi * number / 320) for number in range(4)]
 """How large an error is depends on where in a step the joints reverse."""
 
 

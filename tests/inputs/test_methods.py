@@ -1,29 +1,10 @@
 """Methods by their names: integrators, and words for a need."""
 
-import subprocess
-import sys
-
 import pytest
 
 from warpchain.inputs.methods import METHODS_BY_NEED
 from warpchain.inputs.options import Options
 from warpchain.kernels.methods.method import find_method
-
-
-def test_a_new_tableau_is_a_method() -> None:
-    """A tableau that is registered is taken for `method`, and named in its description and in the help."""
-    program = (
-        "from dataclasses import replace\n"
-        "from warpchain.kernels.methods.explicit_tableaus import BS32, register\n"
-        "register(replace(BS32, name='new32', title='a new method 3(2)'))\n"
-        "from warpchain.cli.main import main\n"
-        "from warpchain.inputs.options import Options\n"
-        "print(Options(method='new32', device='cuda').method)\n"
-        "main(['walk', '--help'])\n"
-    )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, encoding="utf-8")
-    assert done.stderr == "" and done.stdout.startswith("new32\n")
-    assert "new32: a new method" in done.stdout
 
 
 def test_words_mean_methods_that_the_device_has() -> None:

@@ -8,7 +8,6 @@ import warpchain
 from tests.support.setups import setup_walk
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.sections import NAME_OF_SYMBOL, SECTION_OF, SYMBOL_OF
-from warpchain.inputs.setup import resolve
 from warpchain.inputs.validation import InputError
 from warpchain.sweeps.sweep_file import read_walk_file
 
@@ -27,29 +26,6 @@ def written(folder: Path, text: str) -> Path:
     path = folder / "walk.yaml"
     path.write_text(text, encoding="utf-8")
     return path
-
-
-def test_a_file_gives_the_setup_of_its_values(tmp_path: Path) -> None:
-    """Sections without values, or no section at all, leave the defaults."""
-    text = """
-    preset: paper
-    scene: {links: 80, frequency: 2e1, start: ellipse}
-    options:
-      tolerance: 1.0e-7
-      step_limit: 1_000_000
-      self_contact: no
-    parameters:
-    """
-    name, sections = read_walk_file(written(tmp_path, text))
-    assert resolve(name, **sections) == resolve(
-        "paper",
-        scene={"links": 80, "frequency": 20.0, "start": "ellipse"},
-        options={"tolerance": 1e-7, "step_limit": 1_000_000, "self_contact": False},
-        parameters={},
-    )
-    assert read_walk_file(written(tmp_path, "scene: {n: 8}")) == (
-        None, {"scene": {"links": 8}, "options": {}, "parameters": {}}
-    )  # fmt: skip
 
 
 def test_every_parameter_has_one_symbol() -> None:

@@ -1,17 +1,15 @@
 """The loop on its sprocket: its mean against curves that are known, and its figure."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
 from tests.support.made_walks import make_walk
 from warpchain.inputs.parameters import preset
 from warpchain.inputs.start_shapes import ellipse, lay_chain
-from warpchain.loop.stationary_loop import BeforeRelease, LoopParameters, StationaryLoop, average_frames
+from warpchain.loop.stationary_loop import BeforeRelease, StationaryLoop, average_frames
 
 SOFT = preset("soft")
-LENGTH = SOFT.link_length
+LENGTH, MASS = SOFT.link_length, (SOFT.inner_mass + SOFT.outer_mass) / 2
 RATE = 591.3  # links a second
 
 
@@ -31,8 +29,7 @@ def frames_of(joints: np.ndarray, forces: np.ndarray | None = None) -> BeforeRel
 
 def average(before: BeforeRelease, top: float) -> StationaryLoop:
     """The mean loop of frames whose highest joints pass at some height [m] over the origin, where a sprocket ends."""
-    parameters = dataclasses.replace(LoopParameters.of(SOFT), gravity=0.0)
-    return average_frames(before, parameters, np.array([0.0, top - 0.01]), 0.01)
+    return average_frames(before, SOFT, MASS, np.array([0.0, top - 0.01]), 0.01)
 
 
 def make_ring(links: int, frames: int = 100) -> tuple[BeforeRelease, float, float]:
@@ -45,8 +42,7 @@ def make_ring(links: int, frames: int = 100) -> tuple[BeforeRelease, float, floa
     moved = RATE * 2e-3 * (np.arange(frames) - frames)
     angle = -2 * np.pi * (np.arange(links) + moved[:, None]) / links
     radial = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    mass = (SOFT.inner_mass + SOFT.outer_mass) / 2
-    tension = mass * radius * np.cos(np.pi / links) * turning**2 / (2 * np.sin(np.pi / links))
+    tension = MASS * radius * np.cos(np.pi / links) * turning**2 / (2 * np.sin(np.pi / links))
     along = np.stack([np.sin(angle), -np.cos(angle)], axis=-1)
     return frames_of(radius * radial, tension * along), radius, tension
 
@@ -103,6 +99,6 @@ def test_what_makes_no_mean_loop_is_refused() -> None:
     with pytest.raises(ValueError, match="hardly moves"):
         average(frames_of(np.repeat(before.frame_joints[:1], 20, axis=0)), radius)
     with pytest.raises(ValueError, match="no free part"):
-        average_frames(before, LoopParameters.of(SOFT), np.zeros(2), radius)
+        average_frames(before, SOFT, MASS, np.zeros(2), radius)
     with pytest.raises(ValueError, match="record_before"):
         make_walk().plot("loop")

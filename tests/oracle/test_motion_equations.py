@@ -5,9 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tests.oracle_model import motion_equations
-from tests.oracle_model.circular_loop import circular_loop, circular_loop_force
-from tests.support.impulse_cases import UNIT
-from tests.support.mild_parameters import MILD
+from tests.oracle_model.circular_loop import circular_loop
+from tests.support.mild_parameters import MILD, UNIT
 from warpchain.inputs.parameters import Parameters, preset
 
 PAPER = preset("paper")
@@ -88,17 +87,3 @@ def test_energies_and_momenta_by_hand():
     assert_allclose(motion_equations.linear_momentum(velocity, parameters), [1, 3])
     # About (2, 1): (−2,−1)×(1,0) = 1, (2,−1)×(0,3) = 6, spin 2 − 1.
     assert motion_equations.angular_momentum(position, velocity, parameters) == pytest.approx(8)
-
-
-@pytest.mark.parametrize("n", [4, 6, 60])
-def test_stretched_loop_is_an_exact_equilibrium(n):
-    """With b = 0 every link of the stretched loop has just its centripetal acceleration."""
-    parameters = PAPER.with_values({"joint_stiffness": 1e5, "joint_damping": 0.0})
-    position, velocity = circular_loop(n, parameters, 5.0, stretched=True)
-    spin = velocity[0, 2]
-    scale = spin**2 * np.linalg.norm(position[0, :2])
-    result = motion_equations.acceleration(position, velocity, parameters, gravity=False)
-    assert_allclose(result[:, :2], -(spin**2) * position[:, :2], atol=1e-7 * scale)
-    torque_scale = circular_loop_force(n, parameters, 5.0)[0] * parameters.link_length
-    assert_allclose(result[:, 2] * motion_equations.link_inertias(n, parameters), 0, atol=1e-8 * torque_scale)
-    assert np.linalg.norm(motion_equations.joint_opening(position, parameters), axis=1).min() > 1e-5

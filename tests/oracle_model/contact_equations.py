@@ -18,6 +18,11 @@ Sprocket = tuple[Array, float, float]
 """Centre (2,) in m, radius that the link circles touch in m, angular velocity in rad/s (anticlockwise > 0)."""
 
 
+def link_radii(n: int, parameters: Parameters) -> Array:
+    """Radius of the circles of each link, (n,), m; the links' own if parameters have `radii`."""
+    return getattr(parameters, "radii", np.full(n, parameters.circle_radius))
+
+
 def collision_impulse(
     v_rel: Array,
     normal: Array,
@@ -54,21 +59,8 @@ def collision_impulse(
     A is a driven surface this holds in the frame of the surface at P; the surface may do work on B.) The first
     case leaves v'_t = −e_t s − e v_n W_tn/W_nn: it ends all sliding only if e_t = 0 and e W_tn = 0.
 
-    Args:
-        v_rel: v_A − v_B at P, (2,), m/s.
-        normal: unit vector from A to B, (2,).
-        lever_a: P − centre of mass of A, (2,), m.
-        lever_b: P − centre of mass of B, (2,), m.
-        inv_mass_a: 1/m_A, 1/kg; 0 for an immovable body.
-        inv_inertia_a: 1/I_A, 1/(kg m²); 0 for an immovable body.
-        inv_mass_b: 1/m_B, 1/kg; not both bodies may be immovable.
-        inv_inertia_b: 1/I_B, 1/(kg m²).
-        restitution: e in [0, 1].
-        friction: μ, at least 0.
-        tangential_restitution: e_t in [−1, 1].
-
-    Returns:
-        J in world axes, (2,), N s; zero unless the bodies approach (v_n > 0).
+    Vectors are (2,) in world axes, levers go from the centre of mass to P. An immovable body has inverses of 0. The
+    impulse is zero unless the bodies approach (v_n > 0).
     """
     v_n = float(normal @ v_rel)
     if v_n <= 0:
@@ -99,7 +91,7 @@ def resolve_contacts(
 ) -> tuple[Array, dict[str, int]]:
     """One pass over all touching circles, each contact seeing the velocities that those before it left.
 
-    A link has a circle of radius r at either end. Circles touch when they overlap (gap < 0); a touching contact
+    A link has a circle of its radius at either end. Circles touch when they overlap (gap < 0); a touching contact
     gets the impulse of `collision_impulse` if it approaches, else nothing. Positions never change. Two circles, or
     a circle and the sprocket, with exactly the same centre have no normal and are left alone.
 
@@ -109,24 +101,15 @@ def resolve_contacts(
 
     The point P and the normal: floor (A; y = 0): the circle's lowest point, +y. Sprocket (A): the circle's point
     nearest the sprocket's centre, radially outwards; the surface moves with Ω ẑ × (P − centre). Two links: midway
-    between the circles' centres, from A, the link at joint p, to B, the link at joint q > p.
+    between the points of the circles that are deepest in the other, from A, the link at joint p, to B, that at q > p.
 
-    Args:
-        position: (n, 3).
-        velocity: (n, 3); not changed.
-        parameters: the chain and its coefficients of collision.
-        floor: whether there is a floor.
-        sprocket: the sprocket, or None.
-        self_contact: whether links collide with each other.
-
-    Returns:
-        The new velocity (n, 3), and the numbers of impulses by kind: "floor", "sprocket", "self".
+    Returns the new velocity (n, 3), and the numbers of impulses by kind: "floor", "sprocket", "self".
     """
     n = len(position)
     velocity = velocity.copy()
     inv_mass = 1 / link_masses(n, parameters)
     inv_inertia = 1 / link_inertias(n, parameters)
-    radius = parameters.circle_radius
+    radii = link_radii(n, parameters)
     counts = {"floor": 0, "sprocket": 0, "self": 0}
 
     def collide(
@@ -160,17 +143,17 @@ def resolve_contacts(
         upwards = np.array([0.0, 1.0])
         for link in range(n):
             for centre in ends[link]:
-                if centre[1] - radius < 0:
-                    counts["floor"] += collide(None, link, centre - radius * upwards, upwards, law)
+                if centre[1] - radii[link] < 0:
+                    counts["floor"] += collide(None, link, centre - radii[link] * upwards, upwards, law)
     if sprocket is not None:
         law = (parameters.sprocket_restitution, parameters.sprocket_friction)
         hub, contact_radius, angular_velocity = sprocket
         for link in range(n):
             for centre in ends[link]:
                 distance = np.hypot(*(centre - hub))
-                if 0 < distance < contact_radius + radius:
+                if 0 < distance < contact_radius + radii[link]:
                     outwards = (centre - hub) / distance
-                    point = centre - radius * outwards
+                    point = centre - radii[link] * outwards
                     surface = angular_velocity * turned(point - hub)
                     counts["sprocket"] += collide(None, link, point, outwards, law, surface)
     if self_contact:
@@ -179,9 +162,10 @@ def resolve_contacts(
         for half, pair in product((0, 1), in_order):
             for a, b, centre_a, centre_b in _circle_pairs(pair, ends, half):
                 distance = np.hypot(*(centre_b - centre_a))
-                if 0 < distance < 2 * radius:
+                if 0 < distance < radii[a] + radii[b]:
                     normal = (centre_b - centre_a) / distance
-                    counts["self"] += collide(a, b, (centre_a + centre_b) / 2, normal, law)
+                    nearest = centre_a + radii[a] * normal, centre_b - radii[b] * normal
+                    counts["self"] += collide(a, b, sum(nearest) / 2, normal, law)
     return velocity, counts
 
 
@@ -197,15 +181,16 @@ def touching_pairs(position: Array, parameters: Parameters) -> list[tuple[int, i
     Circles of the same link or of neighbours never count. Exactly concentric circles do overlap.
     """
     n = len(position)
+    radii = link_radii(n, parameters)
     ends = np.stack(link_ends(position, parameters), axis=1)
     return [
         (p, q)
         for p in range(n)
         for q in range(p + 1, n)
         if any(
-            np.hypot(*(centre_b - centre_a)) < 2 * parameters.circle_radius
+            np.hypot(*(centre_b - centre_a)) < radii[a] + radii[b]
             for half in (0, 1)
-            for _, _, centre_a, centre_b in _circle_pairs((p, q), ends, half)
+            for a, b, centre_a, centre_b in _circle_pairs((p, q), ends, half)
         )
     ]
 

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from tests.oracle_model.contact_equations import collision_impulse
+from tests.oracle_model.contact_equations import collision_impulse, link_radii
 from tests.oracle_model.motion_equations import acceleration, cross, link_ends, link_inertias, link_masses, turned
 from warpchain.inputs.parameters import Parameters
 
@@ -29,8 +29,9 @@ def endless(points: Array) -> Array:
 
 def contacts(position: Array, points: Array, parameters: Parameters) -> Iterator[Contact]:
     """What may touch, link by link, face by face: the circles with face and corner at its beginning, then the side."""
-    corners, r = endless(points), parameters.circle_radius
+    corners, radii = endless(points), link_radii(len(position), parameters)
     for link, ends in enumerate(np.stack(link_ends(position, parameters), axis=1)):
+        r = radii[link]
         axis = (ends[1] - ends[0]) / parameters.link_length
         for k, (begin, end) in enumerate(pairwise(corners)):
             along = (end - begin) / np.hypot(*(end - begin))

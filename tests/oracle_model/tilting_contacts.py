@@ -75,16 +75,8 @@ def tilting_collision_impulse(
     cases and the energy changes by −½ (1−e²) P_IᵀW P_I − ½ κ (2−κ) DᵀW D, with κ = 1+e_t in the first. That proof uses
     no number of dimensions.
 
-    Args:
-        v: velocity of the touching point over the floor, (3,), m/s.
-        normal: unit vector from the floor to the body, (3,).
-        w: W, (3, 3), 1/kg, positive definite: an impulse P changes v by W P.
-        restitution: e in [0, 1].
-        friction: μ, at least 0.
-        tangential_restitution: e_t in [−1, 1].
-
-    Returns:
-        P (3,), N s; zero unless the body approaches (n̂·v < 0).
+    v (3,) [m/s] is the velocity of the touching point over the floor, n̂ points from the floor to the body, and an
+    impulse P changes v by W P, W positive definite [1/kg]. P is zero unless the body approaches (n̂·v < 0).
     """
     approach = -float(normal @ v)
     if approach <= 0:
@@ -135,14 +127,7 @@ def touching_point(
     if they are above it or go up, the roller touches if a₊ + a₋ > 0, at ζ = h (a₊ − a₋)/(a₊ + a₋): midway if both rims
     fall alike, as an upright chain's do, and at the rim that falls if only one does. That point always approaches.
 
-    Args:
-        centre: of the roller, (2,), m.
-        position: of its link, (3,).
-        velocity: of its link, (3,).
-        plane: where the plane is; its speeds are not looked at.
-        rates: (u, ω1, ω2) of the plane.
-        radius: r, m.
-        half_width: h, m.
+    The plane's speeds are `rates`, (u, ω1, ω2), whatever `plane` has.
     """
     slope = float(np.hypot(plane.y[0], plane.y[1]))
     lowest = centre - radius * plane.y[:2] / max(slope, LEAST_SLOPE)
@@ -173,15 +158,7 @@ def resolve_tilting_floor(
 
     A contact has W = (1/m) 1₂ + p pᵀ/I in the plane, p = e3 × lever, plus N Gᵀ A⁻¹ G of `plane_share`.
 
-    Args:
-        position: (n, 3).
-        velocity: (n, 3); not changed.
-        plane: its position and motion.
-        parameters: the chain and its coefficients of collision with the floor.
-        half_width: h, m.
-
-    Returns:
-        the new velocities, the impulses and the losses.
+    The links' velocities are not changed; h [m] is `half_width`.
     """
     n = len(position)
     inv_mass, inv_inertia = 1 / link_masses(n, parameters), 1 / link_inertias(n, parameters)

@@ -73,12 +73,8 @@ def tilted_plane(
 ) -> Plane:
     """An upright plane, first tilted about its e1, then turned about the room's Ŷ.
 
-    Args:
-        tilt: asin(Ŷ·e3), rad, in [−π/2, π/2]. With yaw 0 its rate is −ω1.
-        yaw: heading of e1, rad, anticlockwise from X̂ seen from above.
-        speed: u, m/s.
-        turn: (ω1, ω2), rad/s.
-        origin: in room axes, m.
+    The tilt is asin(Ŷ·e3) in [−π/2, π/2]; with yaw 0 its rate is −ω1. Yaw is the heading of e1, anticlockwise from X̂
+    seen from above. Speed is u [m/s], `turn` (ω1, ω2) [rad/s], and the origin in room axes [m].
     """
     (cos_tilt, sin_tilt), (cos_yaw, sin_yaw) = direction(np.array([tilt, yaw]))
     return Plane(

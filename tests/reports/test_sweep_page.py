@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 import yaml
 
+from tests.support.command_line import Command
 from tests.support.made_sweeps import FIGURE_6, distance, make_sweep
 from tests.support.made_walks import make_unreleased, make_walk
-from warpchain.cli.main import main
 from warpchain.inputs.validation import InputError
 from warpchain.reports import sweep_page
 from warpchain.reports.sweep_page import write_report
@@ -36,7 +36,7 @@ def flawed(walk: PlannedWalk) -> float | Status | None:
     return {3: Status.TIME_LIMIT, 13: Status.NOT_FINITE, 17: None}.get(walk.index, distance(walk))
 
 
-def test_walks_that_ended_as_planned_are_no_failures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_walks_that_ended_as_planned_are_no_failures(tmp_path: Path, command: Command) -> None:
     """`finished` and `distance_limit` are no failures in page and table; plot says what can be drawn of them."""
     content = FIGURE_6 | {"samples": 1, "blocks": [{"name": "only", "grid": {"frequency": [10, 20]}}]}
     ends = {0: Status.FINISHED, 1: Status.DISTANCE_LIMIT}
@@ -48,10 +48,8 @@ def test_walks_that_ended_as_planned_are_no_failures(tmp_path: Path, capsys: pyt
     head, *rows = document.rows["cells"]
     assert [dict(zip(head, row, strict=True))["failed"] for row in rows] == ["0", "0"]
     assert [dict(zip(head, row, strict=True))["ended as asked"] for row in rows] == ["1", "1"]
-    with pytest.raises(SystemExit) as end:
-        main(["info", str(directory)])
-    assert not end.value.code
-    assert "ended as asked" in capsys.readouterr().out
+    answer = command("info", str(directory))
+    assert answer.status == 0 and "ended as asked" in answer.out
     with pytest.raises(InputError, match="no walk has this quantity; give another, such as quantity='walk_time'"):
         load(directory).plot()
 
@@ -206,29 +204,18 @@ def test_walk_without_pictures(folder: Path, tmp_path: Path, monkeypatch: pytest
 
 
 @pytest.mark.usefixtures("no_figures")
-def test_a_walk_is_run_again_on_another_device(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_walk_is_run_again_on_another_device(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command
+) -> None:
     """With --device the walk is that of the sweep but for where it runs; without --walk there is nothing to run."""
     asked = with_walk(monkeypatch, make_walk)
-    monkeypatch.chdir(tmp_path)
     for arguments in (["--walk", "15"], ["--walk", "15", "--device", "cuda:1"]):
-        with pytest.raises(SystemExit) as end:
-            main(["report", str(folder), "-o", "report.html", *arguments])
-        assert not end.value.code
+        assert command("report", str(folder), "-o", "report.html", *arguments).status == 0
     there, here = asked[1], asked[0]
     assert (here.options.device, there.options.device) == ("cpu", "cuda:1")
     assert (here.scene, here.parameters) == (there.scene, there.parameters)
     Path("report.html").unlink()
-    with pytest.raises(SystemExit, match="2"):
-        main(["report", str(folder), "-o", "report.html", "--device", "cpu"])
-    assert not list(tmp_path.iterdir())
-
-
-def test_unknown_walk_is_refused(folder: Path, tmp_path: Path) -> None:
-    """A walk that does not exist is refused with the numbers that do, and nothing is written."""
-    with pytest.raises(
-        InputError, match=r"^index: the sweep has no walk 18; give one of its column index, at most 17$"
-    ):
-        write_report(folder, tmp_path / "report.html", animation_of=18)
+    assert command("report", str(folder), "-o", "report.html", "--device", "cpu").status == 2
     assert not list(tmp_path.iterdir())
 
 

@@ -12,9 +12,8 @@ import warp as wp
 import yaml
 
 from tests.run.test_sweep_run import TINY, data_of
-from warpchain.cli.main import main
-from warpchain.inputs.validation import InputError
-from warpchain.run.gpu_workers import gpu_workers, visible_gpus
+from tests.support.command_line import Command
+from warpchain.run.gpu_workers import gpu_workers
 from warpchain.run.progress_bar import SweepProgress
 from warpchain.run.sweep_run import sweep
 from warpchain.run.workers import LostWorkersError
@@ -24,18 +23,23 @@ GPU_OF_WORKER = "__import__('time').sleep(0.5) or __import__('os').environ['CUDA
 
 
 def test_each_worker_has_a_gpu_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Workers see one GPU each, those that this process may use, and too many are refused; a sweep runs on them."""
-    monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "5, GPU-abc,2")
-    assert visible_gpus(2) == ["5", "GPU-abc"]
-    with pytest.raises(
-        InputError, match="--gpus: 4 wanted, but CUDA_VISIBLE_DEVICES is '5, GPU-abc,2'; give at most 3"
-    ):
-        visible_gpus(4)
-    with gpu_workers(2) as executor:
-        seen = list(executor.map(eval, [GPU_OF_WORKER] * 4))
-    assert set(seen) == {"5", "GPU-abc"} and os.environ["CUDA_VISIBLE_DEVICES"] == "5, GPU-abc,2"
-    monkeypatch.delenv("CUDA_VISIBLE_DEVICES")
-    assert visible_gpus(3) == ["0", "1", "2"]
+    """Workers see one GPU each, the first of those that this process may use."""
+    for visible, expected in (("5, GPU-abc,2", {"5", "GPU-abc"}), (None, {"0", "1"})):
+        if visible is None:
+            monkeypatch.delenv("CUDA_VISIBLE_DEVICES")
+        else:
+            monkeypatch.setenv("CUDA_VISIBLE_DEVICES", visible)
+        with gpu_workers(2) as executor:
+            assert set(executor.map(eval, [GPU_OF_WORKER] * 4)) == expected
+        assert os.environ.get("CUDA_VISIBLE_DEVICES") == visible
+
+
+def test_more_gpus_than_there_are_are_refused(monkeypatch: pytest.MonkeyPatch, command: Command) -> None:
+    """One line says how many there are, before the folder is made."""
+    monkeypatch.setattr("warpchain.engine.devices.gpu_count", lambda: 1)
+    answer = command("sweep", "figure6", "-o", "sweep", "--gpus", "2")
+    assert answer.status == 2 and not Path("sweep").exists()
+    assert answer.err == "error: --gpus: 2 wanted, but this machine has 1; give at most 1\n"
 
 
 def test_an_exception_ends_what_workers_are_doing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -50,29 +54,17 @@ def test_an_exception_ends_what_workers_are_doing(monkeypatch: pytest.MonkeyPatc
     assert time.monotonic() - began < 15
 
 
-def test_a_sweep_runs_on_gpu_workers(tmp_path: Path) -> None:
-    """What such workers write are the bytes of one thread; on the CPU here, whatever GPU they were given."""
-    sweep(TINY, tmp_path / "one", workers=1)
-    with gpu_workers(2) as executor:
-        sweep(TINY, tmp_path / "two", executor=executor, workers=2)
-    assert data_of(tmp_path / "two") == data_of(tmp_path / "one")
-
-
 @pytest.mark.skipif(wp.get_cuda_device_count() > 0, reason="there is a GPU")
 @pytest.mark.parametrize("given", (["--device", "cuda"], ["--gpus", "1"], ["--gpus", "99999"]))
-def test_a_missing_gpu_leaves_no_folder(
-    tmp_path: Path, given: list[str], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    """One line says that there is no GPU, before the folder is made."""
+def test_a_missing_gpu_leaves_no_folder(given: list[str], monkeypatch: pytest.MonkeyPatch, command: Command) -> None:
+    """One line names the option and says that there is no GPU, before the folder is made."""
     monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
-    source = tmp_path / "tiny.yaml"
-    source.write_text(yaml.safe_dump(TINY, sort_keys=False))
-    with pytest.raises(SystemExit) as caught:
-        main(["sweep", str(source), "-o", str(tmp_path / "sweep"), *given])
-    said = capfd.readouterr().err
-    assert caught.value.code == 2
-    assert said == "error: options.device: there is no cuda on this machine; give one of cpu\n"
-    assert not (tmp_path / "sweep").exists()
+    answer = command("sweep", "figure6", "-o", "sweep", *given)
+    problem = "--gpus: no GPU is found on this machine; leave it out to run on the CPU"
+    if given[0] == "--device":
+        problem = "options.device: there is no cuda on this machine; give one of cpu"
+    assert answer.err == f"error: {problem}\n"
+    assert answer.status == 2 and not Path("sweep").exists()
 
 
 def test_a_worker_that_is_killed_ends_the_sweep_in_one_line(tmp_path: Path) -> None:

@@ -1,25 +1,18 @@
 """Sweeps as they are run: on slots, threads, processes and a Dask cluster, killed and resumed."""
 
 import concurrent.futures
-import contextlib
-import gc
 import multiprocessing
 import os
 import signal
-import subprocess
-import sys
-import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 
 from tests.support.setups import setup_walk
-from warpchain.cli.main import main
 from warpchain.inputs.setup import Setup
 from warpchain.run.sweep_run import run_shards, sweep
+from warpchain.run.workers import LostWorkersError
 from warpchain.status import Status
 from warpchain.walks.scheduler import run_setups
 
@@ -66,18 +59,6 @@ def uninterrupted(tmp_path_factory) -> dict[str, bytes]:
     result = sweep(TINY, folder, workers=1)
     assert result.summary() == {"time_limit": 80, "at_rest": 0, "missing": 0}
     return data_of(folder)
-
-
-def test_walks_do_not_depend_on_their_batch():
-    """Number of slots, order and company change no bit of a walk, with different n, methods and starts in one batch."""
-    setups = [brief_setup(seed) for seed in range(5)]
-    setups += [brief_setup(seed, links=44, start="spinning", hold_limit=0.05) for seed in range(2)]
-    setups += [brief_setup(9, method="rkf78"), brief_setup(9, links=240)]
-    alone = [outcomes([setup])[0] for setup in setups]
-    assert outcomes(setups, slots=1) == alone
-    assert outcomes(setups, slots=4) == alone
-    assert outcomes(setups[::-1], slots=3) == alone[::-1]
-    assert len(set(alone)) == len(alone)
 
 
 def test_one_broken_walk_among_a_thousand_changes_no_other():
@@ -165,72 +146,31 @@ def test_a_dask_worker_may_be_killed(tmp_path, uninterrupted):
     np.testing.assert_array_equal(indices, np.arange(80))
 
 
-@contextlib.contextmanager
-def dask_cluster(folder: Path, workers: int) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
-    """Address of a scheduler that was started by itself, with so many workers, and its process."""
-    from distributed import Client
-
-    where, dask = folder / "scheduler.json", [sys.executable, "-m", "dask"]
-    commands = [["scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"]]
-    commands += [["worker", "--no-nanny", "--nthreads", "1", "--no-dashboard", "--local-directory", folder]] * workers
-    processes: list[subprocess.Popen[bytes]] = []
-    with (folder / "dask.log").open("wb") as log:
-        try:
-            for command in commands:
-                command = [*dask, *command, "--scheduler-file", where]
-                processes.append(subprocess.Popen(command, stdout=log, stderr=log))
-            until = time.monotonic() + 60
-            while not (where.exists() and where.read_text()):
-                assert time.monotonic() < until, "no scheduler"
-                time.sleep(0.1)
-            with Client(scheduler_file=str(where)) as client:
-                client.wait_for_workers(workers, timeout=60)
-                address = str(client.scheduler.address)
-            yield address, processes[0]
-        finally:
-            for process in reversed(processes):
-                process.kill()
-                process.wait()
-
-
 @pytest.mark.slow
-def test_a_dask_cluster_of_separate_processes(tmp_path, uninterrupted):
-    """`--scheduler` on a scheduler and two workers that were started by themselves: the bytes are the same."""
-    pytest.importorskip("distributed")
-    source = tmp_path / "tiny.yaml"
-    source.write_text(yaml.safe_dump(TINY, sort_keys=False))
-    with dask_cluster(tmp_path, 2) as (address, _):
-        command = [sys.executable, "-m", "warpchain", "sweep", source, "-o", tmp_path / "sweep", "--scheduler", address]
-        done = subprocess.run(command, capture_output=True, encoding="utf-8")
-    assert "80 time_limit" in done.stdout, done.stderr
-    assert data_of(tmp_path / "sweep") == uninterrupted
-
-
-@pytest.mark.parametrize("address", ("tls://127.0.0.1:1", "ucx://127.0.0.1:1", "inproc://1", "http://a:1"))
-def test_a_scheduler_that_cannot_be_reached_is_refused(tmp_path, capsys, address):
-    """Whatever class of error Dask raises: one line, status 2, no folder, and no client that closes itself later."""
+def test_a_dask_cluster_may_be_closed_midway(tmp_path):
+    """The sweep ends in one line, and the shards that were written are kept."""
     distributed = pytest.importorskip("distributed")
-    with pytest.raises(SystemExit) as caught:
-        main(["sweep", "quickstart", "-o", str(tmp_path / "sweep"), "--scheduler", address])
-    said = capsys.readouterr().err
-    assert caught.value.code == 2 and said.startswith(f"error: --scheduler: '{address}': ") and said.count("\n") == 1
-    assert not (tmp_path / "sweep").exists()
-    clients = [each for each in gc.get_objects() if isinstance(each, distributed.Client)]
-    assert clients and all(client.status == "closed" for client in clients)
+    cluster = distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None)
+
+    def close(progress):
+        if progress.done >= 10:
+            cluster.close()
+
+    with distributed.Client(cluster) as client, pytest.raises(LostWorkersError, match="the workers ended") as lost:
+        sweep(TINY | {"samples": 400}, tmp_path / "sweep", executor=client, on_progress=close)
+    assert "\n" not in str(lost.value) and data_of(tmp_path / "sweep")
 
 
-@pytest.mark.slow
-def test_a_scheduler_may_be_closed_midway(tmp_path):
-    """The command ends in one line with status 1, and the shards that were written are kept."""
-    pytest.importorskip("distributed")
-    source, folder = tmp_path / "tiny.yaml", tmp_path / "sweep"
-    source.write_text(yaml.safe_dump(TINY | {"samples": 400}, sort_keys=False))
-    with dask_cluster(tmp_path, 1) as (address, scheduler):
-        command = [sys.executable, "-m", "warpchain", "sweep", source, "-o", folder, "--scheduler", address]
-        run = subprocess.Popen(command, stderr=subprocess.PIPE, encoding="utf-8")
-        while run.poll() is None and len(list((folder / "shards").glob("[0-9]*.h5"))) < 5:
-            time.sleep(0.05)
-        scheduler.kill()
-        _, said = run.communicate(timeout=60)
-    assert run.returncode == 1 and said.startswith("error: the workers ended") and said.count("\n") == 1
-    assert len(data_of(folder)) >= 5
+def test_the_first_walks_are_of_all_cells(tmp_path):
+    """So the rate, and the time left, are soon those of the whole sweep."""
+    cells = []
+
+    class InOrder(concurrent.futures.ThreadPoolExecutor):
+        def submit(self, call, planned, directory, stamp, shards, pulse):
+            cells.append([int(cell) for shard in shards for cell in shard.keys["cell"]])
+            return super().submit(call, planned, directory, stamp, shards, pulse)
+
+    with InOrder(1) as executor:
+        sweep(TINY, tmp_path / "sweep", executor=executor, workers=1)
+    assert sorted(cell for task in cells for cell in task) == sorted(list(range(4)) * 20)
+    assert {cell for task in cells[: len(cells) // 6] for cell in task} == {0, 1, 2, 3}

@@ -31,8 +31,8 @@ def test_threads_take_turns_on_a_gpu(monkeypatch: pytest.MonkeyPatch, device: st
         inside.pop()
         return []
 
-    shards = Manifest.of(planned, 8).shards
-    monkeypatch.setattr(runner, "compile_kernels", lambda setups, threads: None)
+    shards = Manifest.of(planned, 8).wanted
+    monkeypatch.setattr(runner, "compile_kernels", lambda setups: None)
     monkeypatch.setattr(runner, "run_setups", run_walks)
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
         for task in [pool.submit(run_shards, planned, "", "", [shard]) for shard in shards[:2]]:

@@ -1,7 +1,6 @@
 """A grid axis over a quantity that is drawn as well: the axis and what was drawn are two things everywhere."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -9,41 +8,28 @@ import xarray
 from matplotlib.text import Text
 
 from tests.support.made_sweeps import distance, make_sweep
-from warpchain.inputs.parameters import preset
-from warpchain.inputs.scene import TAP, Scene
+from tests.support.sweep_content import content
 from warpchain.reports.sweep_figures import figures
 from warpchain.reports.sweep_page import write_report
 from warpchain.store.merged_file import merge
 from warpchain.store.sweep_result import SweepResult, load
 
-
-def value_of(name: str) -> float:
-    """What a quantity is if nobody says otherwise; of scenes a plain value."""
-    own = getattr(preset("soft"), name, None)
-    return float(own or getattr(Scene(), name, None) or 0.5)
+VALUES = {"floor_friction": 0.27, "clearance": 0.01, "tilt": 0.5}
 
 
 def swept(folder: Path, name: str) -> SweepResult:
     """A made sweep with an axis over a quantity that is drawn about each of its values."""
-    value = value_of(name)
-    content: dict[str, Any] = {
-        "version": 1,
-        "name": "axis",
-        "seed": 4,
-        "preset": "soft",
-        "samples": 3,
-        "scene": {"plane": "tilting" if name in TAP else "fixed"},
-        "grid": {name: [value, 1.001 * value]},
-        "distributions": {"all": "fixed", name: {"gaussian": {"sigma": 1e-5 * value}}},
-    }
-    return make_sweep(folder, content, distance)
+    value = VALUES[name]
+    drawn = {"all": "fixed", name: {"gaussian": {"sigma": 1e-5 * value}}}
+    scene = {"plane": "tilting" if name == "tilt" else "fixed"}
+    return make_sweep(folder, content(scene=scene, grid={name: [value, 1.001 * value]}, distributions=drawn), distance)
 
 
-@pytest.mark.parametrize("name", ["floor_friction", "clearance", "tilt"])
+@pytest.mark.parametrize("name", VALUES)
 def test_an_axis_over_a_drawn_quantity_is_exported(name: str, tmp_path: Path) -> None:
     """Arrays, xarray, pandas, the merged file, figures and the page hold both, each under a name of its own."""
     result = swept(tmp_path / "sweep", name)
-    axis = np.array([value_of(name), 1.001 * value_of(name)])
+    axis = np.array([VALUES[name], 1.001 * VALUES[name]])
     drawn = getattr(result, f"{name}_drawn")
     assert result.axes[name].tolist() == axis.tolist()
     assert drawn.shape == (2, 3) and len(set(drawn.ravel())) == 6
@@ -69,8 +55,7 @@ def test_an_axis_over_a_drawn_quantity_is_exported(name: str, tmp_path: Path) ->
 def test_parameter_sets_are_an_axis_with_columns(tmp_path: Path) -> None:
     """Figures, xarray and the merged file have the sets along `point`, and what stands in each beside it."""
     points = {"floor_friction": [0.1, 0.2, 0.3], "load_factor": [None, 1.0, 2.0]}
-    content = {"version": 1, "name": "sets", "seed": 4, "preset": "soft", "samples": 2, "points": points}
-    result = make_sweep(tmp_path / "sets", content | {"grid": {"links": [60, 90]}}, distance)
+    result = make_sweep(tmp_path / "sets", content(points=points, grid={"links": [60, 90]}), distance)
     assert "parameter set" in {text.get_text() for text in result.plot().findobj(Text)}
     merge(tmp_path / "sets", tmp_path / "sets.h5")
     assert load(tmp_path / "sets.h5").design().equals(result.design())

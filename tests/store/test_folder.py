@@ -1,9 +1,7 @@
 """Folders of sweeps: killed at any moment, gone on with, locked, refused, and full disks."""
 
-import hashlib
 import json
 import os
-import re
 import shutil
 import signal
 import subprocess
@@ -15,22 +13,22 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-import yaml
 
 from tests.support import synthetic_sweep
 from tests.support.stopped_calls import is_stopped
 from tests.support.synthetic_sweep import LONG_SWEEP, SHARD_SIZE, SWEEP, content, run, synthetic_rows, write
 from warpchain.inputs.validation import InputError, InputWarning
 from warpchain.store import folder
-from warpchain.store.folder import SweepFolder, read_rows
-from warpchain.store.manifest import Manifest, read_manifest
+from warpchain.store.folder import SweepFolder
+from warpchain.store.manifest import Manifest
 from warpchain.store.shards import write_shard
+from warpchain.store.sweep_result import load
+from warpchain.sweeps.plan import Sweep
 from warpchain.version import NUMERICS_VERSION
 
-FIRST, SECOND = "0-000000.h5", "0-000001.h5"
-SHARDS = Manifest.of(SWEEP, SHARD_SIZE).shards
+FIRST, SECOND = "000000.h5", "000001.h5"
+SHARDS = Manifest.of(SWEEP, SHARD_SIZE).wanted
 CHANGED = replace(SWEEP, seed=7, name="changed")
 
 
@@ -73,36 +71,6 @@ needs_namespace = pytest.mark.skipif(
 # Begin, go on, end
 
 
-def test_a_sweep_is_written_and_read(tmp_path: Path) -> None:
-    """All rows come back to the bit; nothing is missing, and nothing else is in the folder."""
-    with open_folder(tmp_path / "new" / "folder") as opened:
-        folder = opened.directory
-        walks = np.concatenate([shard.walks for shard in opened.missing()])
-        assert walks.tolist() == SWEEP.indices.tolist() and {len(shard) for shard in opened.missing()} == {20}
-        assert len(read_rows(folder, opened.manifest)[1]) == 0
-        for shard in reversed(opened.missing()):
-            write(opened, shard, synthetic_rows(SWEEP, shard))
-        assert opened.missing() == []
-        opened.log("ended")
-        expected = np.concatenate([synthetic_rows(SWEEP, shard) for shard in SHARDS])
-        assert read_rows(folder, opened.manifest)[1].tobytes() == expected.tobytes()
-    assert sorted(os.listdir(folder)) == ["lock", "log.txt", "shards", "sweep.json", "sweep.yaml"]
-    assert len(os.listdir(folder / "shards")) == 8
-    assert yaml.safe_load((folder / "sweep.yaml").read_text()) == SWEEP.canonical()
-    assert (folder / "log.txt").read_text().endswith("  ended\n")
-
-
-def test_equal_sweeps_leave_equal_files(tmp_path: Path) -> None:
-    """The files have no time, place or chance in them, whatever NaNs and order the rows came with."""
-    run(tmp_path / "one")
-    with open_folder(tmp_path / "two") as opened:
-        for shard in sorted(opened.missing(), key=lambda shard: shard.walks[0] % 7):
-            rows = synthetic_rows(SWEEP, shard)
-            rows["greatest_opening"] = -rows["greatest_opening"]  # the same NaN to a reader, but other bits
-            write(opened, shard, rows)
-    assert content(tmp_path / "one") == content(tmp_path / "two")
-
-
 def test_a_sweep_survives_kills(tmp_path: Path) -> None:
     """Killed 20 times at random moments, always readable and gone on with: the same bytes as one never killed."""
     done = play("killed", tmp_path / "killed")
@@ -124,7 +92,7 @@ def test_every_step_of_opening_may_be_the_last(tmp_path: Path, fresh: bool, monk
             run(folder)
         if not is_stopped(lambda: open_folder(folder, sweep, fresh=fresh).close(), stops, monkeypatch):  # noqa: B023
             break
-        run(folder, sweep, fresh=fresh and "changed" not in (folder / "sweep.json").read_text())
+        run(folder, sweep, fresh=fresh and b"changed" not in (folder / "sweep.h5").read_bytes())
         assert content(folder) == expected, stops
         stops += 1
     assert stops >= 4
@@ -133,7 +101,7 @@ def test_every_step_of_opening_may_be_the_last(tmp_path: Path, fresh: bool, monk
 def test_unfinished_files_go(tmp_path: Path) -> None:
     """What a killed process had half written is cleared away; hidden files of others are not."""
     run(tmp_path)
-    parts = [".sweep.0123abcd.part.json", "shards/.0-000000.0123abcd.part.h5"]
+    parts = [".sweep.0123abcd.part.h5", "shards/.000000.0123abcd.part.h5"]
     for name in (*parts, ".nfs0123", "shards/.keep"):
         (tmp_path / name).write_bytes(b"half")
     open_folder(tmp_path).close()
@@ -169,7 +137,7 @@ def test_workers_may_write_the_same_shard(tmp_path: Path) -> None:
         shards = opened.missing()[:2] * 20
         list(threads.map(lambda shard: write(opened, shard, synthetic_rows(SWEEP, shard)), shards))
     assert content(tmp_path / "race") == content(tmp_path / "threads")
-    assert len(read_rows(tmp_path / "race", read_manifest(tmp_path / "race"))[1]) == 40
+    assert load(tmp_path / "race").missing_count == 120
 
 
 # Refusals
@@ -192,20 +160,21 @@ def test_a_changed_sweep_is_refused(tmp_path: Path) -> None:
 def test_other_numerics_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Walks of another version of the numerics are not gone on with, but still read."""
     run(tmp_path)
+    (tmp_path / "lock").unlink()  # as of a copied folder
     monkeypatch.setattr(folder, "NUMERICS_VERSION", 99)
     with refused(InputError, tmp_path, f"numerics {NUMERICS_VERSION}, but this warpchain has 99", "start anew"):
         open_folder(tmp_path)
-    assert len(read_rows(tmp_path, read_manifest(tmp_path))[1]) == 160
+    assert load(tmp_path).missing_count == 0 and not (tmp_path / "lock").exists()
 
 
 @pytest.mark.parametrize("fresh", [False, True])
-@pytest.mark.parametrize("name", ["sweep.yaml", "shards", "log.txt", "sweep.json", "lock"])
+@pytest.mark.parametrize("name", ["sweep.yaml", "shards", "log.txt", "sweep.h5", "lock"])
 def test_files_of_others_are_not_touched(tmp_path: Path, name: str, fresh: bool) -> None:
     """A folder that has such a name for something else is refused, even to start anew."""
     (tmp_path / name).write_text("mine: true")
     with refused(InputError, tmp_path, str(tmp_path / name), "give"):
         open_folder(tmp_path, fresh=fresh)
-    assert (tmp_path / name).read_text() == "mine: true"
+    assert (tmp_path / name).read_text() == "mine: true" and os.listdir(tmp_path) == [name]
 
 
 def test_a_shard_of_another_sweep_is_refused(tmp_path: Path) -> None:
@@ -226,15 +195,25 @@ def test_a_shard_of_another_sweep_is_refused(tmp_path: Path) -> None:
         open_folder(tmp_path / "one").close()
 
 
-def test_a_sweep_that_is_refused_now_is_named(tmp_path: Path) -> None:
+def test_a_sweep_that_is_refused_now_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A method that was removed since: one line with the file and what to do."""
     run(tmp_path)
-    path = tmp_path / "sweep.json"
-    text, _ = path.read_text().split(',\n "sha256"')
-    text = re.sub(r'"method": "\w+"', '"method": "rodas5p"', text)
-    path.write_text(f'{text},\n "sha256": "{hashlib.sha256(text.encode()).hexdigest()}"\n}}\n')
+    path, content = tmp_path / "sweep.h5", SWEEP.canonical()
+    content["blocks"][0]["options"]["method"] = "rodas5p"
+    with monkeypatch.context() as patched:
+        patched.setattr(Sweep, "canonical", lambda sweep: content)
+        path.write_bytes(Manifest.of(SWEEP, SHARD_SIZE).image())
     with refused(InputError, tmp_path, f"{path}: sweep.blocks[0].options.method: 'rodas5p' was removed", "version"):
-        read_manifest(tmp_path)
+        load(tmp_path)
+
+
+def test_a_folder_of_an_earlier_version_is_refused(tmp_path: Path) -> None:
+    """Its sweep.json is named as what it is; nothing begins there, with shards or without."""
+    (tmp_path / "sweep.json").write_text("{}")
+    with refused(InputError, tmp_path, "a sweep of an earlier warpchain; read it with that version"):
+        load(tmp_path)
+    with refused(InputError, tmp_path, "give another folder"):
+        open_folder(tmp_path)
 
 
 def test_workers_need_the_folder(tmp_path: Path) -> None:
@@ -257,5 +236,5 @@ def test_a_full_disk(tmp_path: Path) -> None:
     """A disk that fills up in the middle: a clear line, nothing lost, and the sweep goes on once there is room."""
     done = play("full_disk", tmp_path / "full", namespace=True)
     writing, opening = done["messages"]
-    assert "0-000001.h5: cannot be written (No space left on device); make room" in writing
+    assert ".h5: cannot be written (No space left on device); make room" in writing
     assert "make room" in opening and done["missing"] == 0

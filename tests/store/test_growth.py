@@ -3,23 +3,23 @@
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import yaml
 
+from tests.run.test_sweep_run import data_of
 from tests.support.made_sweeps import make_sweep
 from tests.support.stopped_calls import is_stopped
 from tests.support.sweep_content import UNIFORM, blocks, content
 from tests.support.synthetic_sweep import content as files
+from tests.support.synthetic_sweep import run
 from warpchain.inputs.validation import InputError
 from warpchain.store import sweep_result
 from warpchain.store.folder import SweepFolder
-from warpchain.store.manifest import Manifest, Shard, read_manifest
+from warpchain.store.manifest import Manifest, read_manifest
 from warpchain.store.merged_file import merge
 from warpchain.store.sweep_result import SweepResult, load
-from warpchain.sweeps.designs import EXTENSIBLE, SAMPLERS
+from warpchain.sweeps.designs import EXTENSIBLE
 from warpchain.sweeps.plan import PlannedWalk, load_sweep
-from warpchain.walks.rows import Rows
 
 
 def two_blocks(first: int, second: int, **changes: Any) -> dict[str, Any]:
@@ -42,11 +42,6 @@ def columns(result: SweepResult) -> dict[tuple[str, str], bytes]:
     }
 
 
-def shards(folder: Path) -> dict[str, bytes]:
-    """Name → bytes of all shards."""
-    return {name: data for name, data in files(folder).items() if name.startswith("shards/")}
-
-
 @pytest.mark.parametrize("sampler", EXTENSIBLE)
 def test_a_grown_sweep_is_the_larger_one(tmp_path: Path, sampler: str) -> None:
     """Grown twice, in one block or both, a folder gives the larger sweep to the bit; no shard changes."""
@@ -55,7 +50,7 @@ def test_a_grown_sweep_is_the_larger_one(tmp_path: Path, sampler: str) -> None:
     for counts in ((2, 4), (8, 4), (16, 8)):
         given = two_blocks(*counts, sampler=sampler, **drawn)
         grown = make_sweep(tmp_path / "grown", given, drawn_distance)
-        after = shards(tmp_path / "grown")
+        after = data_of(tmp_path / "grown")
         assert before.items() < after.items()
         before = after
     fresh = make_sweep(tmp_path / "fresh", given, drawn_distance)
@@ -67,20 +62,18 @@ def test_a_grown_sweep_is_the_larger_one(tmp_path: Path, sampler: str) -> None:
     assert (tmp_path / "grown.h5").read_bytes() == (tmp_path / "fresh.h5").read_bytes()
 
 
-def test_a_sweep_grows_before_it_is_complete(tmp_path: Path) -> None:
-    """Walks that were missing are then run in their old shards; what is there is read meanwhile."""
-    make_sweep(tmp_path / "grown", content(samples=2), lambda walk: drawn_distance(walk) if walk.sample else None)
-    kept = shards(tmp_path / "grown")
-    made = make_sweep(
-        tmp_path / "grown", content(samples=5), lambda walk: drawn_distance(walk) if walk.cell[0] else None
-    )
-    assert kept.items() < shards(tmp_path / "grown").items()
-    expected = np.zeros((2, 2, 5), bool)
-    expected[1] = expected[:, :, 1] = True
-    np.testing.assert_array_equal(made.status == 1, expected)
-    grown = make_sweep(tmp_path / "grown", content(samples=5), drawn_distance)
-    assert columns(grown) == columns(make_sweep(tmp_path / "fresh", content(samples=5), drawn_distance))
-    assert kept.items() < shards(tmp_path / "grown").items()
+def test_parts_that_grow_stay_parts_of_the_whole(tmp_path: Path) -> None:
+    """Each part keeps its walks when all are given more samples: no walk is in two, and together they are the whole."""
+    parts = [tmp_path / f"part-{number}" for number in (1, 2, 3)]
+    small, large = (load_sweep(two_blocks(*samples)) for samples in ((4, 2), (7, 2)))
+    for number, folder in enumerate(parts, 1):
+        run(folder, small, part=(number, 3), shard_size=3)
+        min((folder / "shards").glob("[0-9]*.h5")).unlink()  # growth does not wait for the walks before it
+        run(folder, large, part=(number, 3), shard_size=3)
+    merge(parts, tmp_path / "all.h5")
+    run(tmp_path / "whole", large)
+    whole = load(tmp_path / "whole")
+    assert whole.missing_count == 0 and columns(load(tmp_path / "all.h5")) == columns(whole)
 
 
 def test_every_step_of_growing_may_be_the_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -104,9 +97,13 @@ def test_every_step_of_growing_may_be_the_last(tmp_path: Path, monkeypatch: pyte
     assert stops >= 5
 
 
+HYPERCUBE = content(samples=8, sampler="latin_hypercube")
+
+
 @pytest.mark.parametrize(
     ("given", "message"),
     [
+        (HYPERCUBE, "but a latin_hypercube of 8 samples has other points; give samples: 4"),
         (
             content(samples=3),
             "holds 4 samples of each cell of block main, but 3 are asked for; give samples: 4 or more",
@@ -118,22 +115,12 @@ def test_every_step_of_growing_may_be_the_last(tmp_path: Path, monkeypatch: pyte
     ],
 )
 def test_what_is_no_growth_is_refused(tmp_path: Path, given: dict[str, Any], message: str) -> None:
-    """Fewer samples, or another change beside more samples, are refused in one line; the folder stays as it was."""
-    make_sweep(tmp_path, content(samples=4), drawn_distance)
+    """Fewer or no extensible samples, or another change beside, are refused in one line; the folder stays as it was."""
+    make_sweep(tmp_path, HYPERCUBE | {"samples": 4} if given is HYPERCUBE else content(samples=4), drawn_distance)
     before = files(tmp_path)
     with pytest.raises(InputError, match=message) as caught:
         make_sweep(tmp_path, given, drawn_distance)
     assert "\n" not in str(caught.value) and files(tmp_path) == before
-
-
-def test_samples_that_do_not_grow_are_refused(tmp_path: Path) -> None:
-    """A latin hypercube has other points when it is larger: one line says so, and the folder stays."""
-    assert set(SAMPLERS) - set(EXTENSIBLE) == {"latin_hypercube"}
-    make_sweep(tmp_path, content(samples=4, sampler="latin_hypercube"), drawn_distance)
-    before = files(tmp_path)
-    with pytest.raises(InputError, match="but a latin_hypercube of 8 samples has other points; give samples: 4"):
-        make_sweep(tmp_path, content(samples=8, sampler="latin_hypercube"), drawn_distance)
-    assert files(tmp_path) == before
 
 
 def test_a_reader_meets_a_sweep_that_begins_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -141,7 +128,7 @@ def test_a_reader_meets_a_sweep_that_begins_anew(tmp_path: Path, monkeypatch: py
     make_sweep(tmp_path, content(samples=2), drawn_distance)
     read = sweep_result.read_rows
 
-    def late(directory: Path, manifest: Manifest) -> tuple[list[Shard], Rows]:
+    def late(directory: Path, manifest: Manifest) -> Any:
         monkeypatch.undo()
         other = load_sweep(content(samples=2, seed=8))
         SweepFolder.open(tmp_path, other, fresh=True, shard_size=8).close()

@@ -11,7 +11,6 @@ import yaml
 
 import warpchain
 from tests.run.test_sweep_run import TINY
-from tests.support import command_line
 from tests.support.command_line import Command
 from tests.support.made_sweeps import make_sweep
 from warpchain.inputs.validation import InputError
@@ -19,8 +18,6 @@ from warpchain.reports.sweep_figures import figures
 from warpchain.store.merged_file import merge
 from warpchain.store.sweep_result import load
 from warpchain.sweeps.plan import load_sweep
-
-command = command_line.command
 
 AXES = {"load_factor": [None, 1.0], "steady_time": [None, 0.1], "soft_tolerance": [1e-3, None]}
 

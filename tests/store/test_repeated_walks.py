@@ -9,14 +9,11 @@ import numpy as np
 import pytest
 
 import warpchain
-from tests.support import command_line
 from tests.support.command_line import Command
 from warpchain import InputError, SweepResult, WalkResult
 from warpchain.inputs.validation import InputWarning
 from warpchain.store.merged_file import merge
 from warpchain.walks.rows import STORED_COLUMNS, fill_row, missing_rows, row_type
-
-command = command_line.command
 
 SWEEP: dict[str, Any] = {
     "links": 12,
@@ -92,18 +89,13 @@ def test_a_walk_that_is_not_named_is_refused(command: Command, folder: Path, wor
     assert answer.status == 2 and problem.replace("DIR", str(folder)) in answer.err
 
 
-def test_numbers_that_say_no_walk_are_refused(folder: Path, tmp_path: Path) -> None:
-    """A number beside values of axes, one that two merged sweeps have, or a truth value."""
-    warpchain.sweep(**SWEEP, samples=1, seed=5, out=tmp_path / "other", progress=False)
-    merge([folder, tmp_path / "other"], tmp_path / "merged.h5")
-    result, merged = warpchain.load(folder), warpchain.load(tmp_path / "merged.h5")
+def test_numbers_that_say_no_walk_are_refused(folder: Path) -> None:
+    """A number beside values of axes, or a truth value."""
+    result = warpchain.load(folder)
     with pytest.raises(InputError, match="frequency: given together with index"):
         result.walk(0, frequency=3.0)
     with pytest.raises(InputError, match="index: True is not the number"):
         result.walk(True)
-    with pytest.raises(InputError, match=r"index: 2 merged sweeps have a walk 0; .*sample=0, 2"):
-        merged.walk(0)
-    assert_same_numbers(merged.walk(frequency=3.0, sample=2), merged, (0, 2))
 
 
 def test_a_walk_that_is_not_the_same_brings_a_warning(folder: Path) -> None:

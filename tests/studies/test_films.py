@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studies.common import save_figure
-from studies.films import calibration, drawing, hidden, reduce, run
+from studies.films import calibration, drawing, hidden, run
 from tests.support.made_films import films_of, made_bank
 from warpchain import films
 
@@ -34,17 +33,6 @@ def test_banks_are_joined_by_their_chains(banks: tuple[films.Bank, films.Bank]) 
     assert len(both.values) == len(both.films) == 50
 
 
-def test_a_reduced_bank_is_the_same(banks: tuple[films.Bank, films.Bank], tmp_path: Path) -> None:
-    """But for motions, which are kept in single precision."""
-    bank, _ = banks
-    reduce.save(bank, tmp_path / "bank.npz")
-    again = reduce.load(tmp_path / "bank.npz")
-    assert again.names == bank.names and (again.values == bank.values).all() and again.experiments == bank.experiments
-    film, same = bank.films[3][1][2], again.films[3][1][2]
-    assert same.center == pytest.approx(film.center, abs=1e-7) and same.outline == pytest.approx(film.outline, rel=1e-6)
-    assert same.speed == pytest.approx(film.speed, rel=1e-7) and (same.time == film.time).all()
-
-
 def test_calibration_tells_a_bank_that_knows_from_one_that_does_not(banks: tuple[films.Bank, films.Bank]) -> None:
     """Hidden chains as the bank's are covered; if the floor was 5 mm lower than any camera's error, they are not."""
     bank, truths = banks
@@ -63,9 +51,9 @@ def test_tables_and_figures_are_made(banks: tuple[films.Bank, films.Bank], tmp_p
         "| made | 60/20 |",
     ]
     found = calibration.calibrate(bank, truths, run.SETS["1 film: 20 Hz"])
-    save_figure(drawing.coverage_figure({"1 film": found}), tmp_path / "coverage.png")
+    drawing.coverage_figure({"1 film": found}).savefig(tmp_path / "coverage.png")
     answer = bank.posterior(films_of(bank, 0, 1, films.Camera(), 0)[:1])
-    save_figure(drawing.corner(answer, dict(zip(answer.names, answer.mean, strict=True))), tmp_path / "corner.png")
+    drawing.corner(answer).savefig(tmp_path / "corner.png")
     assert min(path.stat().st_size for path in tmp_path.iterdir()) > 10_000
 
 

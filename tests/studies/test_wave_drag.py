@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 
 import warpchain
-from studies.waves.wave_drag import RUNNING, drag_waves, loop_motions, wave_motion
+from studies.waves.wave_drag import RUNNING, drag_waves, inertia_of, loop_motions, wave_motion
 from warpchain.inputs.parameters import preset
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 
@@ -14,13 +14,7 @@ Array = NDArray[np.float64]
 LINKS, SPEED = 60, 5.0
 CHAIN = preset("soft")
 LENGTH = np.array([CHAIN.link_length])
-
-
-def inertias() -> Array:
-    """Mass, mass and moment of inertia of each link, (1, n, 3)."""
-    inner = [CHAIN.inner_mass, CHAIN.inner_mass, CHAIN.inner_inertia]
-    outer = [CHAIN.outer_mass, CHAIN.outer_mass, CHAIN.outer_inertia]
-    return np.array([[inner, outer] * (LINKS // 2)])
+INERTIA = inertia_of(LINKS, CHAIN)
 
 
 def loop(aspect: float = 1.0) -> tuple[Array, Array]:
@@ -33,12 +27,12 @@ def dragged(
     position: Array, velocity: Array, share: float = 0.3, least_mode: float = 0.0
 ) -> tuple[Array, Array, Array]:
     """What `drag_waves` gives for one loop."""
-    return drag_waves(position, velocity, inertias(), LENGTH, np.array([share]), np.array([least_mode]))
+    return drag_waves(position, velocity, INERTIA[None], LENGTH, np.array([share]), np.array([least_mode]))
 
 
 def momenta(position: Array, velocity: Array) -> Array:
     """Momentum x, y and angular momentum about the origin."""
-    mass, spin = inertias()[0, :, 0], inertias()[0, :, 2]
+    mass, spin = INERTIA[:, 0], INERTIA[:, 2]
     x, y, _ = position[0].T
     u, v, omega = velocity[0].T
     return np.array([mass @ u, mass @ v, mass @ (x * v - y * u) + spin @ omega])
@@ -51,14 +45,6 @@ def test_a_circle_that_runs_along_itself_has_no_waves() -> None:
     assert np.allclose(after, velocity, atol=1e-9)
     assert energy[0] < 1e-20
     assert abs(speed[0]) == pytest.approx(SPEED, rel=2e-3)  # links are chords of the circle
-
-
-def test_an_ellipse_that_runs_along_itself_hardly_has_waves() -> None:
-    """Where curvature changes, a chord does not quite move along itself."""
-    position, velocity = loop(2.0)
-    _, energy, _ = dragged(position, velocity)
-    kinetic = 0.5 * np.sum(inertias() * velocity**2)
-    assert energy[0] < 3e-5 * kinetic
 
 
 @pytest.mark.parametrize("least_mode", [0.0, 5.0])
@@ -83,7 +69,7 @@ def test_a_wave_of_one_length_loses_its_share(mode: int, least_mode: float, left
     wave = np.cos(2 * np.pi * mode * np.arange(LINKS) / LINKS)
     velocity[..., :2] += 0.1 * wave[:, None] * normal[0]
     after, _, _ = dragged(position, velocity, least_mode=least_mode)
-    rest = wave_motion(motions[:, RUNNING], after, inertias())[1]
+    rest = wave_motion(motions[:, RUNNING], after, INERTIA[None])[1]
     across = np.einsum("nc,nc->n", rest[0, :, :2], normal[0])
     # links of two masses: a wave is not quite a wave of one length
     assert 2 / LINKS * across @ wave == pytest.approx(0.1 * left, rel=0.01)

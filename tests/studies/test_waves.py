@@ -8,17 +8,14 @@ import warpchain
 from studies.waves.dispersion import (
     LOWER_BACKWARD,
     LOWER_FORWARD,
-    continuous_ring,
     equivalent_friction,
     long_wave_speed,
     ring_spin,
     ring_waves,
     straight_waves,
 )
-from studies.waves.mode_fit import find_packet, fit_rates, mode_amplitudes
-from studies.waves.tapped_ring import tapped_ring
+from studies.waves.rings import fit_rates, from_tap, mode_amplitudes, tapped_ring
 from tests.oracle_model.motion_equations import acceleration, friction_torque
-from tests.oracle_model.ring_modes import ring_modes
 from warpchain import Status, preset
 
 PAPER = preset("paper").with_values({"coulomb_friction": 0.0})
@@ -78,6 +75,36 @@ def test_long_waves_run_at_the_speed_of_a_string():
     assert waves.reach[0, LOWER_FORWARD] == pytest.approx(speed / PAPER.link_length / expected, rel=1e-3)
 
 
+def ring_modes(n, parameters, speed, numbers):
+    """Rates of bending (k, 4) of a ring [1/s] in the frame that turns along, where it looks the same at every pair.
+
+    Small motions are ∝ exp(iκj + λt), κ = 2π·number/n: two links, six coordinates (radial, tangential, angle). With the
+    equations Ẍ = A δX + B δẊ differentiated by complex steps, and Ẋ = ξ̇ + Ω ẑ × ξ, ξ̈ = (A + Ω B ẑ× + Ω²) ξ +
+    (B − 2Ω ẑ×) ξ̇. Bending is the slower third of the rates, springs of joints the others.
+    """
+    position, velocity = tapped_ring(n, parameters, speed, np.zeros(n))
+    spin, (cosine, sine) = velocity[0, 2], position[:, :2].T / np.hypot(*position[:, :2].T)
+    axes = np.zeros((n, 3, 3))  # component, direction
+    axes[:, :2, :2] = np.moveaxis(np.array([[cosine, -sine], [sine, cosine]]), -1, 0)
+    axes[:, 2, 2] = 1.0
+    derivatives = np.empty((2, n // 2, 6, 6))
+    for which, column in np.ndindex(2, 6):
+        link, direction = divmod(column, 3)
+        state = [position.astype(complex), velocity.astype(complex)]
+        state[which][link] += 1e-30j * axes[link, :, direction]
+        changed = acceleration(*state, parameters, gravity=False).imag / 1e-30
+        derivatives[which, :, :, column] = np.einsum("lcd,lc->ld", axes, changed).reshape(n // 2, 6)
+    turn, square, rates = np.zeros((6, 6)), np.diag([1.0, 1.0, 0.0] * 2) * spin**2, []
+    turn[[0, 3], [1, 4]], turn[[1, 4], [0, 3]] = -1.0, 1.0
+    for number in numbers:
+        wave = np.exp(-4j * np.pi * number * np.arange(n // 2) / n)
+        place, rate = (np.tensordot(wave, blocks, axes=1) for blocks in derivatives)
+        lower = [place + spin * rate @ turn + square, rate - 2 * spin * turn]
+        found = np.linalg.eigvals(np.block([[np.zeros((6, 6)), np.eye(6)], lower]))
+        rates.append(found[np.argsort(np.abs(found))][:4])
+    return np.array(rates)
+
+
 @pytest.mark.parametrize("links", [8, 12, 60])
 @pytest.mark.parametrize("friction", [0.0, 9e-5])
 def test_ring_agrees_with_the_equations_of_motion(links, friction):
@@ -87,15 +114,6 @@ def test_ring_agrees_with_the_equations_of_motion(links, friction):
     waves, modes = ring_waves(parameters, links, SPEED, numbers), ring_modes(links, parameters, SPEED, numbers)
     assert_allclose(nearest(waves.rate, modes), waves.rate, rtol=2e-5)
     assert_allclose(nearest(modes, waves.rate), modes, rtol=2e-5)
-
-
-def test_long_waves_of_a_ring_are_those_of_the_continuous_ring():
-    """At 60 links a wave and more, frequencies of the continuous ring are right to 0.1 %, damping to 2 %."""
-    numbers = np.array([2, 3, 5])
-    ring = ring_waves(PAPER, 300, SPEED, numbers).rate[:, [LOWER_BACKWARD, LOWER_FORWARD]]
-    continuous = continuous_ring(PAPER, 300, SPEED, numbers)
-    assert_allclose(continuous.imag, ring.imag, rtol=1e-3)
-    assert_allclose(continuous.real, ring.real, rtol=2e-2)
 
 
 def tapped(links, spins, times, parameters=SOFT):
@@ -116,11 +134,6 @@ def tapped(links, spins, times, parameters=SOFT):
     return angles
 
 
-def from_tap(links):
-    """Number of each link, counted from link 0 in both directions, (n,)."""
-    return (np.arange(links) + links / 2) % links - links / 2
-
-
 def test_modes_of_a_tapped_ring():
     """Slow and fast modes of 60 links ring at the rates of theory: frequencies to 0.1 %, damping to 1 %."""
     links, interval, numbers = 60, 8e-4, np.arange(2, 13)
@@ -134,32 +147,6 @@ def test_modes_of_a_tapped_ring():
     measured = nearest(wanted, np.array(found))
     assert_allclose(measured.imag, wanted.imag, rtol=1e-3)
     assert_allclose(measured.real, wanted.real, rtol=1e-2)
-
-
-def test_two_packets_run_at_their_group_speeds():
-    """Waves of 12 links run both ways: places as group speeds say to 0.1 %, amplitudes fall as damping says to 1 %.
-
-    A packet's short waves die first, so its mean speed changes; the packet's own spectrum gives it.
-    """
-    links, number = 180, 15
-    place, times = from_tap(links), np.linspace(0.05, 0.1, 41)
-    spins = 0.1 * np.cos(2 * np.pi * number / links * place) * np.exp(-(place**2) / 200)
-    angles = tapped(links, spins, times)
-    waves = ring_waves(SOFT, links, SPEED, np.arange(2, links // 4 + 1))
-    in_room = []
-    for column in (LOWER_BACKWARD, LOWER_FORWARD):
-        speeds, damping = waves.group_speed[:, column], waves.damping[:, column]
-        guess = speeds[number - 2] * times
-        width = np.minimum(np.abs(guess), links / 2 - np.abs(guess))
-        packets = [find_packet(*each) for each in zip(angles, guess, width, strict=True)]
-        expected = [packet.mean(speeds) * time for packet, time in zip(packets, times, strict=True)]
-        speed = np.polyfit(times, [packet.place for packet in packets], 1)[0]
-        assert speed == pytest.approx(np.polyfit(times, expected, 1)[0], rel=1e-3)
-        assert speed == pytest.approx(speeds[number - 2], rel=0.02)
-        falls = -np.polyfit(times, np.log([packet.amplitude for packet in packets]), 1)[0]
-        assert falls == pytest.approx(np.mean([packet.mean(damping) for packet in packets]), rel=1e-2)
-        in_room.append(1 + speed * SOFT.link_length / SPEED)
-    assert_allclose(in_room, [0.0, 2.0], atol=0.04)
 
 
 @pytest.mark.parametrize("amplitude", [1e-3, 0.1, 1.0, 60.0])

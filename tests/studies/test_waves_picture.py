@@ -14,7 +14,6 @@ from studies.waves.fields import (
 )
 from studies.waves.picture import waves_figure
 from tests.support.made_walks import make_walk
-from warpchain.walks.walk_result import WalkResult
 
 LINKS = 40
 MASSES = np.tile([0.003, 0.002], LINKS // 2)
@@ -39,16 +38,14 @@ def wave(time: np.ndarray, speed: float, height: float = 1e-3) -> np.ndarray:
 
 
 def test_a_ring_has_constant_fields() -> None:
-    """Of a turning ring: curvature 1/R to (π/n)², no velocity across it, its speed along it, the tension put on it."""
+    """Of a turning ring: curvature 1/R to (π/n)², no velocity across it, the tension put on it."""
     time = np.linspace(0.0, 0.02, 201)
     joints = ring(time)
-    center = np.array([0.0, MIDDLE]) + np.stack([time, 0 * time], axis=1)[:, None] * np.array([1.0, 0.0])
+    center = np.stack([time, np.full(201, MIDDLE)], axis=1)[:, None]
     outward = (joints - center) / RADIUS
     along = np.stack([outward[..., 1], -outward[..., 0]], axis=2)
     np.testing.assert_allclose(tensions(joints, 7.0 * along + 2.0 * outward), 7.0, rtol=1e-9)
-    np.testing.assert_allclose(tensions(joints, -7.0 * along), -7.0, rtol=1e-9)
     np.testing.assert_allclose(curvatures(joints, LENGTH), 1 / RADIUS, rtol=2e-3)
-    np.testing.assert_allclose(curvatures(joints[:, ::-1], LENGTH), 1 / RADIUS, rtol=2e-3)
     inner = slice(1, -1)  # one-sided differences at both ends are less accurate
     assert np.abs(normal_velocities(time, joints, MASSES)[inner]).max() < 1e-4 * SPEED
 
@@ -72,47 +69,22 @@ def test_a_wave_follows_its_characteristic(speed: float) -> None:
     assert stacked_power(np.ones((5, LINKS)), np.arange(5.0)) == 0.0
 
 
-def bouncing_ring(interval: float = 2e-4, **changes: Any) -> WalkResult:
-    """A made walk of a ring that is twice at the floor, with a wave and with joint forces."""
-    time = np.arange(0.0, 0.3, interval)
-    joints = ring(time, bumps=wave(time, SPEED))
-    joints[..., 1] += 0.0042 - MIDDLE + RADIUS + 0.02 * np.abs(np.cos(20 * time))[:, None] - 1e-5
-    return make_walk(LINKS, frame_time=time, frame_joints=joints, **changes)
-
-
-def with_forces(walk: WalkResult) -> dict[str, Any]:
-    """Forces of 9 N along the chain, and moments, for all frames of a walk."""
-    joints = walk.frame_joints
-    ahead = np.roll(joints, -1, axis=1) - np.roll(joints, 1, axis=1)
-    forces = 9.0 * ahead / np.linalg.norm(ahead, axis=2, keepdims=True)
-    return {"frame_forces": forces, "frame_moments": np.zeros(joints.shape[:2])}
-
-
 @pytest.mark.parametrize("colour", ["curvature", "velocity"])
 def test_the_picture(colour: Any) -> None:
-    """Two panels with a colour bar; four characteristics from each impact; nothing lies outside the paper."""
-    walk = bouncing_ring(**with_forces(bouncing_ring()))
+    """Of a ring twice at the floor, with a wave: both frames, four characteristics from each impact."""
+    time = np.arange(0.0, 0.3, 2e-4)
+    joints = ring(time, bumps=wave(time, SPEED))
+    joints[..., 1] += 0.0042 - MIDDLE + RADIUS + 0.02 * np.abs(np.cos(20 * time))[:, None] - 1e-5
+    ahead = np.roll(joints, -1, axis=1) - np.roll(joints, 1, axis=1)
+    forces = 9.0 * ahead / np.linalg.norm(ahead, axis=2, keepdims=True)
+    frames = {"frame_time": time, "frame_joints": joints, "frame_moments": np.zeros(joints.shape[:2])}
+    walk = make_walk(LINKS, **frames, frame_forces=forces)
     figure = waves_figure(walk, colour=colour, window=(0.02, 0.28))
     figure.draw_without_rendering()
-    own, room, bar = figure.axes
-    assert len(own.lines) == len(room.lines) == 8
-    assert len(own.images) == len(room.images) == 1
-    assert own.get_xlim() == pytest.approx((0.02, 0.28), abs=3e-4)
-    assert own.get_ylim() == (-0.5, LINKS - 0.5)
+    own, room, _ = figure.axes
+    assert len(own.lines) == len(room.lines) == 8 and len(own.images) == len(room.images) == 1
+    assert own.get_xlim() == pytest.approx((0.02, 0.28), abs=3e-4) and own.get_ylim() == (-0.5, LINKS - 0.5)
     length = LINKS * walk.setup.parameters.link_length
-    assert room.get_ylim() == pytest.approx((-length / 2, length / 2))
-    units = {"curvature": "m$^{-1}$", "velocity": "(m/s)"}
-    assert bar.get_ylabel().endswith(f"/ {units[colour]}")
-    low, high = own.images[0].get_clim()
-    if colour == "velocity":
-        assert low == -high
     for axes, around in ((own, LINKS), (room, length)):  # no contact is drawn across its panel
         drawn = [segment for lines in axes.collections for segment in lines.get_segments()]
         assert drawn and max(np.abs(np.diff(segment[:, 1])).max(initial=0.0) for segment in drawn) < around / 2
-    texts = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert any("sqrt" in text for text in texts) and len(texts) == 4
-    paper = figure.bbox
-    for axes in figure.axes:
-        box = axes.get_tightbbox()
-        assert box is not None
-        assert box.x0 >= 0 and box.y0 >= 0 and box.x1 <= paper.x1 and box.y1 <= paper.y1

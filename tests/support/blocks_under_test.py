@@ -9,9 +9,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
 from tests.support.folded_chains import folded_chain
+from tests.support.unlike_links import UnlikeLinks
 from warpchain.engine.batch import Batch
+from warpchain.inputs.floor import Floor, floor_from
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import preset
+from warpchain.inputs.parameters import Parameters, preset
 from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.cpu import loop as cpu_loop
 from warpchain.kernels.features import Features
@@ -26,6 +28,11 @@ HILLS = np.array([[-1.0, -0.002], [-0.02, 0.003], [0.0, -0.001], [0.015, 0.002],
 """Points of a floor with corners of both kinds, which heaps cut."""
 
 
+def floor_with(points: Array, parameters: Parameters | UnlikeLinks) -> Floor:
+    """A profile all of whose faces have the coefficients of the parameters."""
+    return floor_from(points.tolist(), 0.0, (parameters.floor_restitution, parameters.floor_friction))
+
+
 @contextmanager
 def fibers() -> Iterator[None]:
     """Blocks of more than one thread run as fibers on the CPU."""
@@ -38,14 +45,9 @@ def fibers() -> Iterator[None]:
 
 
 def heap(links: int, seed: int = 3, *, tilt: float = 0.3, raised: float = 0.0) -> tuple[Array, Array]:
-    """A folded chain in which many links touch one another; position and velocity (n, 3).
+    """A folded chain in which many links touch one another, raised over the origin [m]; position and velocity (n, 3).
 
-    Args:
-        links: n.
-        seed: Of the folds.
-        tilt: Greatest angle of a link against the horizontal [rad]. In a flat heap only joints an even number of links
-            apart meet.
-        raised: Height of its centre above the origin [m].
+    In a flat heap, of a small `tilt` [rad], only joints an even number of links apart meet.
     """
     position, velocity = folded_chain(links, seed, SOFT.link_length, tilt=tilt, opening=1e-5)
     position[:, 1] += raised
@@ -62,16 +64,10 @@ def batch_of(
     tolerance: float = 1e-4,
     keeps: bool = False,
 ) -> Batch:
-    """A batch with these chains (position, velocity) at soft parameters.
+    """A batch with these chains (position, velocity), one a world, at soft parameters.
 
-    Args:
-        chains: One per world.
-        method: Name of a tableau.
-        self_contact: Contacts between a chain's own links.
-        fixed_step: All steps take FIXED_STEP: the tolerance refuses nothing and no skin lets a step be longer.
-        stop_time: In s.
-        tolerance: Of adaptive steps.
-        keeps: Keep samples, and a frame with loads at every second one.
+    With a fixed step all steps take FIXED_STEP: the tolerance refuses nothing and no skin lets a step be longer. It
+    `keeps` samples, and a frame with loads at every second one.
     """
     longest = max(len(position) for position, _ in chains)
     options = Options(method=method, tolerance=0.1 if fixed_step else tolerance, self_contact=self_contact)

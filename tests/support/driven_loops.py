@@ -7,14 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tests.support.setups import setup_walk
-from warpchain.engine.batch import Batch
+from warpchain.engine.batch import Batch, Recorded
 from warpchain.inputs.link_values import LinkValues
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.scene import contact_radius, loop_speed
+from warpchain.inputs.scene import loop_speed
 from warpchain.inputs.setup import Setup
 from warpchain.kernels import layout
 from warpchain.status import Status
-from warpchain.walks.walk_phases import Phase, WalkRun
+from warpchain.walks.walk_phases import WalkRun
 
 Array = NDArray[np.float64]
 
@@ -42,12 +42,14 @@ def released_loop(preset: str = "soft", **settings: Any) -> Loop:
     setup = setup_walk(preset, {"method": "explicit"} | settings, None)
     batch = Batch(1, setup.scene.links, setup.options)
     run = WalkRun(batch, 0, setup)
-    while True:
-        batch.run([0], run.features)
-        position, velocity = batch.position(0), batch.velocity(0)
-        assert run.next_phase(), "it was not released"
-        if run.phase == Phase.WALK:
-            return Loop(setup, position, velocity)
+    found: Loop | None = None
+    for features in run.phases():
+        if run.phase == "walk":
+            break
+        batch.run([0], features)
+        found = Loop(setup, batch.position(0), batch.velocity(0))
+    assert found is not None and run.phase == "walk", "it was not released"
+    return found
 
 
 def hold(
@@ -57,7 +59,7 @@ def hold(
     setup = loop.setup
     scene = setup.scene
     batch = Batch(1, scene.links, setup.options, keeps_samples=True, frame_every=1)
-    batch.set_chain(0, parameters, scene.links, contact_radius(scene, parameters), own)
+    batch.set_chain(0, parameters, scene.links, own, scene)
     softness = 1.0 if setup.options.soften_drive else 0.0
     batch.load(0, loop.position, loop.velocity, stop_time=duration, stop_status=Status.NOT_STEADY, softness=softness)
     batch.set_drive(
@@ -72,28 +74,17 @@ def hold(
         loaded_softness=softness,
         push_rate=5e3,
     )
-    samples: list[Array] = []
-    frames: list[tuple[Array, Array]] = []
-
-    def drain() -> None:
-        samples.append(batch.drain_samples(0))
-        frames.append(batch.drain_frames(0))
-
-    batch.run([0], batch.features(fixed_body="sprocket"), drain)
+    pieces: list[Recorded] = []
+    batch.run([0], batch.features(fixed_body="sprocket"), lambda: pieces.append(batch.drain(0)))
     assert batch.status(0) == Status.NOT_STEADY
-    rows, times, joints = np.concatenate(samples), *(np.concatenate(parts) for parts in zip(*frames, strict=True))
+    rows, times, joints, _, _ = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
     since = duration - period_of(setup)
     shape = rows[rows[:, layout.TIME] > since][:, SHAPE].mean(axis=0)
     return np.append(shape, bottom_curvature(joints[times > since]))
 
 
 def bottom_curvature(joints: Array, reach: int = 3) -> float:
-    """Mean curvature [1/m] at the lowest joint: the turn from the chord before it to that behind it, by their length.
-
-    Args:
-        joints: (f, n, 2) [m].
-        reach: Links of a chord.
-    """
+    """Mean curvature [1/m] at the lowest joint: the turn from the chord before to that behind, by their length."""
     turns = []
     for frame in joints:
         lowest = int(np.argmin(frame[:, 1]))

@@ -12,10 +12,11 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from tests.support.blocks_under_test import floor_with
 from tests.support.unlike_links import UnlikeLinks
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import start_device
-from warpchain.engine.ground import cells_of, faces_of
+from warpchain.inputs.floor import Floor
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
@@ -35,6 +36,7 @@ DEVICE = start_device("cpu").warp
 POISONED_JOINT = 2**30
 LEVEL = np.array([[-1.0, 0.0], [0.0, 0.0], [1.0, 0.0]])
 """Points of a level profile."""
+
 
 compiled = functools.partial(
     wp.kernel, module="unique", enable_backward=False, module_options={"cpu_compiler_flags": COMPILER_FLAGS}
@@ -105,6 +107,7 @@ def _contact_pass(columns: int) -> wp.Kernel:
         chain.push_rate = push_rate
         block = scratch[world]
         row = lists[world]
+        plane = results[world]  # none of these bodies tilts
         pairs = wp.array(ptr=row.ptr, shape=(wp.static(size),), dtype=wp.int32)
         load_state(block, model, state, chain, world)
         place_ends(block, chain)
@@ -123,10 +126,10 @@ def _contact_pass(columns: int) -> wp.Kernel:
         results[world, 5] = list_slack(block, chain, skin, opening)
         if (parts & 2) != 0:
             results[world, 1] = floor_gap(block, chain, ground, face)
-            results[world, 6] = wp.float64(resolve_floor(block, chain, ground, face))
+            results[world, 6] = wp.float64(resolve_floor(block, plane, chain, ground, face))
         if (parts & 4) != 0:
             results[world, 2] = sprocket_gap(block, chain, ground, face)
-            results[world, 7] = wp.float64(resolve_sprocket(block, chain, ground, face))
+            results[world, 7] = wp.float64(resolve_sprocket(block, plane, chain, ground, face))
         if (parts & 8) != 0:
             hits, strands, lost, depth = resolve_self_contacts(block, pairs, chain, opening)
             results[world, 8] = wp.float64(hits)
@@ -135,7 +138,7 @@ def _contact_pass(columns: int) -> wp.Kernel:
             results[world, 11] = wp.float64(strands)
         if (parts & 16) != 0:
             results[world, 12] = terrain_gap(block, chain, ground, face)
-            results[world, 13] = wp.float64(resolve_terrain(block, chain, ground, face))
+            results[world, 13] = wp.float64(resolve_terrain(block, plane, chain, ground, face))
 
     return contact_pass
 
@@ -160,15 +163,17 @@ class ContactPass:
         sprocket_speed: float = 0.0,
         push_rate: float = 0.0,
         profile: Array = LEVEL,
+        laws: Array | None = None,
     ) -> None:
         """Make room for chains and place them; the sprocket about the origin has their sprocket_radius."""
         self.links = [len(chain.position) for chain in chains]
         self.columns = layout.padded_width(max(self.links))
         self.skin, self.sprocket_speed, self.push_rate = skin, sprocket_speed, push_rate
         self.model = model_of([(len(chain.position), chain.parameters) for chain in chains])
-        sizes = chains[0].parameters.link_length, chains[0].parameters.circle_radius
-        for name, rows_of in (("faces", faces_of(profile)), ("cells", cells_of(profile, *sizes))):
-            same = np.repeat(rows_of[None], len(chains), axis=0)
+        sizes = chains[0].parameters.link_length, max(self.model.chains.numpy()["circle_radius"])
+        floor = floor_with(profile, chains[0].parameters) if laws is None else Floor(profile, laws)
+        for name, rows in (("faces", floor.faces()), ("cells", floor.cells(*sizes))):
+            same = np.repeat(rows[None], len(chains), axis=0)
             setattr(self.model, name, wp.array(same, dtype=wp.float64, device=DEVICE))
         worlds, rows, size = len(chains), layout.scratch_rows(0), list_layout(self.columns).size
         self.state = State()

@@ -44,16 +44,6 @@ TOLERANCE: dict[str, Any] = {
     "grid": {"links": [60, 120], "frequency": [10, 20], "tolerance": [1e-6, 1e-9]},
 }
 
-SENSITIVITY: dict[str, Any] = {
-    "version": 1,
-    "name": "sensitivity",
-    "seed": 8,
-    "preset": "soft",
-    "samples": 64,
-    "sampler": "saltelli",
-    "grid": {"frequency": [10, 20]},
-}
-
 
 def distance(walk: PlannedWalk) -> float:
     """Roughly what a chain does: farther when fast, short or smooth; tolerances differ by a few per cent [m]."""

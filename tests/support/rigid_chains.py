@@ -93,13 +93,7 @@ def exact_rigid_flight(
 
 
 def loop(links: int, parameters: Parameters = PAPER, speed: float = 2.0) -> tuple[Array, Array]:
-    """A circulating ellipse in the air with joints that are closed and stay so, in NumPy to rounding.
-
-    Args:
-        links: n.
-        parameters: Of the chain.
-        speed: Along the loop [m/s].
-    """
+    """A circulating ellipse in the air with joints that are closed and stay so, in NumPy to rounding."""
     position, velocity = lay_chain(ellipse(1.3), links, parameters.link_length, speed, 0.1)
     position[:, 1] += 0.3
     velocity[:, 2] += 0.5 * np.sin(7.0 * np.arange(links))

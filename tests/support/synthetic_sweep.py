@@ -116,7 +116,7 @@ def play_killed(directory: Path) -> None:
         time.sleep(rng.uniform(0.0, 0.01))
         os.kill(child, signal.SIGKILL)
         kills += os.WIFSIGNALED(os.waitpid(child, 0)[1])
-        if (directory / "sweep.json").exists():  # at any moment the folder can be read
+        if (directory / "sweep.h5").exists():  # at any moment the folder can be read
             states.add(load(directory).missing_count)
     run(directory, LONG_SWEEP, shard_size=4)
     print(json.dumps({"kills": kills, "states": len(states)}))
@@ -137,7 +137,7 @@ def play_race(directory: Path) -> None:
         for _ in range(4):
             children.append(os.fork())
             if not children[-1]:
-                for _, shard in itertools.product(range(10), store.manifest.shards[:2]):
+                for _, shard in itertools.product(range(10), store.manifest.wanted[:2]):
                     write(store, shard, synthetic_rows(SWEEP, shard))
                 os._exit(0)
         print(json.dumps([os.waitpid(child, 0)[1] for child in children]))

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from tests.oracle_model.circular_loop import circular_loop
 from tests.oracle_model.tilting_plane import Plane, tilted_plane
-from tests.support.impulse_cases import crumpled_chain
+from tests.support.folded_chains import crumpled_chain
 from warpchain.inputs.parameters import Parameters
 
 Array = NDArray[np.float64]
@@ -16,13 +16,7 @@ Array = NDArray[np.float64]
 def tumbling_loop(n: int, parameters: Parameters, seed: int) -> tuple[Array, Array, Plane]:
     """A disturbed circular loop at 2 m/s in the air whose plane has any attitude and turns fast: all terms matter.
 
-    Args:
-        n: number of links.
-        parameters: the chain.
-        seed: of the random numbers.
-
-    Returns:
-        position (n, 3), velocity (n, 3), plane.
+    Returns position (n, 3), velocity (n, 3) and plane.
     """
     generator = np.random.default_rng(seed)
     position, velocity = circular_loop(n, parameters, 2.0)
@@ -42,12 +36,8 @@ def tumbling_loop(n: int, parameters: Parameters, seed: int) -> tuple[Array, Arr
 def tilted_heap(seed: int, parameters: Parameters) -> tuple[Array, Array, Plane, Parameters, float]:
     """A heap of links thrown at random in a random plane that the floor cuts through, for contact passes only.
 
-    Args:
-        seed: of the random numbers; every third heap lies almost or exactly flat, every third stands almost upright.
-        parameters: the chain; its coefficients of collision with the floor are drawn anew.
-
-    Returns:
-        position (n, 3), velocity (n, 3), plane, parameters with the coefficients, and half width h, m.
+    Every third heap lies almost or exactly flat, every third stands almost upright. Returns position (n, 3), velocity
+    (n, 3), plane, parameters with coefficients of collision drawn anew, and half width h [m].
     """
     generator = np.random.default_rng(seed)
     n = int(generator.choice([4, 6, 8, 12]))

@@ -14,11 +14,12 @@ from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
+from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.cpu.explicit import place_ends
 from warpchain.kernels.cpu.loop import load_state
 from warpchain.kernels.cpu.tilting import resolve_tilting_floor, tilting_gap, write_plane_sums
 from warpchain.kernels.physics.plane import on_plane
-from warpchain.kernels.types import Model, State
+from warpchain.kernels.types import Ground, Model, State
 from warpchain.status import Status
 
 Array = NDArray[np.float64]
@@ -46,17 +47,10 @@ def tilting_batch(
     stop_status: Status = Status.FINISHED,
     **kept: bool | int,
 ) -> Batch:
-    """A batch of chains of equal length, about to start.
+    """A batch of chains of equal length, about to start; `kept` is what it is to keep.
 
-    Args:
-        starts: of each chain.
-        parameters: of each chain.
-        options: for all.
-        stop_time: s.
-        longest_step: no step is longer, s; all are that long if the tolerance allows more. It needs contacts, among
-            links or with the floor, in the kernel's features. None: as the tolerance will have it.
-        stop_status: with which a run ends there; `FINISHED`: it doesn't end at rest before.
-        kept: what `Batch` is to keep.
+    No step is longer than `longest_step` [s]; all are that long if the tolerance allows more. It needs contacts, among
+    links or with the floor, in the kernel's features. A run that stops as `FINISHED` does not end at rest before.
     """
     links = len(starts[0][0])
     batch = Batch(len(starts), links, options, tilts=True, **kept)
@@ -122,8 +116,8 @@ def _floor_pass(columns: int) -> wp.Kernel:
         load_state(block, model, state, chain, 0)
         place_ends(block, chain)
         write_plane_sums(block, row, chain)
-        results[0] = tilting_gap(block, on_plane(chain, row, 0))
-        results[1] = wp.float64(resolve_tilting_floor(block, row, chain))
+        results[0] = tilting_gap(block, on_plane(chain, row, 0), Ground(), Face())
+        results[1] = wp.float64(resolve_tilting_floor(block, row, chain, Ground(), Face()))
 
     return floor_pass
 

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 from jsonschema import Draft7Validator
 
-from tests.support.sweep_content import UNIFORM, blocks, content
-from warpchain.inputs.scene import LISTS
+from tests.support.sweep_content import blocks, content
+from tests.test_fuzz import SWEEPS
 from warpchain.inputs.sections import NAME_OF_SYMBOL, SECTION_OF
 from warpchain.inputs.yaml_files import read_yaml
 from warpchain.sweeps.plan import load_sweep
@@ -21,7 +21,7 @@ def test_it_is_a_schema_that_knows_all_names() -> None:
     """Names and symbols, with what they mean."""
     Draft7Validator.check_schema(SCHEMA.schema)
     axes = SCHEMA.schema["$defs"]["grid"]["properties"]
-    assert set(axes) == {"preset", *SECTION_OF, *NAME_OF_SYMBOL} - {*LISTS}
+    assert set(axes) == {"preset", *SECTION_OF, *NAME_OF_SYMBOL}
     assert "friction" in SCHEMA.schema["$defs"]["parameters"]["properties"]["mu_fc"]["description"]
 
 
@@ -41,14 +41,9 @@ def test_shipped_sweeps_are_valid(path: Path) -> None:
 @pytest.mark.parametrize(
     "given",
     [
-        content(),
+        *SWEEPS,
         content(scene={"n": 60, "load_factor": None}, grid=None, options={"method": "explicit", "self_contact": False}),
-        content(grid={"nu": {"from": 5, "to": 30, "count": 6}, "start": ["rest", "ellipse"]}),
-        content(grid={"preset": ["paper", "soft"]}, preset=None, parameters={"mu_fc": 0.3}),
-        content(distributions={"all": "fixed", "tau_c": {"gaussian": {"sigma": 2e-5}}, "g": UNIFORM}),
-        content(record={"series": True, "frames": {"samples": [0], "interval": 0.01, "before": 0.5}}),
-        content(points={"n": [60, 90], "mu_fc": [0.3, 0.2]}, grid=None),
-        blocks({"samples": 1}, same_samples_along=[]),
+        content(grid={"floor": {"flat": "flat", "ramp": [[0, 0], [1, 0.1]]}}),
     ],
 )
 def test_what_a_sweep_may_say(given: dict[str, Any]) -> None:
@@ -65,6 +60,8 @@ def test_what_a_sweep_may_say(given: dict[str, Any]) -> None:
         content(options={"method": "rk4"}),
         content(parameters={"m_outer": 0}),
         content(grid={"nu": [-5]}),
+        content(grid={"floor": ["flat"]}),
+        content(grid={"floor": {"ramp": "hill"}}),
         content(distributions={"gravity": {"gaussian": {"mean": 9}}}),
         content(record={"series": {"every": 2}}),
         blocks({"name": "a/b"}),

@@ -1,13 +1,10 @@
 """Sweeps: files, values, blocks and refusals."""
 
 import itertools
-import pickle
 import time
-from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 
 from tests.support.sweep_content import TABLE_1, UNIFORM, blocks, content
 from warpchain.inputs.parameters import Parameters
@@ -46,19 +43,12 @@ def test_values_and_layout() -> None:
 
 def test_blocks_inherit_and_override() -> None:
     """A block takes from the top level what it does not say itself, value by value; a grid beats inherited values."""
+    own = {"preset": "paper", "samples": 2, "sampler": "latin_hypercube", "scene": {"start": "ellipse"}}
+    own |= {"options": {"method": "bs32"}, "distributions": {"floor_friction": "fixed"}}
     sweep = load_sweep(
         blocks(
             {"grid": {"links": [60]}},
-            {
-                "preset": "paper",
-                "samples": 2,
-                "sampler": "latin_hypercube",
-                "scene": {"start": "ellipse"},
-                "options": {"tolerance": 1e-9},
-                "distributions": {"floor_friction": "fixed"},
-                "grid": {"frequency": [10, 20], "tolerance": [1e-5]},
-            }
-            | {"options": {"method": "bs32"}},
+            own | {"grid": {"frequency": [10, 20], "tolerance": [1e-5]}},
             {"grid": {"preset": ["paper", "soft"]}},
             scene={"links": 90, "frequency": 15},
             options={"tolerance": 1e-7},
@@ -66,18 +56,19 @@ def test_blocks_inherit_and_override() -> None:
             distributions={"floor_friction": {"gaussian": {"sigma": 0.01}}},
         )
     )
-    assert [block.name for block in sweep.blocks] == ["b0", "b1", "b2"]
-    assert [block.first_cell for block in sweep.blocks] == [0, 1, 3]
+    assert [(block.name, block.first_cell) for block in sweep.blocks] == [("b0", 0), ("b1", 1), ("b2", 3)]
     assert [block.sampler for block in sweep.blocks] == ["random", "latin_hypercube", "random"]
     assert sweep.walk_count == 13
     first, second, paper, soft = (sweep.planned(index).setup for index in (0, 2, 3, 4))
-    assert (first.preset, first.scene.links, first.scene.start) == ("soft", 60, "rest")
-    assert (first.scene.frequency, first.options.tolerance, first.options.method) == (15, 1e-7, "hybrid")
-    assert (second.preset, second.scene.links, second.scene.start) == ("paper", 90, "ellipse")
-    assert (second.scene.frequency, second.options.tolerance, second.options.method) == (20, 1e-5, "bs32")
+    for setup, *expected in (
+        (first, "soft", 60, "rest", 15, 1e-7, "hybrid"),
+        (second, "paper", 90, "ellipse", 20, 1e-5, "bs32"),
+    ):
+        scene, options = setup.scene, setup.options
+        found = [setup.preset, scene.links, scene.start, scene.frequency, options.tolerance, options.method]
+        assert found == expected
     assert second.parameters.floor_friction == 0.3 != first.parameters.floor_friction
-    assert (paper.preset, paper.parameters.joint_stiffness) == ("paper", 1e9)
-    assert (soft.preset, soft.parameters.joint_stiffness) == ("soft", 1e7)
+    assert [(each.preset, each.parameters.joint_stiffness) for each in (paper, soft)] == [("paper", 1e9), ("soft", 1e7)]
 
 
 @pytest.mark.parametrize(
@@ -101,24 +92,9 @@ def test_axis_values(name: str, given: object, values: tuple[object, ...]) -> No
     assert [type(value) for value in block.axes[name]] == [type(value) for value in values]
 
 
-def test_from_a_file(tmp_path: Path) -> None:
-    """A file gives the same sweep as its content, its canonical copy too; a sweep is taken as it is."""
-    path = tmp_path / "sweep.yaml"
-    path.write_text(yaml.safe_dump(content(distributions={"coulomb_friction": {"gaussian": {"sigma": 2e-5}}})))
-    sweep = load_sweep(path)
-    again = tmp_path / "again.yaml"
-    again.write_text(yaml.safe_dump(sweep.canonical(), sort_keys=False))
-    for other in (load_sweep(str(path)), load_sweep(again), pickle.loads(pickle.dumps(sweep)), load_sweep(sweep)):
-        assert other.digest() == sweep.digest()
-        assert other.canonical() == sweep.canonical()
-        assert [other.planned(index) for index in other.indices[:12].tolist()] == [
-            sweep.planned(index) for index in other.indices[:12].tolist()
-        ]
-
-
 # Refusals
 
-FULL = {"frequency": {"from": 1, "to": 10_000, "step": 1}}
+FULL = {"walk_limit": {"from": 1, "to": 10_000, "step": 1}}
 LONG = {"from": 1e-3, "to": 1e-2, "count": 10_000}
 
 
@@ -126,7 +102,6 @@ LONG = {"from": 1e-3, "to": 1e-2, "count": 10_000}
     ("changes", "path"),
     [
         ({"version": 2}, "version"),
-        ({"preset": None}, "preset"),
         ({"samples": None}, "samples"),
         ({"scene": {"frequncy": 5}}, "scene.frequncy"),
         ({"options": {"device": "cuda"}, "grid": {"method": ["os32", "hybrid"]}}, "grid.method[1]"),
@@ -134,7 +109,6 @@ LONG = {"from": 1e-3, "to": 1e-2, "count": 10_000}
         ({"grid": {"lniks": [60]}}, "grid.lniks"),
         ({"grid": {"links": []}}, "grid.links"),
         ({"grid": {"floor": ["flat", [[-1, 0], [1, 0]]]}}, "grid.floor"),
-        ({"grid": {"links": [60, 20]}}, "grid.links[1]"),
         ({"grid": {"links": [60, 1026]}, "options": {"device": "cuda"}}, "grid.links[1]"),
         ({"grid": {"frequency": [5, 5.0]}}, "grid.frequency"),
         ({"grid": {"preset": ["soft"]}}, "grid.preset"),
@@ -142,14 +116,12 @@ LONG = {"from": 1e-3, "to": 1e-2, "count": 10_000}
         ({"grid": {"device": ["cpu", "cuda"]}, "options": {}}, "grid"),
         ({"grid": {"links": {"from": 60, "to": 90, "step": 10, "count": 4}}}, "grid.links.step"),
         ({"grid": {"links": {"from": 60, "to": 90, "step": 20}}}, "grid.links.to"),
-        ({"grid": {"links": {"from": 60, "to": 90, "step": 7.5}}}, "grid.links[1]"),
         ({"grid": {"frequency": {"from": 5, "to": 10, "step": 1e-300}}}, "grid.frequency.step"),
         ({"grid": {"start": ["rest", "spinning"]}, "scene": {"clearance_of": "hanging"}}, "scene.clearance_of"),
         ({"grid": {"link_length": [0.012, 0.008]}}, "parameters.circle_radius"),
         ({"distributions": {"links": "fixed"}}, "distributions.links"),
         ({"distributions": {"gravity": "table"}}, "distributions.gravity"),
         ({"distributions": {"floor_friction": {"uniform": [0.3, 0.2]}}}, "distributions.floor_friction.uniform[1]"),
-        ({"distributions": {"floor_friction": {"uniform": [-0.1, 0.2]}}}, "distributions.floor_friction.uniform[0]"),
         ({"distributions": {"g": {"gaussian": {"mean": -1, "sigma": 1}}}}, "distributions.gravity.gaussian.mean"),
         ({"distributions": {"e_fc": {"gaussian": {"sigma": 50}}}}, "distributions.floor_restitution"),
         ({"distributions": {"mu_fc": UNIFORM}, "grid": {"mu_fc": [0.3]}}, "distributions.floor_friction"),
@@ -159,19 +131,16 @@ LONG = {"from": 1e-3, "to": 1e-2, "count": 10_000}
         ({"samples": 12, "sampler": "sobol"}, "samples"),
         ({"same_samples_along": ["tolerance"]}, "same_samples_along"),
         ({"record": {"series": {"interval": 1.5e-3}}}, "record.series.interval"),
-        ({"record": {"series": {"samples": [1, 1]}}}, "record.series.samples"),
         ({"record": {"series": {"samples": [0, 3]}}}, "record.series.samples"),
         ({"record": {"frames": True}}, "record.frames"),
         ({"record": {"series": {"samples": [0]}, "frames": {"samples": [0, 1]}}}, "record.frames"),
         ({"points": {"mu_fc": [0.1, 0.2], "e_fc": [0.1]}}, "points.floor_restitution"),
-        ({"points": {"nu": [5]}}, "points.frequency"),
         ({"blocks": [{"name": "b"}]}, "grid"),
         ({"blocks": [{"name": "a/b"}], "grid": None}, "blocks[0].name"),
         ({"blocks": [{"name": "b"}, {"name": "b"}], "grid": None}, "blocks[1].name"),
         ({"blocks": [{"name": "b", "grid": {"nu": [5, -5]}}], "grid": None}, "blocks[0].grid.frequency[1]"),
         # sizes
         ({"samples": 2**30}, "samples"),
-        ({"samples": 2**21, "sampler": "sobol"}, "samples"),
         ({"grid": dict.fromkeys(list(Parameters.model_fields)[:12], LONG)}, "grid"),
         ({"grid": FULL | {"gravity": {"from": 1, "to": 11, "step": 1}}}, "grid"),
         ({"blocks": [{"name": f"b{number}", "grid": FULL} for number in range(5000)], "grid": None}, "blocks["),

@@ -11,13 +11,13 @@ from scipy import stats
 
 from tests.support.setups import setup_walk
 from tests.support.sweep_content import TABLE_1, UNIFORM, blocks, content, drawn
-from warpchain.inputs.distributions import Gaussian, random_generator, sampled
+from warpchain.inputs.distributions import Gaussian, Uniform, draw, random_generator, sampled
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import check_scene, fewest_links
 from warpchain.inputs.setup import resolve
-from warpchain.inputs.validation import Bounds, InputError
-from warpchain.sweeps.designs import design_points, saltelli_outputs, sobol_indices
-from warpchain.sweeps.plan import Sweep, load_sweep
+from warpchain.inputs.validation import InputError
+from warpchain.sweeps.designs import design_points, sobol_indices
+from warpchain.sweeps.plan import load_sweep
 
 # Random numbers
 
@@ -55,21 +55,10 @@ def test_first_sample_is_that_of_a_single_walk() -> None:
     """Sample 0 of cell 0 is what a single walk draws from the same seed; the others follow the same rule."""
     settings = {"links": 90, "frequency": 12.0, "floor_friction": 0.1}
     for seed in (0, 7, 2**127):
-        sweep = load_sweep(
-            content(
-                seed=seed,
-                scene={"links": 90, "frequency": 12.0},
-                parameters={"floor_friction": 0.1},
-                grid={"tolerance": [1e-3, 1e-7]},
-            )
-        )
+        parts = {"scene": {"links": 90, "frequency": 12.0}, "parameters": {"floor_friction": 0.1}}
+        sweep = load_sweep(content(seed=seed, **parts, grid={"tolerance": [1e-3, 1e-7]}))
         assert sweep.planned(0).setup == setup_walk("soft", settings | {"tolerance": 1e-3}, seed)
-        base = resolve(
-            "soft",
-            scene={"links": 90, "frequency": 12.0},
-            options={"tolerance": 1e-7},
-            parameters={"floor_friction": 0.1},
-        )
+        base = resolve("soft", **parts, options={"tolerance": 1e-7})
         assert sweep.planned(sweep.indices[5]).setup == sampled(
             base, random_generator(seed, 1, 2), kept={"floor_friction"}
         )
@@ -130,30 +119,16 @@ def test_values_on_an_axis_are_exact_unless_scatter_is_asked_for(name: str, othe
     ("changes", "names"),
     [
         ({}, [*TABLE_1, "phase", "clearance"]),
-        ({"distributions": {"all": "table"}}, [*TABLE_1, "phase", "clearance"]),
         ({"scene": {"phase": 0.5}}, [*TABLE_1, "clearance"]),
-        ({"grid": {"clearance": [0.01]}}, [*TABLE_1, "phase"]),
         ({"grid": {"link_length": [0.013]}}, [*TABLE_1[1:], "phase", "clearance"]),
         ({"parameters": {"link_length": 0.013}}, [*TABLE_1[1:], "phase", "clearance"]),
         ({"distributions": {"all": "fixed", "phase": "table"}}, ["phase"]),
         ({"distributions": {"all": "fixed"}, "samples": 1}, []),
         (
-            {
-                "distributions": {
-                    "all": "fixed",
-                    "clearance": {"gaussian": {"sigma": 0.001}},
-                    "frequency": {"uniform": [10, 20]},
-                    "gravity": UNIFORM,
-                    "link_length": "table",
-                },
-                "grid": {"links": [60]},
-            },
-            ["link_length", "gravity", "frequency", "clearance"],
+            {"distributions": {"all": "fixed", "frequency": UNIFORM, "g": UNIFORM}, "grid": None},
+            ["gravity", "frequency"],
         ),
-        (
-            {"distributions": {name: "fixed" for name in TABLE_1}, "parameters": {"floor_friction": 0.3}},
-            ["phase", "clearance"],
-        ),
+        ({"distributions": dict.fromkeys(TABLE_1, "fixed"), "parameters": {"mu_fc": 0.3}}, ["phase", "clearance"]),
     ],
 )
 def test_what_is_drawn(changes: dict[str, Any], names: list[str]) -> None:
@@ -161,10 +136,9 @@ def test_what_is_drawn(changes: dict[str, Any], names: list[str]) -> None:
     sweep = load_sweep(content(**changes))
     assert list(sweep.blocks[0].drawn) == names == list(sweep.planned(0).drawn)
     setup = sweep.planned(0).setup
-    if "phase" not in names:
-        assert setup.scene.phase == changes.get("scene", {}).get("phase", 0.0)
-    if "floor_friction" not in names:
-        assert setup.parameters.floor_friction == changes.get("parameters", {}).get("floor_friction", 0.27)
+    assert "phase" in names or setup.scene.phase == changes.get("scene", {}).get("phase", 0.0)
+    expected = changes.get("parameters", {}).get("mu_fc", 0.27)
+    assert "floor_friction" in names or setup.parameters.floor_friction == expected
 
 
 CASES = {
@@ -201,7 +175,7 @@ def test_distributions(sampler: str, samples: int) -> None:
 @pytest.mark.parametrize("ends", [(0.0, 1.0), (-math.inf, 0.5), (0.3, math.inf), (6.0, 7.0), (-40.0, -7.0), (9.0, 9.1)])
 def test_quantiles_of_truncated_gaussians(ends: tuple[float, float]) -> None:
     """Quantiles agree with SciPy's truncated Gaussian, far in both tails too."""
-    gaussian = Gaussian(0.25, 0.5, Bounds(*(0.25 + 0.5 * end for end in ends)))
+    gaussian = Gaussian(0.25, 0.5, (0.25 + 0.5 * ends[0], 0.25 + 0.5 * ends[1]))
     for fraction in (1e-12, 1e-3, 0.3, 0.5, 0.9, 1 - 1e-9):
         expected = stats.truncnorm(*ends, loc=0.25, scale=0.5).ppf(fraction)
         assert gaussian.quantile(fraction) == pytest.approx(expected, rel=1e-8, abs=1e-12)
@@ -236,73 +210,30 @@ def test_every_planned_walk_is_possible(sampler: str) -> None:
     longest = max(walk.setup.parameters.sprocket_radius for walk in walks[: len(walks) // 2])
     impossible = (values[1, :, :, 0] > longest).any(axis=1)
     assert (redrawn == impossible).all()
-    if sampler == "random":
-        for sample in range(64):
-            rng = random_generator(7, 0, sample)
-            pair = rng.normal(radius, 5e-4), rng.random()
-            while pair[0] > longest:
-                pair = rng.normal(radius, 5e-4), rng.random()
-            assert tuple(values[0, sample, 0]) == pair
-    if sampler == "saltelli":
-        first, second, *crossed = values[0].transpose(1, 0, 2)
-        for number, points in enumerate(crossed):
-            assert (points[:, number] == second[:, number]).all()
-            assert (points[:, 1 - number] == first[:, 1 - number]).all()
+
+
+def test_samples_that_are_never_possible_are_refused() -> None:
+    """One line names what is drawn, whether one quantity alone or all of them together are never physical."""
+    never = Uniform(2.0, 3.0, (0.0, 1.0))
+    with pytest.raises(InputError, match=r"^scene\.phase: 1000 draws between 2\.0 and 3\.0 were all outside the phys"):
+        draw({"gravity": Uniform(0.0, 1.0, (0.0, 1.0)), "phase": never}, np.random.default_rng(0))
+    too_large = {"all": "fixed", "sprocket_radius": {"uniform": [0.061, 0.07]}}
+    problem = r"^sweep\.distributions: 1000 samples made no possible walk; the last: scene\.links: 32 links of 0\.01268"
+    for sampler in ("random", "sobol"):
+        with pytest.raises(InputError, match=problem):
+            load_sweep(content(grid=None, scene={"links": 32}, samples=4, sampler=sampler, distributions=too_large))
+
+
+@pytest.mark.parametrize("name", ["circle_radius", "charm_radius"])
+def test_a_seed_draws_what_is_physical(name: str) -> None:
+    """Circles, of all links or of one, almost as wide as the mean link cut its Gaussian off: no seed is refused."""
+    setups = [setup_walk("soft", {name: 6.3399e-3, "start": "ellipse"}, seed) for seed in range(16)]
+    assert min(setup.parameters.link_length for setup in setups) > 2 * 6.3399e-3
 
 
 # Designed samples
 
 
-def unit_cube(names: list[str], sampler: str, samples: int, seed: int = 7) -> Sweep:
-    """A sweep of one cell that draws fractions, uniform from 0 to 1."""
-    return load_sweep(
-        content(
-            seed=seed,
-            sampler=sampler,
-            samples=samples,
-            grid=None,
-            distributions={"all": "fixed", **{name: {"uniform": [0, 1]} for name in names}},
-        )
-    )
-
-
-FRACTIONS = ["floor_restitution", "floor_friction", "chain_restitution", "chain_friction"]
-
-
-def ishigami(points: np.ndarray) -> np.ndarray:
-    """The function of Ishigami and Homma (1990), a = 7, b = 0.1, of points in the unit cube, shape (N, 3)."""
-    x, y, z = math.pi * (2 * points.T - 1)
-    return np.sin(x) + 7 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x)
-
-
-def test_saltelli_gives_known_sobol_indices() -> None:
-    """From the walks of a `saltelli` cell, SciPy and this package find the indices of the Ishigami function."""
-    sweep = unit_cube(FRACTIONS[:3], "saltelli", 1024)
-    assert sweep.blocks[0].shape == (1024 * 5,)
-    values = ishigami(drawn(sweep, sweep.walk_count))
-    outputs = saltelli_outputs(values, 3)
-    assert [outputs[key].shape for key in ("f_A", "f_B", "f_AB")] == [(1, 1024), (1, 1024), (3, 1, 1024)]
-    scipy = stats.sobol_indices(func=outputs, n=1024)
-    first, total = sobol_indices(outputs)
-    assert first == pytest.approx(scipy.first_order, rel=1e-10, abs=1e-12)
-    assert total == pytest.approx(scipy.total_order, rel=1e-10)
-    assert first == pytest.approx([0.3139, 0.4424, 0.0], abs=0.1)
-    assert total == pytest.approx([0.5576, 0.4424, 0.2437], abs=0.1)
-
-
-def test_failed_walks_cost_their_sample_only() -> None:
-    """A walk without result takes its sample out of the indices and changes the others little."""
-    sweep = unit_cube(FRACTIONS[:3], "saltelli", 512)
-    values = ishigami(drawn(sweep, sweep.walk_count))
-    whole = saltelli_outputs(values, 3)
-    values[[0, 4, 1234]] = math.nan
-    outputs = saltelli_outputs(values, 3)
-    for key, result in outputs.items():
-        assert (result == np.delete(whole[key], [0, 1234 // 5], axis=-1)).all()
-    for index, all_of_them in zip(sobol_indices(outputs), sobol_indices(whole), strict=True):
-        assert index == pytest.approx(all_of_them, abs=0.03)
-    nothing = sobol_indices(saltelli_outputs(np.full(10, math.nan), 3))
-    constant = sobol_indices(saltelli_outputs(np.ones(10), 3))
-    assert np.isnan([*nothing, *constant]).all()
-    with pytest.raises(ValueError, match="reshape"):
-        saltelli_outputs(values[1:], 3)
+def test_no_variance_has_no_sobol_indices() -> None:
+    """Equal results, or none, have NaN for indices."""
+    assert np.isnan([*sobol_indices(np.ones((2, 5))), *sobol_indices(np.ones((0, 5)))]).all()

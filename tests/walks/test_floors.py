@@ -9,8 +9,8 @@ import pytest
 
 import warpchain
 from tests.kernels.contacts.test_terrain import BOX, SOFT
+from tests.support.blocks_under_test import floor_with
 from warpchain import Status
-from warpchain.inputs.floor import distances
 from warpchain.pictures.animation import player
 from warpchain.pictures.chain import floor_line
 
@@ -35,6 +35,15 @@ def test_energy_is_accounted_for_on_every_floor(scene):
     assert walk.greatest_penetration["floor"] < 2e-4
 
 
+def test_ice_gives_no_push_along_it_and_rubber_does():
+    """On points with μ = 0 the centre keeps its x while the loop lands and spins; with μ = 1 it is off at once."""
+    scene = {"links": 24, "start": "ellipse", "preset": "soft", "method": "explicit", "walk_limit": 0.2}
+    ice, rubber = (warpchain.walk(floor=[[-1, 0, 0.018, mu], [1, 0]], **scene) for mu in (0.0, 1.0))
+    assert ice.impulses["floor"] > 100 and rubber.impulses["floor"] > 100
+    assert np.abs(ice.center[:, 0]).max() < 1e-9 and np.abs(ice.center_velocity[:, 0]).max() < 1e-9
+    assert rubber.center_velocity[-1, 0] > 0.2
+
+
 def test_a_walk_down_a_steep_slope_ends_by_its_distance():
     """It ends where its centre has gone the limit along the slope, and Δx is that of no chain at rest."""
     walk = warpchain.walk(links=24, start="ellipse", preset="soft", method="explicit", slope=30.0, distance_limit=0.5)
@@ -50,7 +59,7 @@ def test_the_release_is_at_its_clearance_from_the_profile():
             links=24, start="ellipse", preset="soft", method="explicit", clearance=0.02, distance_limit=1e-3, **scene
         )
         points = BOX if "floor" in scene else np.array([[0, 0], [np.cos(np.radians(20)), -np.sin(np.radians(20))]])
-        first = distances(points, walk.frame_joints[0]).min() - SOFT.circle_radius
+        first = floor_with(points, SOFT).distances(walk.frame_joints[0]).min() - SOFT.circle_radius
         assert first == pytest.approx(0.02, abs=1e-4)
 
 

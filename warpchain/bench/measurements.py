@@ -85,14 +85,13 @@ def step_costs(device: str, links: Sequence[int], report: Report) -> list[Row]:
         for method in methods:
             end, _, accepted, rejected = flights[n, method][0]
             seconds = statistics.median(flight[1] for flight in flights[n, method])
-            options, attempts = Options.model_validate({"method": method}), accepted + rejected
+            options = Options.model_validate({"method": method})
             tolerance = options.flight_tolerance if find_method(method).has_rigid_flight else options.tolerance
-            flown = TIMED - COMPARED_TIME
-            counts = attempts, flown / accepted, rejected / attempts
-            rows.append(_row(n, method, tolerance, chains, seconds, flown, counts, end, aim))
-        end, seconds, evaluated = numpy_model.fly(*start, COMPARED_TIME, PARAMETERS, SCIPY_TOLERANCE)
-        measured = evaluated, COMPARED_TIME / evaluated, math.nan
-        rows.append(_row(n, SCIPY, SCIPY_TOLERANCE, 1, seconds, COMPARED_TIME, measured, end, aim))
+            about = {"links": n, "method": method, "tolerance": tolerance, "chains": chains}
+            rows.append(about | _cost(chains, seconds, TIMED - COMPARED_TIME, accepted, rejected) | _errors(end, aim))
+        end, seconds, attempts = numpy_model.fly(*start, COMPARED_TIME, PARAMETERS, SCIPY_TOLERANCE)
+        about = {"links": n, "method": SCIPY, "tolerance": SCIPY_TOLERANCE, "chains": 1}
+        rows.append(about | _cost(1, seconds, COMPARED_TIME, attempts, math.nan) | _errors(end, aim))
     return rows
 
 
@@ -132,25 +131,17 @@ def fly(start: State, method: str, chains: int, device: str) -> tuple[State, flo
     return compared, seconds, after["accepted"] - before["accepted"], after["rejected"] - before["rejected"]
 
 
-def _row(
-    links: int,
-    method: str,
-    tolerance: float,
-    chains: int,
-    seconds: float,
-    flown: float,
-    counts: tuple[float, float, float],
-    end: State,
-    aim: State,
-) -> Row:
-    """A row of `step_costs`; counts: attempts, mean step [s], share rejected."""
-    attempts, step, rejected = counts
-    off = [float(np.hypot(*(end[k] - aim[k])[:, :2].T).max()) for k in (0, 1)]
-    return {
-        **{"links": links, "method": method, "tolerance": tolerance, "chains": chains},
-        **{"microseconds": 1e6 * seconds / (attempts * chains), "step": step, "rejected": rejected},
-        **{"chain_seconds": chains * flown / seconds, "position_error": off[0], "velocity_error": off[1]},
-    }
+def _cost(chains: int, seconds: float, flown: float, accepted: float, rejected: float) -> Row:
+    """What `step_costs` says of the steps of a flight; `rejected` is NaN where attempts are counted as accepted."""
+    attempts = np.nansum([accepted, rejected])
+    rates = {"step": flown / accepted, "rejected": rejected / attempts, "chain_seconds": chains * flown / seconds}
+    return {"microseconds": 1e6 * seconds / (attempts * chains)} | rates
+
+
+def _errors(end: State, aim: State) -> Row:
+    """What `step_costs` says of the end of a flight."""
+    place, rate = (float(np.hypot(*(one - other)[:, :2].T).max()) for one, other in zip(end, aim, strict=True))
+    return {"position_error": place, "velocity_error": rate}
 
 
 def walk_rate(device: str, report: Report) -> Row:

@@ -59,8 +59,7 @@ def bench(
             raise InputError(f"bench.links: {count} is odd; inner and outer links alternate: give an even number")
     about = machine(where)
     with changing_line() as show:
-        told = show or (lambda text: None)
-        steps, walks = step_costs(where, lengths, told), walk_rate(where, told)
+        steps, walks = step_costs(where, lengths, show), walk_rate(where, show)
     if as_json:
         print(json.dumps(json_value({"machine": about, "steps": steps, "walks": walks}), indent=2, allow_nan=False))
         return

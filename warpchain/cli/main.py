@@ -26,6 +26,9 @@ from warpchain.version import VERSION
 REFUSED: Final = 2
 """Exit status beside `FAILED` and `INTERRUPTED`."""
 
+FORMER_OPTIONS: Final = {"--animate": "give -o DIR, then run `warpchain animate DIR`"}
+"""Options that were removed → what to do instead."""
+
 app = typer.Typer(pretty_exceptions_enable=False, rich_markup_mode=None)  # boxes of rich would double the time of help
 
 
@@ -61,7 +64,8 @@ def _refuse_for(error: Exception) -> None:
     if isinstance(error, typer.TyperException):
         context = getattr(error, "ctx", None)
         command = context.command_path if context is not None else "warpchain"
-        _refuse([f"{error.format_message().rstrip('.')}; see {command} --help"], error.exit_code)
+        remedy = FORMER_OPTIONS.get(getattr(error, "option_name", ""), f"see {command} --help")
+        _refuse([f"{error.format_message().rstrip('.')}; {remedy}"], error.exit_code)
     if isinstance(error, OSError):
         _refuse([str(error)], FAILED if error.errno in DISK_FAILURES else REFUSED)
     if isinstance(error, InputError):

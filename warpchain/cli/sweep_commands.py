@@ -1,12 +1,10 @@
 """The commands of the command line that are about sweeps: sweep, info, plot, report, merge."""
 
 import contextlib
-import logging
 import os
 import sys
-from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
@@ -18,7 +16,6 @@ if TYPE_CHECKING:
 
 _FILE: Final = "The sweep, or the bare name of one that comes with warpchain, such as figure6."
 _DEVICE: Final = "cpu, cuda (the first GPU) or cuda:N, instead of what the sweep says."
-_SCHEDULER: Final = "Run on the workers of this Dask scheduler; they must see DIR."
 
 AsJson = Annotated[bool, JSON]
 
@@ -28,10 +25,7 @@ def sweep(
     source: Annotated[Path | None, argument("FILE.yaml", _FILE)] = None,
     folder: Annotated[Path | None, output("DIR", "Folder of the results; a killed sweep goes on in it.")] = None,
     device: Annotated[str | None, option("NAME", _DEVICE)] = None,
-    workers: Annotated[
-        int | None, option("N", "Shards in work at once. Default: processors, or Dask's threads.", min=1)
-    ] = None,
-    scheduler: Annotated[str | None, option("tcp://HOST:PORT", _SCHEDULER)] = None,
+    workers: Annotated[int | None, option("N", "Shards in work at once. Default: processors.", min=1)] = None,
     gpus: Annotated[
         int | None, option("N", "Run on the first N GPUs of this machine, a process for each.", min=1)
     ] = None,
@@ -41,9 +35,6 @@ def sweep(
     ] = None,
     seed: Annotated[int | None, option("S", "Seed instead of the file's.", min=0)] = None,
     samples: Annotated[int | None, option("N", "Samples of each cell instead of the file's.", min=1)] = None,
-    estimate: Annotated[
-        bool, typer.Option("--estimate", help="Try a few walks; say how long all take, and their size.")
-    ] = False,
     fresh: Annotated[bool, typer.Option("--fresh", help="Discard what another sweep left in the folder.")] = False,
     new: Annotated[
         Path | None,
@@ -63,25 +54,21 @@ def sweep(
         return
     if source is None:
         raise InputError("FILE.yaml: missing; give a sweep file, or --new FILE.yaml to have one written")
-    if estimate:
-        if gpus is not None or scheduler is not None:
-            raise InputError("--estimate: tries walks in this process; leave out --gpus and --scheduler")
-        _print_estimate(source, device=device, workers=workers, part=part, seed=seed, samples=samples)
-        return
     if folder is None:
         raise InputError("--output: missing; give a folder for the results with -o DIR")
     from warpchain.cli.terminal import print_sweep
+    from warpchain.run.gpu_workers import gpu_workers
     from warpchain.run.sweep_run import sweep as run
 
     if gpus is not None:
-        for name, value in (("--scheduler", scheduler), ("--workers", workers)):
-            if value is not None:
-                raise InputError(f"{name}: given together with --gpus; leave one out")
+        if workers is not None:
+            raise InputError("--workers: given together with --gpus; leave one out")
         if device not in (None, "cuda"):
             raise InputError(f"--device: {device} is given together with --gpus; give cuda, or leave one out")
         device = "cuda"
+        _checked_gpus(gpus)
     try:
-        with _executor(gpus, scheduler) as executor:
+        with contextlib.nullcontext() if gpus is None else gpu_workers(gpus) as executor:
             result = run(
                 source,
                 folder,
@@ -108,10 +95,9 @@ def info(
     Of a merged file the checksum is compared first.
     """
     from warpchain.cli.terminal import print_sweep
-    from warpchain.store.folder import running_rate
     from warpchain.store.sweep_result import load
 
-    print_sweep(load(directory), as_json, None if os.path.isfile(directory) else running_rate(directory))
+    print_sweep(load(directory), as_json)
 
 
 def plot(
@@ -128,7 +114,7 @@ def plot(
 ) -> None:
     """Draw all figures of a sweep or of a saved walk.
 
-    Of a sweep: the distance as in the paper's Figure 6, maps, lines over any axes, sensitivity, statuses. Of a walk:
+    Of a sweep: the distance as in the paper's Figure 6, maps, lines over any axes, sensitivity. Of a walk:
     film_strip.png, height_and_speed.png, loop.png, energy.png and, if the plane tilts, tilt.png; a line says what is
     left out and why.
     """
@@ -153,15 +139,14 @@ def plot(
         else (picture.save(folder) for picture in figures(found, quantity or "dx"))
     )
     count = 0
-    for drawing in drawn:
+    for count, drawing in enumerate(drawn, 1):  # noqa: B007
         print(printable(str(drawing)))
-        count += 1
     if not count and is_walk:
         raise typer.Exit(FAILED)
     if not count:
         name = path if quantity is None else f"--quantity: {quantity}"
         raise InputError(
-            f"{name}: no walk at rest has a value, or no axis has several values; give another --quantity, as walk_time"
+            f"{name}: no walk at rest has a value, or no axis has several values; give another --quantity, or see info"
         )
 
 
@@ -191,13 +176,10 @@ def report(
 
 
 def merge(
-    directories: Annotated[list[Path], argument("DIR...", "Folder of a sweep, or several; merged files, too.")],
+    directories: Annotated[list[Path], argument("DIR...", "Folder of a sweep, or of each part; merged files, too.")],
     path: Annotated[Path, argument("FILE.h5", "The file to write.", parser=output_path)],
 ) -> None:
-    """Put the results of folders into one file, which xarray opens.
-
-    Folders of the same sweep with different seeds are put together: their samples stand one behind the other.
-    """
+    """Put the results of a folder, or of all parts of a sweep, into one file, which xarray opens."""
     from warpchain.inputs.validation import printable
     from warpchain.store.merged_file import merge as merge_shards
 
@@ -205,59 +187,19 @@ def merge(
     print(printable(str(path)))
 
 
-def _print_estimate(source: Path, **given: Any) -> None:
-    """Say how long a sweep would take on this machine, and how much of the disk."""
-    from warpchain.run.estimate import estimate_sweep
-    from warpchain.run.progress_bar import duration_text
-
-    found = estimate_sweep(source, **given)
-    print(
-        f"{found.walks:,} walks: about {duration_text(found.seconds)} with {found.workers} at once on this machine, "
-        f"{found.bytes / 1e6:,.1f} MB on disk ({found.pilots} walks tried)"
-    )
-
-
-@contextlib.contextmanager
-def _executor(gpus: int | None, scheduler: str | None) -> Iterator[Any]:
-    """Workers on GPUs, or the client of a Dask cluster; None if neither is asked for."""
+def _checked_gpus(wanted: int) -> None:
+    """Check that this machine has so many GPUs; else an `InputError`."""
     from warpchain.engine.devices import gpu_count
     from warpchain.inputs.validation import InputError
-    from warpchain.run.gpu_workers import gpu_workers, visible_gpus
-
-    if gpus is not None:
-        visible_gpus(gpus)
-        if gpus > (there := gpu_count()):
-            raise InputError(f"--gpus: {gpus} wanted, but this machine has {there}; give at most {there}")
-        with gpu_workers(gpus) as executor:
-            yield executor
-    elif scheduler is not None:
-        logging.disable(logging.ERROR)  # Dask logs tracebacks of what is said in one line
-        try:
-            with _dask_client(scheduler) as client:
-                yield client
-        finally:
-            logging.disable(logging.NOTSET)
-    else:
-        yield None
-
-
-def _dask_client(address: str) -> Any:
-    from warpchain.inputs.validation import InputError, shown
 
     try:
-        from distributed import Client
-    except ImportError:
-        raise InputError("--scheduler: Dask is not installed; pip install 'warpchain[dask]'") from None
-    # A client that does not connect has to be closed. Left alone, it closes itself when it is collected as garbage. If
-    # that happens while this thread starts another client, the thread waits for ever.
-    client = Client.__new__(Client)
-    try:
-        client.__init__(address, timeout=10)  # type: ignore[misc]
-        return client
-    except Exception as error:  # of any class, by protocol: tls and ucx without their settings give a TypeError
-        client.close()  # type: ignore[no-untyped-call]
-        problem = " ".join(str(error).split()) or type(error).__name__
-        raise InputError(f"--scheduler: {shown(address)}: {problem}; give the address of a running scheduler") from None
+        there = gpu_count()
+    except InputError as error:
+        if not str(error).startswith("options.device"):
+            raise
+        raise InputError("--gpus: no GPU is found on this machine; leave it out to run on the CPU") from None
+    if wanted > there:
+        raise InputError(f"--gpus: {wanted} wanted, but this machine has {there}; give at most {there}")
 
 
 def _note_failures(result: "SweepResult") -> None:

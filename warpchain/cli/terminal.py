@@ -7,12 +7,10 @@ import sys
 from collections.abc import Container, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Final
 
-import numpy as np
-
 from warpchain.engine.tallies import LOST
 from warpchain.inputs.validation import json_value, printable
-from warpchain.run.progress_bar import duration_text
-from warpchain.walks.rows import fault_remedies
+from warpchain.pictures.labels import cell_table
+from warpchain.walks.faults import FAULTS
 from warpchain.walks.walk_result import WalkResult
 
 if TYPE_CHECKING:
@@ -37,15 +35,8 @@ def print_table(headings: Iterable[str], rows: Iterable[Sequence[str]], left: Co
     Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else _WIDE).print(table)
 
 
-def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None) -> None:
-    """Print the statuses of a sweep and the mean Δx of each cell on standard output.
-
-    Args:
-        result: the sweep.
-        as_json: whether to print one JSON object instead of a table.
-        rate: walks per second of the process that runs the sweep; None if none does.
-    """
-    time_left = result.missing_count / rate if rate else None
+def print_sweep(result: "SweepResult", as_json: bool) -> None:
+    """Print the statuses of a sweep and the mean Δx of each cell on standard output, as a table or one JSON object."""
     summary, statistics = result.summary(), result.cell_statistics()
     if as_json:
         blocks = {
@@ -56,32 +47,23 @@ def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None)
             for name, cells in statistics.items()
         }
         whole = {"name": result.name, "walks": result.walk_count, "statuses": summary}
-        whole |= {"inaccurate": result.inaccurate_count, "rate": rate, "time_left": time_left, "blocks": blocks}
+        whole |= {"inaccurate": result.inaccurate_count, "blocks": blocks}
         print(json.dumps(json_value(whole), indent=2, allow_nan=False))
         return
     counts = ", ".join(f"{count:,} {label}" for label, count in summary.items() if count)
     print(f"{printable(result.name)}: {result.walk_count:,} walks, {counts}")
-    for remedy_of_fault, number in fault_remedies(block.faults for block in result.blocks.values()).items():
-        print(f"{number:,} inaccurate: {remedy_of_fault}")
-    if rate is not None:
-        left = "" if time_left is None else f", {duration_text(time_left)} left"
-        print(f"running: {rate:.2f} walks a second{left}")
+    for fault, remedy in FAULTS.items():
+        if number := sum(int(block.faults[fault].sum()) for block in result.blocks.values()):
+            print(f"{number:,} inaccurate: {remedy}")
     room = _MOST_CELLS
     for name, cells in statistics.items():
-        numbers = {"at rest": cells.count} | ({"ended as asked": cells.absent} if cells.absent.any() else {})
-        numbers |= {"failed": cells.failed, "missing": cells.missing}
-        rows = []
-        for place in itertools.islice(np.ndindex(*cells.mean.shape), room):
-            at = (values[index] for values, index in zip(cells.axes.values(), place, strict=True))
-            texts = ["null" if value is None else printable(str(value)) for value in at]
-            lengths = [f"{array[place]:.4f}" for array in (cells.mean, cells.sd)]
-            rows.append([*texts, *lengths, *(str(array[place]) for array in numbers.values())])
-        if rows and len(statistics) > 1:
+        head, rows = cell_table(cells)
+        if room and len(statistics) > 1:
             print(printable(name))
-        if rows:
-            print_table([*map(printable, cells.axes), "mean Δx / m", "s.d. / m", *numbers], rows)
-        room -= len(rows)
-    if more := sum(cells.mean.size for cells in statistics.values()) - _MOST_CELLS + room:
+        if room:
+            print_table(head, itertools.islice(rows, room))
+        room = max(0, room - cells.mean.size)
+    if (more := sum(cells.mean.size for cells in statistics.values()) - _MOST_CELLS) > 0:
         print(f"… and {more:,} more cells, which --json lists")
 
 

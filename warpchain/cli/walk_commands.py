@@ -4,7 +4,7 @@ import json
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
@@ -69,10 +69,6 @@ def walk(
     like: Annotated[Path | None, option("PATH", _LIKE)] = None,
     index: Annotated[_Text, option("I", _INDEX)] = None,
     folder: Annotated[Path | None, output("DIR", _OUTPUT)] = None,
-    animation: Annotated[
-        Literal["gif", "mp4", "html"] | None,
-        typer.Option("--animate", help="Write walk.gif, walk.mp4 or walk.html to the folder as well."),
-    ] = None,
     frame_interval: Annotated[_Text, option("SECONDS", _FRAMES)] = None,
     record_loads: Annotated[bool, typer.Option("--record-loads", help=_LOADS)] = False,
     as_json: Annotated[bool, JSON] = False,
@@ -87,7 +83,6 @@ def walk(
     from warpchain.inputs.validation import InputError, checked, printable
     from warpchain.inputs.yaml_files import parse_yaml
     from warpchain.run.progress_bar import changing_line, walk_progress_text
-    from warpchain.sweeps.sweep_file import read_walk_file
     from warpchain.walks.one_walk import run_walk
 
     named = {"links": links, "frequency": frequency, "start": start}
@@ -102,6 +97,8 @@ def walk(
         replaced = replaced_by(given["options"])
         preset, own = base.preset, {name: getattr(base, name).model_dump(exclude=replaced) for name in SECTIONS}
     elif config is not None:
+        from warpchain.sweeps.sweep_file import read_walk_file  # its grammar takes long to build
+
         file_preset, own = read_walk_file(config)
         preset = preset or file_preset
         if preset is None:
@@ -113,23 +110,23 @@ def walk(
     else:
         sections = {name: {**own.get(name, {}), **values} for name, values in given.items()}
         setup = resolve(preset or DEFAULT_PRESET, **sections, seed=number, records_loads=record_loads)
-    interval = _frame_interval(folder, animation, frame_interval, record_loads)
+    interval = _frame_interval(folder, frame_interval, record_loads)
     if folder is not None:
-        try_walk_folder(folder, animation)
+        try_walk_folder(folder)
     with changing_line() as show:
         result = run_walk(
             setup,
             seed=number,
             frame_interval=interval,
             record_loads=record_loads,
-            on_progress=show and (lambda progress: show(walk_progress_text(progress))),
+            on_progress=lambda progress: show(walk_progress_text(progress)),
         )
     if as_json:
         print(json.dumps(result.to_dict(), indent=2, allow_nan=False))
     else:
         print_walk(result)
     if folder is not None:
-        for path in write_walk(result, folder, animation):
+        for path in write_walk(result, folder):
             if not as_json:
                 print(printable(str(path)))
     if not result.status.ok:
@@ -192,23 +189,18 @@ def _saved(path: Path, index: str | None) -> tuple["Setup", int | None]:
     if index is None:
         raise InputError(f"--like: {path} has many walks; give --index, the number of one, as well")
     block, place = found.located(parse_yaml(index, "--index"))
-    return block.setup_at(place), block.sweep_at(place).seed
+    return block.setup_at(place), block.origin.seed
 
 
-def _frame_interval(folder: Path | None, animation: str | None, text: str | None, records_loads: bool) -> Any:
+def _frame_interval(folder: Path | None, text: str | None, records_loads: bool) -> Any:
     """Time between two frames [s], which the walk checks; None without a folder to write them to."""
-    from importlib.util import find_spec
-
     from warpchain.inputs.validation import InputError
     from warpchain.inputs.yaml_files import parse_yaml
 
-    needing = (("--animate", animation), ("--frame-interval", text), ("--record-loads", records_loads or None))
-    for name, value in needing:
-        if value is not None and folder is None:
-            raise InputError(f"{name}: there is no folder to write to; add -o DIR")
-    if animation == "mp4" and find_spec("imageio_ffmpeg") is None:
-        raise InputError("--animate mp4: imageio-ffmpeg is not installed; pip install 'warpchain[video]'")
     if folder is None:
+        for name, given in (("--frame-interval", text is not None), ("--record-loads", records_loads)):
+            if given:
+                raise InputError(f"{name}: there is no folder to write to; add -o DIR")
         return None
     usual = 1e-4 if records_loads else 2e-3
     return usual if text is None else parse_yaml(text, "frame_interval")

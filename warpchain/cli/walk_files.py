@@ -1,4 +1,4 @@
-"""The folder of a walk: its record, its figures, its moving picture."""
+"""The folder of a walk: its record and its figures."""
 
 import os
 import sys
@@ -38,20 +38,11 @@ def saved(path: Path, wanted: str) -> "WalkResult | SweepResult":
     return load(record) if is_sweep or kind_of_hdf5(record, wanted) == KIND else load_walk(record)
 
 
-def try_walk_folder(folder: Path, animation: str | None) -> None:
-    """Check before a walk that all its files can be written; errors as of `try_folder` and `checked_output`."""
-    try_folder(folder)
-    if folder.is_dir():
-        moving = [] if animation is None else [f"walk.{animation}"]
-        for name in (RECORD, *(f"{kind}.png" for kind in get_args(Kind)), *moving):
-            checked_output(folder / name)
-
-
-def try_folder(folder: Path) -> None:
-    """Check before a long run that a folder can be written to; nothing is left there.
+def try_walk_folder(folder: Path) -> None:
+    """Check before a walk that all its files can be written to a folder; nothing is left there.
 
     Raises:
-        OSError: it cannot; one line that names it.
+        OSError: one cannot; one line that names it or the folder.
     """
     nearest = folder.absolute()
     with naming(folder):
@@ -63,10 +54,13 @@ def try_folder(folder: Path) -> None:
                 nearest = nearest.parent
         with tempfile.TemporaryDirectory(prefix=".warpchain-", dir=nearest):
             pass
+    if folder.is_dir():
+        for name in (RECORD, *(f"{kind}.png" for kind in get_args(Kind))):
+            checked_output(folder / name)
 
 
-def write_walk(result: "WalkResult", folder: Path, animation: str | None) -> Iterator[Path]:
-    """Write the record, then its film strip and its moving picture, whole or not at all; yield the path of each.
+def write_walk(result: "WalkResult", folder: Path) -> Iterator[Path]:
+    """Write the record, then its film strip, whole or not at all; yield the path of each.
 
     Figures of an earlier walk are deleted: they do not belong to this record.
 
@@ -79,15 +73,6 @@ def write_walk(result: "WalkResult", folder: Path, animation: str | None) -> Ite
     for kind in get_args(Kind):
         remove_output(folder / f"{kind}.png")
     yield from draw_figures(result, folder, ["film_strip"])
-    if animation is not None:
-        path = folder / f"walk.{animation}"
-        try:
-            result.animate(path)
-        except ValueError as error:
-            remove_output(path)
-            _note(path, error)
-        else:
-            yield path
 
 
 def draw_figures(walk: "WalkResult", folder: Path, kinds: Iterable[Kind]) -> Iterator[Path]:
@@ -103,11 +88,7 @@ def draw_figures(walk: "WalkResult", folder: Path, kinds: Iterable[Kind]) -> Ite
         try:
             figure = walk.plot(kind)
         except ValueError as error:
-            _note(path, error)
+            print(one_line(f"{path}: not drawn; {error}"), file=sys.stderr)
         else:
             save_figure(figure, path)
             yield path
-
-
-def _note(path: Path, error: ValueError) -> None:
-    print(one_line(f"{path}: not drawn; {error}"), file=sys.stderr)

@@ -2,29 +2,30 @@
 
 import itertools
 import math
-import time
-from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpchain.engine.constants import constants_of, rows_of
+from warpchain.engine.constants import constants_of
 from warpchain.engine.control import control_of
 from warpchain.engine.devices import Gpu, start_device
-from warpchain.engine.ground import cells_of, faces_of
-from warpchain.engine.kernel_choice import block_threads, features_of, load_kernels, step_kernel
-from warpchain.engine.memory import CAPACITY_FRAMES, CAPACITY_SAMPLES, scratch_rows
+from warpchain.engine.kernel_choice import block_threads, step_kernel
 from warpchain.engine.mirror import Mirror
 from warpchain.engine.tallies import COUNTS, EXTREMES, LOSSES
+from warpchain.inputs.floor import Floor
 from warpchain.inputs.link_values import LinkValues, alternating
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.scene import Scene, link_values
+from warpchain.inputs.state import Setup
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.list_layout import list_layout
+from warpchain.kernels.cpu.rows import scratch_rows
 from warpchain.kernels.features import Features
+from warpchain.kernels.gpu.functions import board_rows
 from warpchain.kernels.types import LOADING_TIME, Drive, Model, Record, State
 from warpchain.status import Status
 
@@ -33,8 +34,21 @@ Array = NDArray[np.float64]
 FIRST_STEP = 1e-7  # s; it may grow fivefold per step
 LANES = 3
 """Streams on which kernels for different chain lengths run side by side: chains of one length do not fill a GPU."""
-LAUNCH_SECONDS = 0.1  # s, wanted duration of a launch, after which progress is shown and Ctrl-C noticed
-UNSET_WATCHES = (
+LAUNCH_SECONDS = 0.1  # s, after which a launch on a GPU ends, progress is shown and Ctrl-C noticed
+ATTEMPTS = {"cpu": 5_000, "gpu": 200_000}
+"""Most attempts of each chain per launch, by kind of device; what a walk gives does not depend on it.
+
+On a CPU 5000 take 6 to 110 ms, which is the grain of progress and of Ctrl-C. On a GPU a launch is cut by its time:
+attempts in a pile take three times as long as in flight, and with equal numbers of attempts every chain would wait for
+the slowest of its batch.
+"""
+CAPACITY_SAMPLES = 512
+"""Samples of a chain that a device can hold between two launches, if the time series is kept."""
+CAPACITY_FRAMES = 64
+"""Frames of a chain that a device can hold between two launches, if frames are kept."""
+
+
+_UNSET = (
     *(layout.WINDOW_START, layout.STEADY_SINCE, layout.LOADED_SINCE, layout.UNLOADED_SINCE, layout.DRIFT),
     *(layout.REST_SINCE, layout.SOFTENED_AT, layout.FELL_AT),
     *(layout.SELF_CONTACT_AT, layout.SELF_CONTACT_BOUNCES, layout.SELF_CONTACT_FLIGHT),
@@ -44,10 +58,59 @@ UNSET_WATCHES = (
 """Entries of :attr:`State.watch` that are −1 until set."""
 
 
+def _beginning() -> dict[str, Any]:
+    """Fields of :class:`State` of a chain whose clock is at zero."""
+    watch, sample = np.zeros(layout.WATCH_ROWS), np.zeros(layout.ALL_COLUMNS)
+    watch[list(_UNSET)], watch[layout.LAST_FLOOR_IMPULSE], sample[layout.TIME] = -1.0, -np.inf, -1.0
+    zeros = ("time", "gap", "time_to_contact", "slack", "next_sample", "counts", "extremes", "losses", "closing_time")
+    ones = ("load_factor", "is_fresh", "last_error")
+    known = {"step": FIRST_STEP, "other_step": FIRST_STEP, "watch": watch, "last_sample": sample}
+    return known | dict.fromkeys((*zeros, "has_first_stage", "is_rigid"), 0) | dict.fromkeys(ones, 1)
+
+
+_BEGINNING = _beginning()
+
+
+class Recorded(NamedTuple):
+    """What launches have recorded of a chain of n links: t samples and f frames.
+
+    Attributes:
+        samples: shape (t, SAMPLE_COLUMNS), or ALL_COLUMNS if planes are kept, see :mod:`warpchain.kernels.layout`.
+        times: of the frames [s], shape (f,).
+        frames: joints x, y [m], shape (f, n, 2).
+        loads: force x, y [N] and moment [N m] of each joint on the link before it, shape (f, n, 3); f is 0 if they
+            are not kept.
+        planes: of the frames, shape (f, PLANE_VALUES); f is 0 if they are not kept.
+    """
+
+    samples: Array
+    times: Array
+    frames: Array
+    loads: Array
+    planes: Array
+
+
+_STRUCTS: dict[str, Any] = {"model": Model, "drive": Drive, "state": State, "record": Record}
+
+
+def _struct(group: str, arrays: Mapping[str, wp.array]) -> Any:
+    """A struct of kernels with the arrays of its name."""
+    filled = _STRUCTS[group]()
+    for name in _STRUCTS[group].vars:
+        setattr(filled, name, arrays[f"{group}/{name}"])
+    return filled
+
+
 class Batch:
     """W chains on one device, each with its own parameters, state and statistics.
 
-    Arrays are written and read through the methods. The host may read any world between launches.
+    The host may read and change any world between launches.
+
+    Attributes:
+        host: Arrays of the structs in :mod:`warpchain.kernels.types` by name, such as ``state/time``.
+        threads: That carry a chain.
+        bytes: Memory that they take on the device.
+        records: Whether samples or frames are kept.
     """
 
     def __init__(
@@ -62,7 +125,6 @@ class Batch:
         keeps_loads: bool = False,
         tilts: bool = False,
         faces: int = 1,
-        threads: int | None = None,
     ) -> None:
         """Allocate a batch. All worlds are idle (status FINISHED) until a chain is loaded.
 
@@ -75,85 +137,71 @@ class Batch:
             frame_interval: Time [s] between the frames of chains that are loaded with frame marks of their own.
             keeps_loads: Keep force and moment of every joint with each frame.
             tilts: Keep the plane of the chain with samples and frames.
-            faces: Most faces of a floor that is not flat.
-            threads: Threads of every block on a GPU, at least as many as links; None: as many as each chain needs.
+            faces: Most faces of a floor.
         """
         self.options = options
-        self._threads = threads
         self.device = start_device(options.device)
         self.links = [0] * worlds
-        self._mirrors: dict[int, Mirror] = {}
+        self.columns = layout.padded_width(longest)
         self._gpu = self.device if isinstance(self.device, Gpu) else None
         self._stream: Any = self._gpu.stream() if self._gpu else None
         self._done: Any = None
         self._lanes = [self._gpu.stream() for _ in range(LANES)] if self._gpu else []
-        self.columns = layout.padded_width(longest)
-        rows = scratch_rows(options, longest, self.device, threads)
+        self.threads = block_threads(longest) if self._gpu else 1
 
-        cells = (layout.GROUND_CELLS + 1) * (faces > 1)
-        shapes = {"faces": (faces, layout.FACE_VALUES), "cells": (cells, layout.CELL_VALUES)}
-        self.model = self._arrays(Model, links=(layout.LINK_ROWS, longest), **shapes)
-        self.drive = self._arrays(Drive, motion=(layout.MOTION_ROWS, layout.MOTION_VALUES))
-        self._constant = set(self._mirrors)
-        if self._gpu:
-            self._order = Mirror((worlds,), wp.int32, self._gpu, self._stream)
-        self.state = self._arrays(
-            State,
-            links=(6, longest),
-            watch=(layout.WATCH_ROWS,),
-            plane=(layout.PLANE_ROWS,),
-            first_sample=(layout.ALL_COLUMNS,),
-            last_sample=(layout.ALL_COLUMNS,),
-            counts=(layout.COUNT_ROWS,),
-            extremes=(layout.EXTREME_ROWS,),
-            losses=(layout.LOSS_ROWS,),
-        )
-        self._edit(self.state.status)[:] = int(Status.FINISHED)
+        self.records = keeps_samples or frame_every is not None
         samples, frames = CAPACITY_SAMPLES * keeps_samples, CAPACITY_FRAMES * (frame_every is not None)
-        self.record = self._arrays(
-            Record,
-            samples=(samples, layout.ALL_COLUMNS if tilts else layout.SAMPLE_COLUMNS),
-            frames=(frames, 2 * longest + layout.PLANE_VALUES * tilts),
-            frame_times=(frames,),
-            frame_loads=(frames * keeps_loads, 3 * longest),
-        )
+        recorded = {
+            "record/samples": (samples, layout.ALL_COLUMNS if tilts else layout.SAMPLE_COLUMNS),
+            "record/frames": (frames, 2 * longest + layout.PLANE_VALUES * tilts),
+            "record/frame_times": (frames,),
+            "record/frame_loads": (frames * keeps_loads, 3 * longest),
+        }
+        shapes = {
+            **recorded,
+            "model/links": (layout.LINK_ROWS, longest),
+            "model/faces": (faces, layout.FACE_VALUES),
+            "model/cells": ((layout.GROUND_CELLS + 1) * (faces > 1), layout.CELL_VALUES),
+            "drive/motion": (layout.MOTION_ROWS, layout.MOTION_VALUES),
+            "state/links": (6, longest),
+            "state/watch": (layout.WATCH_ROWS,),
+            "state/plane": (layout.PLANE_ROWS,),
+            "state/first_sample": (layout.ALL_COLUMNS,),
+            "state/last_sample": (layout.ALL_COLUMNS,),
+            "state/counts": (layout.COUNT_ROWS,),
+            "state/extremes": (layout.EXTREME_ROWS,),
+            "state/losses": (layout.LOSS_ROWS,),
+        }
+        fields: dict[str, tuple[tuple[int, ...], Any]] = {"worlds": ((worlds,), wp.int32)}  # of a launch, by groups
+        for group, struct in _STRUCTS.items():
+            for name, field in struct.vars.items():
+                fields[f"{group}/{name}"] = (worlds, *shapes.get(f"{group}/{name}", ())), field.type.dtype
+        parts = [{name: fields.pop(name) for name in recorded}, fields]
+        self._recorded, self._numbers = (Mirror(part, self.device, self._stream) for part in parts)
+        self.host, arrays = self._numbers.host | self._recorded.host, self._numbers.arrays | self._recorded.arrays
+        self._worlds = arrays["worlds"]
+        self.model, self.drive, self.state, self.record = (_struct(group, arrays) for group in _STRUCTS)
+        self.host["state/status"][:] = int(Status.FINISHED)
 
         self.control = control_of(options)
         self.control.launch_time = LAUNCH_SECONDS
         self.control.frame_every = frame_every or 1
         self.control.frame_interval = frame_interval
 
-        self._attempts = 500
-        self.scratch = wp.zeros((worlds, rows, self.columns), dtype=wp.float64, device=self.device.warp)
-        self.lists = wp.zeros((worlds, list_layout(self.columns).size), dtype=wp.int32, device=self.device.warp)
+        width = self.columns
+        rows = board_rows(self.threads, width) if self._gpu else scratch_rows(options.method, width)
+        self.scratch = wp.zeros((worlds, rows, width), dtype=wp.float64, device=self.device.warp)
+        self.lists = wp.zeros((worlds, list_layout(width).size), dtype=wp.int32, device=self.device.warp)
+        self.bytes: int = self._numbers.bytes + self._recorded.bytes + self.scratch.capacity + self.lists.capacity
 
-    def _arrays(self, struct: Any, **shapes: tuple[int, ...]) -> Any:
-        """A struct of arrays of zeros; ``shapes``: further axes of an array, after that of the worlds."""
-        filled = struct()
-        for name, field in struct.vars.items():
-            setattr(filled, name, self._array((len(self.links), *shapes.get(name, ())), field.type.dtype))
-        return filled
-
-    def _array(self, shape: tuple[int, ...], dtype: Any) -> wp.array:
-        """An array of zeros on the device that the host will read or write."""
-        if self._gpu is None or math.prod(shape) == 0:
-            return wp.zeros(shape, dtype=dtype, device=self.device.warp)
-        mirror = Mirror(shape, dtype, self._gpu, self._stream)
-        self._mirrors[mirror.array.ptr] = mirror
-        return mirror.array
-
-    def _view(self, array: wp.array) -> NDArray[Any]:
-        """The elements of an array, to be read between launches."""
-        values: NDArray[Any] = self._mirrors[array.ptr].view() if array.ptr in self._mirrors else array.numpy()
-        return values
-
-    def _edit(self, array: wp.array) -> NDArray[Any]:
-        """The elements of an array, to be changed between launches."""
-        values: NDArray[Any] = self._mirrors[array.ptr].edit() if array.ptr in self._mirrors else array.numpy()
-        return values
+    def set_up(self, world: int, setup: Setup) -> None:
+        """Set chain and floor of a world, which stay the same through a walk."""
+        scene, parameters = setup.scene, setup.parameters
+        self.set_chain(world, parameters, scene.links, link_values(scene, parameters), scene)
+        self.set_floor(world, setup.floor)
 
     def set_chain(
-        self, world: int, parameters: Parameters, links: int, radius: float | None = None, own: LinkValues | None = None
+        self, world: int, parameters: Parameters, links: int, own: LinkValues | None = None, scene: Scene | None = None
     ) -> None:
         """Set parameters and number of links of a world's chain.
 
@@ -161,19 +209,20 @@ class Batch:
             world: Index.
             parameters: The chain's parameters.
             links: Number of links.
-            radius: Radius [m] at which circles touch the sprocket; None: the parameter's.
             own: What each link and joint has of its own; None: inner and outer links alternate.
+            scene: Of its walk; None: there is no sprocket.
         """
         own = own or alternating(parameters, links)
         self.links[world] = links
-        self._edit(self.model.chains)[world] = constants_of(parameters, own, radius)
-        self._edit(self.model.links)[world, :, :links] = rows_of(own)
+        self.host["model/chains"][world] = constants_of(parameters, own, scene)
+        self.host["model/links"][world, :, :links] = tuple(vars(own).values())  # in the order of the layout
 
-    def set_floor(self, world: int, points: Array, parameters: Parameters) -> None:
-        """Set the floor of a world's chain, by the points of its profile (p, 2), if it is not flat."""
-        self._edit(self.model.faces)[world, : len(points) - 1] = faces_of(points)
-        if len(points) > 2:
-            self._edit(self.model.cells)[world] = cells_of(points, parameters.link_length, parameters.circle_radius)
+    def set_floor(self, world: int, floor: Floor) -> None:
+        """Set the floor of a world whose chain is set."""
+        chain = self.host["model/chains"][world]
+        cells = floor.cells(2 * chain["half_length"], chain["circle_radius"])
+        for name, rows in (("model/faces", floor.faces()), ("model/cells", cells)):
+            self.host[name][world, : len(rows)] = rows
 
     def load(
         self,
@@ -199,66 +248,57 @@ class Batch:
             softness: Softness of the joints, see :mod:`warpchain.kernels.events.softening`.
             has_frame_marks: Whether frames are `frame_interval` apart, instead of taken with samples.
         """
-        state = self.state
-        n = self.links[world]
-        self._edit(state.links)[world, :3, :n] = position.T
-        self._edit(state.links)[world, 3:, :n] = velocity.T
-        clocks = (state.time, state.gap, state.time_to_contact, state.slack, state.next_sample)
-        for array in (*clocks, state.counts, state.extremes, state.losses):
-            self._edit(array)[world] = 0
-        self._edit(state.next_frame)[world] = 0 if has_frame_marks else -1
-        self._edit(state.watch)[world] = 0
-        self._edit(state.watch)[world, list(UNSET_WATCHES)] = -1.0
-        self._edit(state.softness)[world] = softness
-        self._edit(state.load_factor)[world] = 1.0
-        self._edit(state.last_sample)[world, layout.TIME] = -1.0
-        self._edit(state.watch)[world, layout.LAST_FLOOR_IMPULSE] = -np.inf
-        self._edit(state.attempts_before)[world] = attempts_before
-        self._edit(state.has_first_stage)[world] = 0
-        self._edit(state.is_fresh)[world] = 1
-        self._edit(state.step)[world] = FIRST_STEP
-        self._edit(state.other_step)[world] = FIRST_STEP
-        self._edit(state.is_rigid)[world] = 0
-        self._edit(state.closing_time)[world] = 0.0
-        self._edit(state.last_error)[world] = 1.0
-        self._edit(self.record.sample_count)[world] = 0
-        self._edit(self.record.frame_count)[world] = 0
+        marks = 0 if has_frame_marks else -1
+        self.set_state(world, **_BEGINNING, next_frame=marks, softness=softness, attempts_before=attempts_before)
+        self.host["record/sample_count"][world] = self.host["record/frame_count"][world] = 0
+        self.place(world, position, velocity)
         self.resume(world, stop_time, stop_status)
 
-    def set_velocities(self, worlds: Sequence[int], velocity: Array) -> None:
-        """Give chains of n links that have stopped other velocities, (w, n, 3); their losses of energy start anew."""
-        self._edit(self.state.links)[worlds, 3:, : velocity.shape[1]] = velocity.transpose(0, 2, 1)
-        self._edit(self.state.is_fresh)[worlds] = 1
-
-    def motions(self, worlds: Sequence[int], links: int) -> tuple[Array, Array]:
-        """Positions and velocities, (w, n, 3) each, of chains that all have n links."""
-        rows = self._view(self.state.links)[worlds, :, :links].transpose(0, 2, 1)
-        return rows[..., :3], rows[..., 3:]
-
-    def resume(self, world: int | Sequence[int], stop_time: float, stop_status: Status) -> None:
-        """Let worlds that have stopped run on to a later time, as if they had not stopped there."""
-        self._edit(self.state.stop_time)[world] = stop_time
-        self._edit(self.state.stop_status)[world] = int(stop_status)
-        self._edit(self.state.status)[world] = int(Status.RUNNING)
-
-    def set_plane(self, world: int, plane: Array) -> None:
-        """Set the plane of a world's chain, which tilts: (PLANE_VALUES,), see :mod:`warpchain.kernels.layout`."""
-        self._edit(self.state.plane)[world] = 0.0
-        for first in (0, layout.PLANE_MID):
-            self._edit(self.state.plane)[world, first : first + layout.PLANE_VALUES] = plane
-
-    def plane(self, world: int) -> Array:
-        """The plane of a world's chain, if it tilts: (PLANE_VALUES,), see :mod:`warpchain.kernels.layout`."""
-        return np.array(self._view(self.state.plane)[world, : layout.PLANE_VALUES])
+    def set_state(self, world: int | Sequence[int], **values: float | Array) -> None:
+        """Set fields of :class:`State` of a world, or of several."""
+        for name, value in values.items():
+            self.host[f"state/{name}"][world] = value
 
     def set_drive(self, world: int, **values: float | Array) -> None:
         """Set fields of :class:`Drive` of a world."""
         for name, value in values.items():
-            self._edit(getattr(self.drive, name))[world] = value
+            self.host[f"drive/{name}"][world] = value
+
+    def place(self, world: int | Sequence[int], position: Array, velocity: Array) -> None:
+        """Give a chain of n links another place and rates, (n, 3) each, or w chains, (w, n, 3); losses start anew."""
+        rows = np.concatenate([position, velocity], axis=-1).swapaxes(-1, -2)
+        self.host["state/links"][world, :, : rows.shape[-1]] = rows
+        self.set_state(world, is_fresh=1)
+
+    def motions(self, worlds: Sequence[int], links: int) -> tuple[Array, Array]:
+        """Positions and velocities, (w, n, 3) each, of chains that all have n links."""
+        rows = self.host["state/links"][worlds, :, :links].transpose(0, 2, 1)
+        return rows[..., :3], rows[..., 3:]
+
+    def resume(self, world: int | Sequence[int], stop_time: float, stop_status: Status) -> None:
+        """Let worlds that have stopped run on to a later time, as if they had not stopped there."""
+        self.set_state(world, stop_time=stop_time, stop_status=int(stop_status), status=int(Status.RUNNING))
+
+    def set_plane(self, world: int, plane: Array) -> None:
+        """Set the plane of a world's chain, which tilts: (PLANE_VALUES,), see :mod:`warpchain.kernels.layout`."""
+        rows = np.zeros(layout.PLANE_ROWS)
+        for first in (0, layout.PLANE_MID):
+            rows[first : first + layout.PLANE_VALUES] = plane
+        self.set_state(world, plane=rows)
+
+    def plane(self, world: int) -> Array:
+        """The plane of a world's chain, if it tilts: (PLANE_VALUES,), see :mod:`warpchain.kernels.layout`."""
+        return np.array(self.host["state/plane"][world, : layout.PLANE_VALUES])
 
     def features(self, **wanted: Any) -> Features:
-        """Kernel features for these worlds, see `features_of`."""
-        return features_of(self.options, self.columns, **wanted)
+        """What the kernel of these worlds is compiled for; ``wanted``: what the options do not say."""
+        options = self.options
+        return Features(options.method, self.columns, self_contact=options.self_contact, **wanted)
+
+    @property
+    def attempts_of_launch(self) -> int:
+        """Attempts of each world in a launch, unless it is told another number."""
+        return ATTEMPTS["cpu" if self._gpu is None else "gpu"]
 
     def run(self, worlds: Sequence[int], features: Features, after_launch: Callable[[], None] | None = None) -> None:
         """Carry worlds on until none of them is running. Results do not depend on how a run is cut into launches.
@@ -268,77 +308,47 @@ class Batch:
             features: What the kernel is compiled for.
             after_launch: Called after each launch, to drain the record.
         """
-        self.compile(features, [self.links[world] for world in worlds])
-        while True:
-            status = self.statuses()
-            active = [world for world in worlds if status[world] == Status.RUNNING]
-            if not active:
-                return
-            seconds = self.launch(active, features, self._attempts)
-            if seconds < LAUNCH_SECONDS / 2:
-                self._attempts = min(2 * self._attempts, 1_000_000)
-            elif seconds > 2 * LAUNCH_SECONDS:
-                self._attempts = max(self._attempts // 2, 1)
+        while active := [world for world in worlds if self.statuses()[world] == Status.RUNNING]:
+            self.launch(active, features)
             if after_launch is not None:
                 after_launch()
 
-    def compile(self, features: Features, links: Iterable[int] = ()) -> None:
-        """Compile the kernels for these features, which takes seconds the first time on a machine.
-
-        Args:
-            features: What they are compiled for.
-            links: Numbers of links; on a GPU each may need its own kernel.
-        """
-        sizes = set(map(self.block_size, links)) if self._gpu else {1}
-        load_kernels((self.device, features, size) for size in sizes)
-
-    def block_size(self, links: int) -> int:
-        """Threads of the block that carries a chain of this many links on a GPU."""
-        return self._threads or block_threads(links)
-
-    def launch(self, worlds: Sequence[int], features: Features, attempts: int) -> float:
-        """Carry worlds on by at most this many attempts each; returns the wall time [s]."""
-        before = time.perf_counter()
+    def launch(self, worlds: Sequence[int], features: Features, attempts: int | None = None) -> None:
+        """Carry worlds on, see :meth:`start`, and wait for the end of the launch."""
         self.start({features: worlds}, attempts)
         self.finish()
-        return time.perf_counter() - before
 
-    def start(self, groups: Mapping[Features, Sequence[int]], attempts: int) -> None:
-        """Begin to carry on groups of worlds, each with its own features, by at most this many attempts.
+    def start(self, groups: Mapping[Features, Sequence[int]], attempts: int | None = None) -> None:
+        """Begin to carry on groups of worlds, each with its own features, by at most this many attempts, or `ATTEMPTS`.
 
+        A kernel that is not loaded yet is loaded, and compiled if need be, which takes seconds.
         Until :meth:`finish` the host may not read the worlds. On a GPU this returns at once.
         """
-        self.control.attempts = attempts
+        self.control.attempts = attempts or self.attempts_of_launch
         arrays = [self.model, self.drive, self.state, self.record, self.scratch, self.lists, self.control]
+        kernels = [step_kernel(self.device, features, self.threads) for features in groups]
         if self._gpu is None:
-            for features, worlds in groups.items():
+            for kernel, worlds in zip(kernels, groups.values(), strict=True):
                 numbers = wp.array(np.asarray(worlds, dtype=np.int32), dtype=wp.int32, device=self.device.warp)
-                kernel = step_kernel(self.device, features, 1)
                 wp.launch(kernel, dim=len(worlds), inputs=[numbers, *arrays], device=self.device.warp)
             return
-        blocks: dict[tuple[Features, int], list[int]] = defaultdict(list)
-        for features, worlds in groups.items():
-            for world in worlds:
-                blocks[features, self.block_size(self.links[world])].append(world)
-        order = np.array([world for worlds in blocks.values() for world in worlds], dtype=np.int32)
-        if not np.array_equal(self._order.view()[: len(order)], order):
-            self._order.edit()[: len(order)] = order
+        order = [world for worlds in groups.values() for world in worlds]
+        self.host["worlds"][: len(order)] = order
         self._stream.wait_stream(self._gpu.filling)
-        for mirror in (self._order, *self._mirrors.values()):
-            mirror.upload()
+        self._numbers.upload()
         ready = self._stream.record_event()
         for lane in self._lanes:
             lane.wait_event(ready)
         first = 0
-        for ((features, threads), worlds), lane in zip(blocks.items(), itertools.cycle(self._lanes), strict=False):
-            inputs = [self._order.array[first : first + len(worlds)], *arrays]
-            self._gpu.launch(step_kernel(self.device, features, threads), len(worlds), inputs, threads, lane)
+        for kernel, worlds, lane in zip(kernels, groups.values(), itertools.cycle(self._lanes), strict=False):
+            numbers = self._worlds[first : first + len(worlds)]
+            self._gpu.launch(kernel, len(worlds), [numbers, *arrays], self.threads, lane)
             first += len(worlds)
         for lane in self._lanes:
             self._stream.wait_event(lane.record_event())
-        for mirror in self._mirrors.values():
-            if mirror.array.ptr not in self._constant:
-                mirror.download()
+        self._numbers.download()
+        if self.records:
+            self._recorded.download()
         self._done = self._stream.record_event()
 
     def is_done(self) -> bool:
@@ -353,27 +363,27 @@ class Batch:
 
     def position(self, world: int) -> Array:
         """(n, 3): x, y [m], θ [rad]."""
-        return self._view(self.state.links)[world, :3, : self.links[world]].T.copy()
+        return self.host["state/links"][world, :3, : self.links[world]].T.copy()
 
     def velocity(self, world: int) -> Array:
         """(n, 3): their rates."""
-        return self._view(self.state.links)[world, 3:, : self.links[world]].T.copy()
+        return self.host["state/links"][world, 3:, : self.links[world]].T.copy()
 
     def status(self, world: int) -> Status:
         """Status of the world."""
-        return Status(int(self._view(self.state.status)[world]))
+        return Status(int(self.host["state/status"][world]))
 
     def statuses(self) -> NDArray[np.int32]:
         """Statuses of all worlds, as numbers; a view, not to be changed."""
-        return self._view(self.state.status)
+        return self.host["state/status"]
 
     def time(self, world: int) -> float:
         """Time [s] since loading."""
-        return float(self._view(self.state.time)[world])
+        return float(self.host["state/time"][world])
 
     def counts(self, world: int) -> dict[str, int]:
         """Counters since loading."""
-        row = self._view(self.state.counts)[world]
+        row = self.host["state/counts"][world]
         return {name: int(value) for name, value in zip(COUNTS, row, strict=True)}
 
     def attempts(self, world: int) -> int:
@@ -383,64 +393,43 @@ class Batch:
 
     def extremes(self, world: int) -> dict[str, float]:
         """Greatest joint opening and depths [m] since loading."""
-        row = self._view(self.state.extremes)[world]
+        row = self.host["state/extremes"][world]
         return {name: float(value) for name, value in zip(EXTREMES, row, strict=True)}
 
     def losses(self, world: int) -> dict[str, float]:
         """Energy [J] lost since loading, by cause."""
-        row = self._view(self.state.losses)[world]
+        row = self.host["state/losses"][world]
         return {name: float(value) for name, value in zip(LOSSES, row, strict=True)}
 
     def first_sample(self, world: int) -> Array:
         """The sample taken when the run began: (SAMPLE_COLUMNS,), see :mod:`warpchain.kernels.layout`."""
-        return np.array(self._view(self.state.first_sample)[world])
+        return np.array(self.host["state/first_sample"][world])
 
     def last_sample(self, world: int) -> Array:
         """The chain's latest sample: (SAMPLE_COLUMNS,), that of the final state if its run has ended."""
-        return np.array(self._view(self.state.last_sample)[world])
+        return np.array(self.host["state/last_sample"][world])
 
     def watched(self, world: int, row: int) -> float:
         """An entry of :attr:`State.watch` that is −1 until it is set, and then not negative; NaN while it is not."""
-        entry = float(self._view(self.state.watch)[world, row])
+        entry = float(self.host["state/watch"][world, row])
         return entry if entry >= 0 else math.nan
 
     def unloaded_at(self, world: int) -> float:
-        """Time [s] since loading from which a held loop has been under its own loads; −∞ if it was not watched."""
-        watch = self._view(self.state.watch)[world]
-        if watch[layout.UNLOADED_SINCE] >= 0:
-            return float(watch[layout.UNLOADED_SINCE]) + float(LOADING_TIME)
-        since = float(watch[layout.LOADED_SINCE])  # of the last hold, under a factor of 1
-        return since if since >= 0 else -math.inf
+        """Time [s] since loading from which a held loop has been under its own loads; NaN if it was not watched."""
+        since = self.watched(world, layout.UNLOADED_SINCE) + float(LOADING_TIME)
+        return self.watched(world, layout.LOADED_SINCE) if math.isnan(since) else since
 
-    def drain_samples(self, world: int) -> Array:
-        """Take the time series kept so far: (t, SAMPLE_COLUMNS), see :mod:`warpchain.kernels.layout`."""
-        count = int(self._view(self.record.sample_count)[world])
-        self._edit(self.record.sample_count)[world] = 0
-        return self._view(self.record.samples)[world, :count].copy()
-
-    def frame_loads(self, world: int) -> Array:
-        """Force x, y [N] and moment [N m] of each joint on the link before it, in the frames kept so far: (f, n, 3).
-
-        No frames, if loads are not kept.
-        """
-        n, kept = self.links[world], self.record.frame_loads.shape[1] > 0
-        count = int(self._view(self.record.frame_count)[world]) if kept else 0
-        rows = self._view(self.record.frame_loads)[world, :count, : 3 * n].reshape(count, 3, n)
-        return rows.transpose(0, 2, 1).copy()
-
-    def frame_planes(self, world: int) -> Array:
-        """The plane in the frames kept so far: (f, PLANE_VALUES); (f, 0) if the batch does not keep planes."""
-        count, first = int(self._view(self.record.frame_count)[world]), 2 * self.state.links.shape[2]
-        return self._view(self.record.frames)[world, :count, first:].copy()
-
-    def greatest_tilt(self, world: int) -> float:
-        """Greatest size of the tilt [rad] of a plane since loading."""
-        return math.asin(min(1.0, float(self._view(self.state.watch)[world, layout.GREATEST_LEAN])))
-
-    def drain_frames(self, world: int) -> tuple[Array, Array]:
-        """Take the frames kept so far: times (f,) [s], joint positions (f, n, 2) [m]."""
-        count = int(self._view(self.record.frame_count)[world])
-        self._edit(self.record.frame_count)[world] = 0
-        n = self.links[world]
-        rows = self._view(self.record.frames)[world, :count, : 2 * n].reshape(count, 2, n)
-        return self._view(self.record.frame_times)[world, :count].copy(), rows.transpose(0, 2, 1).copy()
+    def drain(self, world: int) -> Recorded:
+        """Take what launches have recorded since it was last taken."""
+        n, names = self.links[world], ("samples", "frame_times", "frames", "frame_loads")
+        samples, times, frames, loads = (self.host[f"record/{name}"][world] for name in names)
+        taken, count = (int(self.host[f"record/{name}"][world]) for name in ("sample_count", "frame_count"))
+        self.host["record/sample_count"][world] = self.host["record/frame_count"][world] = 0
+        rows = frames[:count]
+        return Recorded(
+            samples=samples[:taken].copy(),
+            times=times[:count].copy(),
+            frames=rows[:, : 2 * n].reshape(-1, 2, n).transpose(0, 2, 1).copy(),
+            loads=loads[:count, : 3 * n].reshape(-1, 3, n).transpose(0, 2, 1).copy(),
+            planes=rows[:, 2 * self.state.links.shape[2] :].reshape(-1, layout.PLANE_VALUES).copy(),
+        )

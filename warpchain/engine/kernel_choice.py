@@ -9,9 +9,7 @@ import warp as wp
 from warpchain.engine.devices import Device, Gpu
 from warpchain.engine.kernel_entries import kernel_entry, step_module
 from warpchain.engine.processors import processors
-from warpchain.inputs.options import Options
 from warpchain.kernels.features import Features
-from warpchain.kernels.methods.method import find_method
 
 WARP = 32
 """Threads that a GPU carries on together."""
@@ -27,10 +25,6 @@ links 12.0, 6.2, 5.5 and 11.5, 5.5, 4.9 (rkf78, dp5, os32); 150 links 15.5, 13.3
 bound, few chains run up to 15 % faster and many slower. No bit of a walk depends on it: the compiler fuses the same
 products and sums (`tests/kernels/gpu/test_on_gpu.py`, walks in blocks of their own and of 192 threads).
 """
-SHARED_THREADS = 192
-"""Most threads of a block that chains of several lengths share."""
-SHARED_WALKS = 2000
-"""Most walks of a sweep that share such blocks; with 2016 it made no difference."""
 _loading = threading.Lock()
 """Held by the thread that loads kernels; two that want the same one would both compile it."""
 _loaded: dict[tuple[Device, Features, int], wp.Kernel] = {}
@@ -51,39 +45,6 @@ def resident_blocks(threads: int) -> int:
     """Blocks of this many threads that a multiprocessor carries on at a time: its registers decide."""
     warps = SCHEDULERS * (SCHEDULER_REGISTERS // (most_registers(threads) * WARP))
     return max(1, warps // (threads // WARP))
-
-
-def shared_threads(method: str, links: Iterable[int], walks: int) -> int | None:
-    """Threads of all blocks if the walks should share a kernel; None: each chain has a block of its own size.
-
-    Kernels for blocks of different sizes compete for the instruction cache of a multiprocessor.
-    With older kernels the 504 walks of Figure 6 (60 to 180 links, os32, one H200) took 6.4 s in blocks of five sizes
-    and 5.3 s in blocks of 192 threads, some of them idle; 1008 walks 10.8 and 8.5 s, 2016 walks 15.8 and
-    15.5 s.
-
-    Args:
-        method: Method of the walks.
-        links: Their numbers of links.
-        walks: Number of walks.
-    """
-    sizes = {block_threads(n) for n in links}
-    if len(sizes) < 2 or walks > SHARED_WALKS or not find_method(method).runs_on_gpus or max(sizes) > SHARED_THREADS:
-        return None
-    return max(sizes)
-
-
-def features_of(
-    options: Options, columns: int, *, fixed_body: str, tilts: bool = False, moving_sprocket: bool = False
-) -> Features:
-    """Kernel features for chains with these options in scratch of this width."""
-    return Features(
-        method=options.method,
-        columns=columns,
-        fixed_body=fixed_body,
-        self_contact=options.self_contact,
-        tilts=tilts,
-        moving_sprocket=moving_sprocket,
-    )
 
 
 def step_kernel(device: Device, features: Features, threads: int) -> wp.Kernel:

@@ -7,6 +7,7 @@ only imported if it must be compiled.
 
 import functools
 import hashlib
+import inspect
 import sys
 import threading
 from pathlib import Path
@@ -15,6 +16,7 @@ import warp as wp
 
 import warpchain.kernels
 from warpchain.kernels.features import COMPILER_FLAGS, Features
+from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.types import make_entry
 
 _making = threading.Lock()
@@ -35,6 +37,16 @@ SOURCES = digest_of_sources()
 """What the source files were when this module was imported, before any of them that makes a kernel."""
 
 
+def _given_by_scripts(features: Features) -> tuple[object, ...]:
+    """What a kernel has of a script and not of the source files: a tableau's numbers, the file of another load."""
+    tableau = find_method(features.method).tableau
+    if features.load == "weight":
+        return (tableau,)
+    from warpchain.kernels.physics.load import LOADS
+
+    return tableau, Path(inspect.getfile(LOADS[features.load].acceleration.func)).read_text(encoding="utf-8")
+
+
 @functools.cache
 def kernel_entry(features: Features, threads: int, registers: int | None) -> wp.Kernel:
     """The entry of a step kernel, in a module of its own.
@@ -50,8 +62,8 @@ def kernel_entry(features: Features, threads: int, registers: int | None) -> wp.
     module = wp.Module("", None)
     options = {"block_dim": threads, "strip_hash": True, "cpu_compiler_flags": COMPILER_FLAGS}
     wp.set_module_options(options, module)
-    parts = (SOURCES, features, threads, registers, sorted(module.resolve_options(wp.config).items()))
-    text = repr((*parts, sys.version, wp.__version__))
+    parts = (SOURCES, features, *_given_by_scripts(features), threads, registers, sys.version, wp.__version__)
+    text = repr((*parts, sorted(module.resolve_options(wp.config).items())))
     module.name = f"advance_{hashlib.sha256(text.encode()).hexdigest()[:32]}"
     return make_entry(module, is_block=registers is not None)
 

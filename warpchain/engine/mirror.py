@@ -1,48 +1,61 @@
-"""An array on a device and its copy on the host, which launches bring up to date.
+"""Arrays on a device and their copies on the host, in one block of memory each: one copy brings all up to date.
 
-A launch uploads what the host has changed and downloads what the kernel may have changed, in the order of its stream.
-So the host waits for one thing only, the end of the launch.
+A launch uploads the block before and downloads it behind, in the order of its stream. So the host waits for one thing
+only, the end of the launch. On a CPU both are the same memory.
 """
 
+import math
+from collections.abc import Mapping
+from itertools import accumulate
 from typing import Any
 
 import warp as wp
 from numpy.typing import NDArray
 
-from warpchain.engine.devices import Gpu
+from warpchain.engine.devices import Device, Gpu
+
+ALIGNMENT = 64
+"""Bytes at whose multiples arrays begin."""
 
 
 class Mirror:
-    """One array, which the host reads and edits through its copy between launches.
+    """Arrays by name, which the host reads and changes through their copies between launches.
 
     Attributes:
-        array: The array on the device.
+        arrays: On the device.
+        host: The same on the host.
+        bytes: Memory that they take on the device.
     """
 
-    def __init__(self, shape: tuple[int, ...], dtype: Any, device: Gpu, stream: Any) -> None:
-        """Begin with zeros, of a type of Warp's or structs of them; copies wait in this stream."""
-        self.array = wp.zeros(shape, dtype=dtype, device=device.warp)
-        self._host = device.host_array(shape, dtype)
-        self._values: NDArray[Any] = self._host.numpy()
-        self._device = device
-        self._stream = stream
-        self._is_edited = False
+    def __init__(self, fields: Mapping[str, tuple[tuple[int, ...], Any]], device: Device, stream: Any) -> None:
+        """Begin with zeros.
 
-    def view(self) -> NDArray[Any]:
-        """The elements, to be read between launches."""
-        return self._values
-
-    def edit(self) -> NDArray[Any]:
-        """The elements, to be changed between launches."""
-        self._is_edited = True
-        return self._values
+        Args:
+            fields: Name → shape, and type of Warp's or struct of them.
+            device: Where they lie.
+            stream: In which copies wait; None on a CPU.
+        """
+        sizes = [math.prod(shape) * wp.types.type_size_in_bytes(dtype) for shape, dtype in fields.values()]
+        firsts = list(accumulate((-(-size // ALIGNMENT) * ALIGNMENT for size in sizes), initial=0))
+        self.bytes = max(ALIGNMENT, firsts[-1])
+        self._stream, self._gpu = stream, device if isinstance(device, Gpu) else None
+        self._block = wp.zeros(self.bytes, dtype=wp.uint8, device=device.warp)
+        self._copy = device.host_array((self.bytes,), wp.uint8) if self._gpu else self._block
+        self.arrays: dict[str, wp.array] = {}
+        self.host: dict[str, NDArray[Any]] = {}
+        memory = self._copy.numpy()
+        for (name, (shape, dtype)), first, size in zip(fields.items(), firsts, sizes, strict=False):
+            array: Any = wp.array(ptr=self._block.ptr + first, dtype=dtype, shape=shape, device=device.warp)
+            array.block = self._block  # which an array at a given place does not keep
+            kind = wp.zeros(1, dtype=dtype, device="cpu").numpy().dtype
+            self.arrays[name], self.host[name] = array, memory[first : first + size].view(kind).reshape(shape)
 
     def upload(self) -> None:
-        """Begin a copy to the device if the host has edited the elements."""
-        if self._is_edited:
-            self._device.copy(self.array, self._host, self._stream)
-            self._is_edited = False
+        """Begin a copy to the device, if there is another."""
+        if self._gpu:
+            self._gpu.copy(self._block, self._copy, self._stream)
 
     def download(self) -> None:
         """Begin a copy to the host."""
-        self._device.copy(self._host, self.array, self._stream)
+        if self._gpu:
+            self._gpu.copy(self._copy, self._block, self._stream)

@@ -1,6 +1,6 @@
 """A world of a batch between two launches: all that its next launch depends on, taken out and put back to the bit."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -9,33 +9,28 @@ from numpy.typing import NDArray
 
 from warpchain.engine.batch import Batch
 from warpchain.kernels import layout
-from warpchain.kernels.types import Drive, State
 
 Array = NDArray[np.float64]
 Snapshot = Mapping[str, NDArray[Any]]
 """Name → one world's part of an array."""
 
+KEPT: Final = ("state/", "drive/")
+"""How the names of arrays begin that are kept."""
 CACHES: Final = ("scratch", "lists")
 """What follows from the state but for rounding, and fits a chain of the same constants and options only."""
 
 
-def _arrays(batch: Batch) -> Iterator[tuple[str, wp.array]]:
-    """Arrays that the host reads and edits, by name."""
-    structs: dict[str, Any] = {"state": State, "drive": Drive}
-    for group, struct in structs.items():
-        yield from ((f"{group}/{name}", getattr(getattr(batch, group), name)) for name in struct.vars)
-
-
 def take_snapshot(batch: Batch, world: int) -> dict[str, NDArray[Any]]:
     """The snapshot of a world."""
-    found = {name: np.array(batch._view(array)[world]) for name, array in _arrays(batch)}
-    return found | {name: np.array(getattr(batch, name)[world].numpy()) for name in CACHES}
+    kept = {name: np.array(values[world]) for name, values in batch.host.items() if name.startswith(KEPT)}
+    return kept | {name: np.array(getattr(batch, name)[world].numpy()) for name in CACHES}
 
 
 def restore(batch: Batch, world: int, snapshot: Snapshot) -> None:
     """Put a snapshot of a chain of equal length, options and parameters back; its caches may be absent."""
-    for name, array in _arrays(batch):
-        batch._edit(array)[world] = snapshot[name]
+    for name, values in snapshot.items():
+        if name.startswith(KEPT):
+            batch.host[name][world] = values
     for name in CACHES:
         if name in snapshot:
             own = getattr(batch, name)[world]
@@ -47,25 +42,9 @@ def change(batch: Batch, world: int, position: Array, velocity: Array) -> None:
 
     Its clock, the softness of its joints, its counters and its watches go on.
     """
-    state, links = batch.state, batch.links[world]
-    batch._edit(state.links)[world, :, :links] = np.concatenate([position, velocity], axis=1).T
-    batch._edit(state.is_fresh)[world] = 1
-    for array in (state.has_first_stage, state.gap, state.time_to_contact, state.slack, state.losses):
-        batch._edit(array)[world] = 0
-    if batch._view(state.is_rigid)[world]:  # joints become rigid again as soon as they are quiet
-        steps = batch._edit(state.step), batch._edit(state.other_step)
-        steps[0][world], steps[1][world] = steps[1][world], steps[0][world]
-        batch._edit(state.is_rigid)[world] = 0
-        batch._edit(state.last_error)[world] = 1.0
-    batch._edit(state.last_sample)[world, layout.TIME] = -1.0
-
-
-def set_frame_marks(batch: Batch, world: int, interval: float) -> None:
-    """Let a world that goes on take frames at multiples of an interval [s]; 0: with its samples."""
-    mark = np.floor(batch.time(world) / interval) if interval > 0 else -1
-    batch._edit(batch.state.next_frame)[world] = mark
-
-
-def set_first_area(batch: Batch, world: int, area: float) -> None:
-    """Set the area [m²] that a loop which collapses is compared with."""
-    batch._edit(batch.state.first_area)[world] = area
+    batch.place(world, position, velocity)
+    batch.set_state(world, **dict.fromkeys(("has_first_stage", "gap", "time_to_contact", "slack", "losses"), 0))
+    if batch.host["state/is_rigid"][world]:  # joints become rigid again as soon as they are quiet
+        step, other = (float(batch.host[f"state/{name}"][world]) for name in ("step", "other_step"))
+        batch.set_state(world, step=other, other_step=step, is_rigid=0, last_error=1.0)
+    batch.host["state/last_sample"][world, layout.TIME] = -1.0

@@ -16,7 +16,7 @@ from typing import Final, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.films.film import CAREFUL, CLOCK, SUSPECTS, Array, Camera, Film, edges, summary
+from warpchain.films.film import CAREFUL, CLOCK, Array, Camera, Film, edges, summary
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import InputError
 from warpchain.store.block_result import BlockResult
@@ -135,7 +135,8 @@ class Bank:
         if distance > 1 or edge.any():
             numbers = zip(self.names, mean, middle, prior, edge | ~edge.any(), strict=True)
             off = [f"{name}: {x:.3g}, in the bank {m:.2g} ± {s:.2g}" for name, x, m, s, shown in numbers if shown]
-            raise InputError(f"films: unlike the bank; check {SUSPECTS}; if right, give one about these values", *off)
+            suspects = "direction, origin, outline, speed (m/s), frequency, unit and release"
+            raise InputError(f"films: unlike the bank; check {suspects}; if right, give one about these values", *off)
         return Posterior(
             names=self.names,
             mean=mean,

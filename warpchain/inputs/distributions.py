@@ -17,10 +17,10 @@ import numpy as np
 from pydantic import Field
 
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.scene import Scene
+from warpchain.inputs.scene import Scene, link_values
 from warpchain.inputs.sections import SECTION_OF
 from warpchain.inputs.state import Setup
-from warpchain.inputs.validation import Bounds, InputError, Whole, checked, field_bounds
+from warpchain.inputs.validation import FIELDS, InputError, Whole, checked, field_bounds
 
 CLEARANCE_RANGE: Final = (0.005, 0.015)
 """Interval of the release height that a sample draws from, in m."""
@@ -49,12 +49,12 @@ class Uniform:
     Attributes:
         lower: lower end, in the unit of the quantity.
         upper: upper end.
-        bounds: the physical values.
+        bounds: least and greatest physical value.
     """
 
     lower: float
     upper: float
-    bounds: Bounds
+    bounds: tuple[float, float]
 
     def draw(self, rng: np.random.Generator) -> float:
         """One value, which need not be physical."""
@@ -71,7 +71,7 @@ class Uniform:
         return lower + (upper - lower) * fraction
 
     def _physical_ends(self) -> tuple[float, float]:
-        return max(self.lower, self.bounds.lower), min(self.upper, self.bounds.upper)
+        return max(self.lower, self.bounds[0]), min(self.upper, self.bounds[1])
 
     def __str__(self) -> str:
         """In words, for error messages."""
@@ -89,12 +89,12 @@ class Gaussian:
     Attributes:
         mean: mean of the whole Gaussian, in the unit of the quantity; None: the chain's own value, see `placed`.
         sigma: standard deviation of the whole Gaussian.
-        bounds: the physical values.
+        bounds: least and greatest physical value.
     """
 
     mean: float | None
     sigma: float
-    bounds: Bounds
+    bounds: tuple[float, float]
 
     def draw(self, rng: np.random.Generator) -> float:
         """One value of the whole Gaussian, which need not be physical."""
@@ -108,9 +108,11 @@ class Gaussian:
     def quantile(self, fraction: float) -> float:
         """The value below which the share `fraction` (0 < fraction < 1) of the physical draws lies."""
         lower, upper = self._standard_ends()
+        scale = self.sigma
         if lower > 0:  # by symmetry below the mean, where shares near 0 keep their digits
-            return self._placed_mean - self.sigma * _between(-upper, -lower, 1.0 - fraction)
-        return self._placed_mean + self.sigma * _between(lower, upper, fraction)
+            lower, upper, fraction, scale = -upper, -lower, 1.0 - fraction, -scale
+        first, last = _below(lower), _below(upper)
+        return self._placed_mean + scale * _STANDARD.inv_cdf(first + (last - first) * fraction)
 
     @property
     def _placed_mean(self) -> float:
@@ -120,8 +122,8 @@ class Gaussian:
 
     def _standard_ends(self) -> tuple[float, float]:
         """The physical bounds in standard deviations from the mean."""
-        mean = self._placed_mean
-        return (self.bounds.lower - mean) / self.sigma, (self.bounds.upper - mean) / self.sigma
+        least, most = self.bounds
+        return (least - self._placed_mean) / self.sigma, (most - self._placed_mean) / self.sigma
 
     def __str__(self) -> str:
         """In words, for error messages."""
@@ -141,20 +143,14 @@ def _below(end: float) -> float:
     return 0.5 * math.erfc(-end / math.sqrt(2))
 
 
-def _between(lower: float, upper: float, fraction: float) -> float:
-    """Quantile of a standard Gaussian cut off at `lower` and `upper`."""
-    first, last = _below(lower), _below(upper)
-    return _STANDARD.inv_cdf(first + (last - first) * fraction)
-
-
 TABLE: Final[Mapping[str, Distribution]] = {
     **{
-        name: Gaussian(None, quantity.sigma, quantity.bounds)
+        name: Gaussian(None, quantity.sigma, field_bounds(FIELDS[name]))
         for name, quantity in Parameters.quantities().items()
         if quantity.sigma > 0
     },
-    "phase": Uniform(0.0, 1.0, field_bounds(Scene.model_fields["phase"])),
-    "clearance": Uniform(*CLEARANCE_RANGE, field_bounds(Scene.model_fields["clearance"])),
+    "phase": Uniform(0.0, 1.0, field_bounds(FIELDS["phase"])),
+    "clearance": Uniform(*CLEARANCE_RANGE, field_bounds(FIELDS["clearance"])),
 }
 """Default of what a sample draws: the Gaussians of Table 1 in the order of the table, then phase and clearance of the
 release."""
@@ -163,11 +159,7 @@ release."""
 def placed(distributions: Mapping[str, Distribution], setup: Setup) -> dict[str, Distribution]:
     """The distributions with means and bounds for one chain.
 
-    A Gaussian without a mean gets the chain's value. A link length must leave room for its two circles.
-
-    Args:
-        distributions: name, one of `DRAWABLE` → distribution.
-        setup: the chain's values.
+    A Gaussian without a mean gets the chain's value. A link length must leave room for two circles of the widest link.
     """
     complete: dict[str, Distribution] = {}
     for name, distribution in distributions.items():
@@ -176,61 +168,44 @@ def placed(distributions: Mapping[str, Distribution], setup: Setup) -> dict[str,
             distribution = Gaussian(float(value), distribution.sigma, distribution.bounds)
         complete[name] = distribution
     if "link_length" in distributions and "circle_radius" not in distributions:
-        room = Bounds(2 * setup.parameters.circle_radius, lower_included=False)
+        widest = float(link_values(setup.scene, setup.parameters).radius.max())
+        room = math.nextafter(2 * widest, math.inf), math.inf
         complete["link_length"] = replace(complete["link_length"], bounds=room)
     return complete
 
 
 def draw(distributions: Mapping[str, Distribution], rng: np.random.Generator) -> dict[str, float]:
-    """One value of each distribution, in their order; one outside its bounds is drawn again.
+    """One value of each of the `placed` distributions, in their order; one outside its bounds is drawn again.
 
-    Args:
-        distributions: name → distribution, see `placed`.
-        rng: the stream to draw from, see `random_generator`.
-
-    Raises:
-        InputError: a quantity had no physical draw.
+    An `InputError` says that a quantity had no physical draw.
     """
-    return {name: _physical_draw(name, distribution, rng) for name, distribution in distributions.items()}
-
-
-def _physical_draw(name: str, distribution: Distribution, rng: np.random.Generator) -> float:
-    for _ in range(DRAW_LIMIT):
-        value = distribution.draw(rng)
-        if distribution.bounds.admit(value):
-            return value
-    raise InputError(
-        f"{SECTION_OF[name]}.{name}: {DRAW_LIMIT} draws {distribution} were all outside the physical bounds; "
-        "give a mean inside them"
-    )
+    drawn = {}
+    for name, distribution in distributions.items():
+        least, most = distribution.bounds
+        for _ in range(DRAW_LIMIT):
+            value = distribution.draw(rng)
+            if least <= value <= most:
+                drawn[name] = value
+                break
+        else:
+            raise InputError(
+                f"{SECTION_OF[name]}.{name}: {DRAW_LIMIT} draws {distribution} were all outside the physical bounds; "
+                "give a mean inside them"
+            )
+    return drawn
 
 
 def random_generator(seed: int, cell: int = 0, sample: int = 0) -> np.random.Generator:
-    """The random generator of one sample.
-
-    Args:
-        seed: seed of the sweep, 0 … `LARGEST_SEED`.
-        cell: index of the sweep's cell (one combination of values), 0 … 2³² − 1.
-        sample: index of the sample in its cell, 0 … 2³² − 1.
-
-    Raises:
-        InputError: a number is no integer or out of range.
-    """
+    """The random generator of one sample, given the sweep's seed, the number of its cell, and its own in there."""
     entropy = checked(seed, "seed", Seed)
     key = [checked(number, name, _Index) for name, number in (("cell", cell), ("sample", sample))]
     return np.random.default_rng(np.random.SeedSequence(entropy, spawn_key=key))
 
 
 def sampled(setup: Setup, rng: np.random.Generator, kept: Container[str] = ()) -> Setup:
-    """The setup with the quantities of `TABLE` drawn about its own values, in the order of the table.
+    """The setup with the quantities of `TABLE`, but those kept, drawn about its own values, in the order of the table.
 
-    Args:
-        setup: the means; a quantity without an uncertainty is taken over.
-        rng: the stream to draw from, see `random_generator`.
-        kept: quantities that are not drawn.
-
-    Raises:
-        InputError: no draw of a quantity was physical, or the drawn values together make no possible walk.
+    An `InputError` says that no draw was physical, or that the drawn values together make no possible walk.
     """
     drawn = {name: distribution for name, distribution in TABLE.items() if name not in kept}
     return setup.with_drawn(draw(placed(drawn, setup), rng))

@@ -1,17 +1,19 @@
-"""The floor of a scene: flat, an endless slope, or a profile of heights given by points.
+"""The floor of a scene: how it is given, and its kinds: flat, an endless slope, or a profile given by points.
 
-Points are joined by straight lines; beyond the first and the last point these go on. Nothing hangs over.
+No other module knows the kinds. A new one is a branch of `FloorField`, a subclass of `Floor`, a line of `floor_from`.
 """
 
 import itertools
 import math
-from typing import Annotated, Final
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
-from pydantic import AfterValidator, Field, Strict
+from numpy.typing import ArrayLike, NDArray
+from pydantic import AfterValidator, Discriminator, Field, Strict, Tag
 
+from warpchain.inputs.parameters import FRACTION, FRICTION
 from warpchain.inputs.validation import InputError
+from warpchain.kernels import layout
 
 Array = NDArray[np.float64]
 
@@ -23,13 +25,17 @@ FARTHEST: Final = 1e4
 """Greatest coordinate of a point, where numbers still tell a thousandth of a nanometre [m]."""
 EXACT: Final = 1e-11
 """Clearances are met to this [m]."""
+ENDLESS: Final = 1e9
+"""How far the first and the last cell of a profile reach [m]."""
 
 
-def _without_overhang(points: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+def _without_overhang(points: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
     """The points of a profile, if they make a floor."""
     if len(points) < 2:
         raise ValueError("a profile has 2 points at least; give more, such as [[0, 0], [1, 0], [1, -0.1], [2, -0.1]]")
-    for number, ((x, y), (next_x, next_y)) in enumerate(itertools.pairwise(points), start=1):
+    if len(points[-1]) > 2:
+        raise ValueError(f"point {len(points) - 1} begins no line that could have e and μ; give x and y")
+    for number, ((x, y, *_), (next_x, next_y, *_)) in enumerate(itertools.pairwise(points), start=1):
         if next_x < x:
             raise ValueError(f"point {number} lies behind the one before it; let x rise from point to point")
         if math.hypot(next_x - x, next_y - y) < SHORTEST:
@@ -42,14 +48,137 @@ def _without_overhang(points: tuple[tuple[float, float], ...]) -> tuple[tuple[fl
 
 
 _Coordinate = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
-_Point = Annotated[tuple[_Coordinate, _Coordinate], Strict(False)]
+_Restitution = Annotated[float, Field(**FRACTION)]
+_Friction = Annotated[float, Field(**FRICTION)]
+_Point = Annotated[
+    Annotated[tuple[_Coordinate, _Coordinate], Strict(False), Tag("(place)")]
+    | Annotated[tuple[_Coordinate, _Coordinate, _Restitution, _Friction], Strict(False), Tag("(law)")],
+    Discriminator(lambda given: "(law)" if isinstance(given, list | tuple) and len(given) > 2 else "(place)"),
+]
 Points = Annotated[
     tuple[_Point, ...],
     Strict(False),
     Field(max_length=MOST_POINTS),
     AfterValidator(_without_overhang),
 ]
-"""A profile: points x, y [m]."""
+"""A profile: points x, y [m], and e and μ of the line that begins there, if it has its own."""
+
+
+FloorField = Annotated[
+    Annotated[Literal["flat"], Tag("(flat)")] | Annotated[Points, Tag("(points)")],
+    Discriminator(lambda given: "(flat)" if isinstance(given, str) else "(points)"),
+]
+"""What the field `floor` of a scene may be."""
+
+
+class Floor:
+    """A floor, as all else knows it: points joined by straight lines, which go on beyond the first and the last point.
+
+    Nothing hangs over. Another kind of floor is a subclass with a body of its own and all that asks for the points.
+
+    Attributes:
+        body: Its name among the `BODIES` of `warpchain.kernels.contacts.fixed_body`; of two points a slope.
+        points: x and y [m], shape (f + 1, 2).
+        laws: Coefficients of restitution and friction of each of its f faces, shape (f, 2).
+    """
+
+    def __init__(self, points: ArrayLike, laws: ArrayLike) -> None:
+        """Begin a floor of these points and coefficients."""
+        self.points, self.laws = np.array(points, np.float64), np.array(laws, np.float64)
+        self.body = "slope" if len(self.points) == 2 else "terrain"
+
+    def faces(self) -> Array:
+        """What kernels read of its faces, (f, FACE_VALUES), see `warpchain.kernels.contacts.terrain`."""
+        step = np.diff(self.points, axis=0)
+        length = np.hypot(*step.T)
+        along = step / length[:, None]
+        turn = along[:-1, 0] * along[1:, 1] - along[:-1, 1] * along[1:, 0]
+        before = np.zeros_like(along)
+        before[1:] = np.where((turn < 0)[:, None], along[:-1], 0.0)
+        begin, end = np.zeros(len(along)), length
+        begin[0], end[-1] = -np.inf, np.inf
+        return np.column_stack([self.points[:-1], along, before, begin, end, self.laws])
+
+    def cells(self, link_length: float, circle_radius: float) -> Array:
+        """Cells that tell which of several faces are near links of one size, (GROUND_CELLS + 1, CELL_VALUES)."""
+        points, (left, right) = self.points, self.points[[0, -1], 0]
+        if len(points) == 2:
+            return np.empty((0, layout.CELL_VALUES))
+        width = (right - left) / layout.GROUND_CELLS
+        margin = link_length
+        reach = margin + 1.01 * (link_length / 2 + circle_radius)
+        lows = left + width * np.arange(layout.GROUND_CELLS) - reach
+        highs = lows + width + 2 * reach
+        lows[0], highs[-1] = -ENDLESS, ENDLESS
+        first = np.searchsorted(points[1:-1, 0], lows, side="left")
+        last = np.searchsorted(points[1:-1, 0], highs, side="right")
+        x, y = points.T
+        inside = np.where((x >= lows[:, None]) & (x <= highs[:, None]), y, -np.inf).max(axis=1)
+        top = np.maximum(inside, self.heights(np.stack([lows, highs])).max(axis=0))
+        return np.vstack([np.column_stack([first, last, top]), [left, 1 / width, margin]])
+
+    def heights(self, x: Any) -> Any:
+        """Height [m] of the floor at x; at an upright face that of one of its ends."""
+        points, (left, right) = self.points, self.points[[0, -1], 0]
+        rise = [float(step[1] / step[0]) for step in (points[1] - points[0], points[-1] - points[-2])]
+        beyond = rise[0] * np.minimum(x - left, 0.0) + rise[1] * np.maximum(x - right, 0.0)
+        return np.interp(x, points[:, 0], points[:, 1]) + beyond
+
+    def distances(self, places: Array) -> Array:
+        """Distance [m] of places (p, 2) from the floor, negative below it."""
+        begin, step = self.points[:-1], np.diff(self.points, axis=0)
+        low, high = np.zeros(len(step)), np.ones(len(step))
+        low[0], high[-1] = -np.inf, np.inf
+        to = places[:, None] - begin
+        share = np.clip((to * step).sum(axis=2) / (step**2).sum(axis=1), low, high)
+        least: Array = np.linalg.norm(to - share[..., None] * step, axis=2).min(axis=1)
+        return np.where(places[:, 1] >= self.heights(places[:, 0]), least, -least)
+
+    def line(self, left: float, right: float) -> Array:
+        """Points (p, 2) that straight lines join to the floor from one x to another, or to what is hardly above it."""
+        ends, x = np.array([left, right]), self.points[:, 0]
+        first, last = np.column_stack([ends, self.heights(ends)])
+        return np.vstack([first, self.points[(x > left) & (x < right)], last])
+
+    def check_above(self, position: Array, link_length: float, path: str) -> None:
+        """Check that the middle of no circle of links (n, 3) is below the floor, where it would never come out.
+
+        If one is, an `InputError` begins with `path`.
+        """
+        depth = -self.distances(circles_of(position, link_length))
+        if depth.max() > 0:
+            raise InputError(
+                f"{path}: link {int(depth.argmax()) % len(position)} starts {depth.max():.3g} m inside the floor; "
+                "raise the chain, or lower the floor"
+            )
+
+    def raised_by(self, circles: Array, radius: Array, clearance: float) -> float:
+        """How far circles (p, 2) of these radii must be raised for the nearest to be so far from the floor [m]."""
+        wanted, (left, bottom), (right, _) = clearance + radius.max(), circles.min(axis=0), circles.max(axis=0)
+        high = self.line(left - wanted, right + wanted)[:, 1].max() + wanted - bottom
+        while (excess := (self.distances(circles + np.array([0.0, high])) - (clearance + radius)).min()) > EXACT:
+            high -= excess  # which brings nothing nearer to the floor than that
+        return float(high)
+
+
+class Flat(Floor):
+    """The floor y = 0."""
+
+    def __init__(self, laws: ArrayLike) -> None:
+        """Begin a floor with these coefficients, (1, 2)."""
+        super().__init__(slope_points(0.0), laws)
+        self.body = "floor"
+
+    def raised_by(self, circles: Array, radius: Array, clearance: float) -> float:
+        """See `Floor`."""
+        return clearance - float((circles[:, 1] - radius).min())
+
+
+def floor_from(given: Any, slope: float, law: tuple[float, float]) -> Floor:
+    """The floor of a scene: from its checked field `floor`, its slope [°], and e and μ where it gives none."""
+    if given == "flat":
+        return Flat([law]) if slope == 0 else Floor(slope_points(slope), [law])
+    return Floor([point[:2] for point in given], [point[2:] or law for point in given[:-1]])
 
 
 def slope_points(degrees: float) -> Array:
@@ -58,52 +187,7 @@ def slope_points(degrees: float) -> Array:
     return np.array([[0.0, 0.0], [math.cos(angle), -math.sin(angle)]])
 
 
-def heights(points: Array, x: Array) -> Array:
-    """Height [m] of the floor at x; at an upright face that of one of its ends."""
-    left, right = points[0, 0], points[-1, 0]
-    rise = [float(step[1] / step[0]) for step in (points[1] - points[0], points[-1] - points[-2])]
-    beyond = rise[0] * np.minimum(x - left, 0.0) + rise[1] * np.maximum(x - right, 0.0)
-    height: Array = np.interp(x, points[:, 0], points[:, 1]) + beyond
-    return height
-
-
-def distances(points: Array, places: Array) -> Array:
-    """Distance [m] of places (p, 2) from the floor, negative below it."""
-    begin, step = points[:-1], np.diff(points, axis=0)
-    low, high = np.zeros(len(step)), np.ones(len(step))
-    low[0], high[-1] = -np.inf, np.inf
-    to = places[:, None] - begin
-    share = np.clip((to * step).sum(axis=2) / (step**2).sum(axis=1), low, high)
-    least: Array = np.linalg.norm(to - share[..., None] * step, axis=2).min(axis=1)
-    return np.where(places[:, 1] >= heights(points, places[:, 0]), least, -least)
-
-
 def circles_of(position: Array, link_length: float) -> Array:
     """Centres of the circles of links (n, 3), (2 n, 2): the left ones, then the right ones."""
     arms = link_length / 2 * np.stack([np.cos(position[:, 2]), np.sin(position[:, 2])], axis=1)
     return np.concatenate([position[:, :2] - arms, position[:, :2] + arms])
-
-
-def check_above(points: Array | None, position: Array, link_length: float, path: str) -> None:
-    """Check that the middle of no circle of links (n, 3) is below the floor, where it would never come out.
-
-    Raises:
-        InputError: one is; the message begins with `path`.
-    """
-    circles = circles_of(position, link_length)
-    depth = -(circles[:, 1] if points is None else distances(points, circles))
-    if depth.max() > 0:
-        raise InputError(
-            f"{path}: link {int(depth.argmax()) % len(position)} starts {depth.max():.3g} m inside the floor; "
-            "raise the chain, or lower the floor"
-        )
-
-
-def raised_by(points: Array, circles: Array, radius: float, clearance: float) -> float:
-    """How far circles about these places (p, 2) must be raised for the nearest to be so far from the floor [m]."""
-    wanted, (left, bottom), (right, _) = clearance + radius, circles.min(axis=0), circles.max(axis=0)
-    beside = points[(points[:, 0] >= left - wanted) & (points[:, 0] <= right + wanted), 1]
-    high = max([*beside, *heights(points, np.array([left - wanted, right + wanted]))]) + wanted - bottom
-    while (excess := distances(points, circles + np.array([0.0, high])).min() - wanted) > EXACT:
-        high -= excess  # which brings nothing nearer to the floor than that
-    return float(high)

@@ -1,8 +1,8 @@
 """What each link and joint of a chain has of its own: two kinds of links in turn, values for each, or a rule.
 
-A link of a chain of two kinds has its kind's mass and inertia, and all joints have the same friction. `Scene` may give
-values for each link instead (`link_masses` …), let masses grow along the chain, hang a charm on one link and make one
-joint stiff.
+A link of a chain of two kinds has its kind's mass and inertia; all circles are alike, and all joints have the same
+friction. `Scene` may give values for each link instead (`link_masses` …), let masses grow along the chain, hang a charm
+on one link and make one joint stiff.
 """
 
 import math
@@ -29,18 +29,24 @@ class LinkValues:
         inertia: moment of inertia of each link about its centre [kg m²].
         viscous_friction: β of each joint [N m s].
         coulomb_friction: τ_c of each joint [N m].
+        radius: of both circles of each link [m].
     """
 
     mass: Array
     inertia: Array
     viscous_friction: Array
     coulomb_friction: Array
+    radius: Array
 
     @property
     def alternates(self) -> bool:
         """Whether each link is like the next but one, as in a chain of two kinds, and each joint likewise."""
-        rows = (self.mass, self.inertia, self.viscous_friction, self.coulomb_friction)
-        return all(np.array_equal(row[2:], row[:-2]) for row in rows)
+        return all(np.array_equal(row[2:], row[:-2]) for row in vars(self).values())
+
+    @property
+    def riding_radius(self) -> float:
+        """Height [m] of the joints above a surface that the chain rides on: half of them are at least so high."""
+        return float(np.median(np.maximum(self.radius, np.roll(self.radius, -1))))
 
     @property
     def total_mass(self) -> float:
@@ -72,4 +78,5 @@ def alternating(parameters: Parameters, links: int) -> LinkValues:
         inertia=np.resize([parameters.inner_inertia, parameters.outer_inertia], links),
         viscous_friction=np.full(links, parameters.viscous_friction),
         coulomb_friction=np.full(links, parameters.coulomb_friction),
+        radius=np.full(links, parameters.circle_radius),
     )

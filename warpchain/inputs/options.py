@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -14,7 +14,7 @@ from warpchain.kernels.methods.method import find_method, method_names
 LONGEST_DRIVE_INTERVAL: Final = 2e-3
 """Greatest time [s] between two of the small steps in which soft joints become stiff, or multiplied loads fall."""
 
-TOLERANCES: Final = {"ge": 1e-13, "le": 1e-1}
+TOLERANCES: Final[Mapping[str, Any]] = {"ge": 1e-13, "le": 1e-1}
 
 FIBERS: Final = "fibers"
 """Device that runs a GPU's kernels on a CPU, slowly, so that tests pass through all that the host does for a GPU."""
@@ -75,57 +75,44 @@ class Options(Section):
             ]
         ),
     )
-    tolerance: float = number_field(
-        1e-6, "1", "error allowed in a step, absolute (SI units) and relative; default of hybrid: 1e-4", **TOLERANCES
-    )
-    soft_tolerance: float | None = number_field(
-        None, "1", "tolerance while soften_drive or soften_pile softens joints; null: as tolerance", **TOLERANCES
-    )
-    flight_tolerance: float = number_field(
-        1e-3, "1", "tolerance of hybrid between impulses, while joints are rigid", **TOLERANCES
-    )
-    controller: Literal["standard", "pi"] = Field(
-        default="standard",
-        description="rule for the next step: standard takes the error of the last step, pi those of the last two; "
-        "hybrid takes one while joints are rigid",
-    )
-    contact_step: float = number_field(
-        2e-5, "s", "longest step near a contact; bounds how deep circles sink in before the contact is found", gt=0
-    )
-    soft_contact_step: float = number_field(
-        5e-5,
-        "s",
-        "longest step near a contact while joints are softened on the sprocket (soften_drive) or softest in the pile "
-        "(soften_pile); without effect if contact_step is longer",
-        gt=0,
-    )
-    skin: float = number_field(
-        2e-3, "m", "margin of the neighbour list, which is built anew when a joint has moved half of it", gt=0
-    )
-    step_limit: Whole = number_field(2_000_000_000, "1", "most steps attempted in one walk", ge=1, le=10**15)
-    smallest_step: float = number_field(1e-12, "s", "the walk ends if a step must be shorter than this", gt=0)
-    self_contact: bool = Field(default=True, description="whether links of the chain can touch one another")
-    rest_speed: float = number_field(
-        0.02, "m/s", "a chain is slow while its centre of mass and its links (rms) are both below this speed", gt=0
-    )
-    rest_time: float = number_field(0.05, "s", "a chain that has been slow for this long is at rest", gt=0)
-    record_interval: float = number_field(1e-3, "s", "time between two samples of a walk", ge=1e-6)
-    soften_pile: bool = Field(
-        default=False,
-        description="whether joints become soft when the walking loop has collapsed, and softest when it encloses less "
-        "than half of soften_area",
-    )
-    soften_area: float = number_field(
-        0.9, "1", "a loop has collapsed when it encloses less than this fraction of its area at the release", gt=0, lt=1
-    )
-    soften_drive: bool = Field(
-        default=False,
-        description="whether joints are softened on the sprocket: softest until it has spun up, then at least soft; "
-        "within 0.03 s after the release they return to their own values",
-    )
-    device: Annotated[str, AfterValidator(_supported_device)] = Field(
-        default="cpu", description="where walks run: cpu, cuda (the first GPU) or cuda:N"
-    )
+    tolerance: float = number_field(1e-6, "1", **TOLERANCES)
+    """error allowed in a step, absolute (SI units) and relative; default of hybrid: 1e-4"""
+    soft_tolerance: float | None = number_field(None, "1", **TOLERANCES)
+    """tolerance while soften_drive or soften_pile softens joints; null: as tolerance"""
+    flight_tolerance: float = number_field(1e-3, "1", **TOLERANCES)
+    """tolerance of hybrid between impulses, while joints are rigid"""
+    controller: Literal["standard", "pi"] = "standard"
+    """rule for the next step: standard takes the error of the last step, pi those of the last two; hybrid takes one
+    while joints are rigid"""
+    contact_step: float = number_field(2e-5, "s", gt=0)
+    """longest step near a contact; bounds how deep circles sink in before the contact is found"""
+    soft_contact_step: float = number_field(5e-5, "s", gt=0)
+    """longest step near a contact while joints are softened on the sprocket (soften_drive) or softest in the pile
+    (soften_pile); without effect if contact_step is longer"""
+    skin: float = number_field(2e-3, "m", gt=0)
+    """margin of the neighbour list, which is built anew when a joint has moved half of it"""
+    step_limit: Whole = number_field(2_000_000_000, "1", ge=1, le=10**15)
+    """most steps attempted in one walk"""
+    smallest_step: float = number_field(1e-12, "s", gt=0)
+    """the walk ends if a step must be shorter than this"""
+    self_contact: bool = True
+    """whether links of the chain can touch one another"""
+    rest_speed: float = number_field(0.02, "m/s", gt=0)
+    """a chain is slow while its centre of mass and its links (rms) are both below this speed"""
+    rest_time: float = number_field(0.05, "s", gt=0)
+    """a chain that has been slow for this long is at rest"""
+    record_interval: float = number_field(1e-3, "s", ge=1e-6)
+    """time between two samples of a walk"""
+    soften_pile: bool = False
+    """whether joints become soft when the walking loop has collapsed, and softest when it encloses less than half of
+    soften_area"""
+    soften_area: float = number_field(0.9, "1", gt=0, lt=1)
+    """a loop has collapsed when it encloses less than this fraction of its area at the release"""
+    soften_drive: bool = False
+    """whether joints are softened on the sprocket: softest until it has spun up, then at least soft; within 0.03 s
+    after the release they return to their own values"""
+    device: Annotated[str, AfterValidator(_supported_device)] = "cpu"
+    """where walks run: cpu, cuda (the first GPU) or cuda:N"""
 
     @model_validator(mode="before")
     @classmethod

@@ -1,7 +1,7 @@
 """Physical parameters of a roller chain: Table 1 of the paper, each quantity declared once.
 
-Every field of `Parameters` carries a `Quantity`: symbol, unit, value and uncertainty in Table 1, physical bounds and
-origin. Presets, error messages and the samples of `warpchain.inputs.distributions` are derived from it.
+Every field of `Parameters` carries a `Quantity`: symbol, unit, value and uncertainty in Table 1, and origin. Presets,
+error messages and the samples of `warpchain.inputs.distributions` are derived from it.
 
 Source: "A walking roller chain", Table 1, unless a quantity says otherwise.
 """
@@ -15,11 +15,9 @@ from pydantic import model_validator
 
 from warpchain.inputs.validation import (
     DIMENSIONLESS,
-    Bounds,
     InputError,
     Section,
     by_name,
-    field_bounds,
     number_field,
     short,
     shown,
@@ -59,7 +57,6 @@ class Quantity:
         value: value in Table 1, in `unit`.
         sigma: standard deviation in Table 1, in `unit`; 0 when the table gives none.
         source: how the value was obtained; "chosen here" when it is not in the paper.
-        bounds: the physical values, in `unit`.
         meaning: one line saying what the quantity is.
     """
 
@@ -68,7 +65,6 @@ class Quantity:
     value: float
     sigma: float
     source: Source
-    bounds: Bounds
     meaning: str
 
 
@@ -147,7 +143,7 @@ class Parameters(Section):
     def quantities(cls) -> dict[str, Quantity]:
         """The parameter table: name of each field → its `Quantity`, in the order of declaration."""
         return {
-            name: Quantity(bounds=field_bounds(field), meaning=field.description, **field.json_schema_extra)  # type: ignore
+            name: Quantity(meaning=field.description, **field.json_schema_extra)  # type: ignore
             for name, field in cls.model_fields.items()
         }
 

@@ -4,9 +4,9 @@ import math
 from typing import Annotated, Final, Literal, Self
 
 import numpy as np
-from pydantic import Discriminator, Field, Strict, Tag, model_validator
+from pydantic import Field, Strict, model_validator
 
-from warpchain.inputs.floor import Array, Points, slope_points
+from warpchain.inputs.floor import FloorField
 from warpchain.inputs.link_values import LinkValues, alternating
 from warpchain.inputs.options import on_gpu
 from warpchain.inputs.parameters import Parameters
@@ -17,9 +17,7 @@ MOST_LINKS: Final = 100_000
 """A chain of so many links takes 0.4 GB, and kernels of its own."""
 MOST_LINKS_ON_GPU: Final = 1024
 """A chain is a block of threads there, one for each link, and CUDA has no larger blocks."""
-HIGHEST_FREQUENCY: Final = 1e4
-"""There Table 1's chain moves at 3.8 km/s, under a tension that stretches its joints by a third of a link [Hz]."""
-LIKELY_FREQUENCY: Final = 300.0
+HIGHEST_FREQUENCY: Final = 300.0
 """Greatest frequency of a sprocket, far above what any loop holds [Hz]; a greater one is in turns a minute."""
 LEAST_SPROCKET: Final = 1e-3
 """Least distance of the joints from the sprocket's centre, in link lengths; far smaller ones are lost in rounding."""
@@ -36,16 +34,16 @@ LONGEST: Final = 1e6
 STEEPEST: Final = 80.0
 """Greatest angle of a slope [°]."""
 RIGHT_ANGLE: Final = math.pi / 2
-OF_LINKS: Final = ("link_masses", "link_inertias", "viscous_frictions", "coulomb_frictions")
+OF_LINKS: Final = ("link_masses", "link_inertias", "viscous_frictions", "coulomb_frictions", "link_radii")
 """Fields with a number for each link or joint."""
-LISTS: Final = (*OF_LINKS, "release", "floor")
-"""Fields that take lists, so that they are no axes of a sweep."""
 TAP: Final = ("lateral_speed", "tilt", "tilt_rate", "yaw_rate")
 """What a release may give to a plane that tilts. Each is 0 by default: an upright plane that nothing disturbs stays
 upright, so that a scene with a tilting plane alone is the paper's."""
 
 
-_Numbers = Annotated[tuple[Annotated[float, Field(ge=0, le=1e12)], ...], Strict(False)] | None
+_COMPOUND: Final = "compound"
+"""Marks a field whose value may be a list or a mapping."""
+_Numbers = Annotated[Annotated[tuple[Annotated[float, Field(ge=0, le=1e12)], ...], Strict(False)] | None, _COMPOUND]
 """A number for each link or joint; null: what the parameters say."""
 
 
@@ -58,148 +56,92 @@ class Scene(Section):
             a link or joint is none of the chain.
     """
 
-    links: Whole = number_field(
-        60,
-        "1",
-        "number of links around the loop, even where inner and outer links alternate",
-        symbol="n",
-        ge=4,
-        le=MOST_LINKS,
-    )
-    frequency: float = number_field(
-        15.0, "Hz", "turns of the sprocket per second at the release", symbol="ν", ge=0, le=HIGHEST_FREQUENCY
-    )
-    start: Literal["rest", "spinning", "ellipse"] = Field(
-        default="rest",
-        description="at rest on the sprocket, circulating on it, or a circulating ellipse without sprocket",
-    )
-    phase: float = number_field(0.0, "1", "moment of the release as a fraction of a loop period", ge=0, lt=1)
-    clearance: float = number_field(
-        0.01, "m", "height of the lowest circle above the floor, of the chain that clearance_of names", ge=0, le=HIGHEST
-    )
-    clearance_of: Literal["spinning", "hanging"] = Field(
-        default="spinning",
-        description="the chain that clearance is measured at: spinning at the release, or hanging at rest",
-    )
-    sprocket_radius_is: Literal["contact", "pitch"] = Field(
-        default="contact",
-        description="what sprocket_radius measures: where circles touch (contact) or joints ride (pitch)",
-    )
-    ellipse_aspect: float = number_field(1.5, "1", "height over width of the starting ellipse", ge=0.05, le=20)
-    settle_time: float | None = number_field(
-        None,
-        "s",
-        "time for the chain to settle on the sprocket at rest; null: 0.1, or 2 if the clearance is that of the "
-        "hanging chain",
-        ge=0,
-        le=LONGEST,
-    )
-    spin_up_time: float = number_field(0.3, "s", "time in which the sprocket reaches its frequency", gt=0, le=LONGEST)
-    load_factor: float | None = number_field(
-        None,
-        "1",
-        "by which gravity, joint friction and rotary inertia are multiplied while the loop becomes "
-        "stationary; null: as many times as suits the chain, at most 50; 1: not at all",
-        ge=1,
-        le=HIGHEST_LOAD,
-    )
-    steady_time: float | None = number_field(
-        None,
-        "s",
-        "the loop is steady once it has kept shape and speed under its own loads for this long; null: a "
-        "loop period or, if its loads were never multiplied, as long as slow waves need to cross it",
-        ge=0,
-        le=LONGEST,
-    )
-    steady_tolerance: float = number_field(
-        0.01,
-        "1",
-        "change of the loop's height, width and place, relative to height or width, that counts as kept",
-        gt=0,
-        le=1,
-    )
-    further_hold: float = number_field(
-        0.0, "s", "time for which a loop that is steady is held on before its release", ge=0, le=LONGEST
-    )
-    hold_limit: float = number_field(
-        30.0, "s", "longest time at full frequency to become steady; then the walk ends as not_steady", gt=0, le=LONGEST
-    )
-    walk_limit: float = number_field(
-        20.0, "s", "longest time from the release to rest; then the walk ends as time_limit", gt=0, le=LONGEST
-    )
-    release: Rows | None = Field(
-        default=None,
-        description="motion of the sprocket after the release: rows [time in s, x and y in m from its place, "
-        "frequency in Hz]; it vanishes after the last, or at once (null); "
-        "what sinks too deep presses the chain into the floor",
-    )
-    floor: Annotated[
-        Annotated[Literal["flat"], Tag("(flat)")] | Annotated[Points, Tag("(points)")],
-        Discriminator(lambda given: "(flat)" if isinstance(given, str) else "(points)"),
-    ] = Field(default="flat", description="flat, or a profile [[x, y], …] in m, whose ends go on straight")
-    slope: float = number_field(
-        0.0, "°", "of an endless floor; positive: it falls the way the chain walks", ge=-STEEPEST, le=STEEPEST
-    )
-    distance_limit: float | None = number_field(
-        None, "m", "distance along the floor at which a walk ends as distance_limit; null: none", gt=0, le=HIGHEST
-    )
-    walk_until: float | None = number_field(
-        None,
-        "s",
-        "time from the release after which a walk that is not at rest is finished, as planned, without Δx; null: none",
-        gt=0,
-        le=LONGEST,
-    )
-    plane: Literal["fixed", "tilting"] = Field(
-        default="fixed",
-        description="whether the chain stays in an upright plane, or walks in one that moves, turns and may fall over",
-    )
-    lateral_speed: float = number_field(
-        0.0,
-        "m/s",
-        "of the centre of mass at the release, across a plane that tilts; positive to the right of the way it walks",
-        ge=-FASTEST_TAP,
-        le=FASTEST_TAP,
-    )
-    tilt: float = number_field(
-        0.0,
-        "rad",
-        "of a tilting plane at the release, about the way it walks; positive: its top leans to the left",
-        ge=-RIGHT_ANGLE,
-        le=RIGHT_ANGLE,
-    )
-    tilt_rate: float = number_field(
-        0.0, "rad/s", "rate of tilt of a tilting plane at the release", ge=-FASTEST_TAP, le=FASTEST_TAP
-    )
-    yaw_rate: float = number_field(
-        0.0,
-        "rad/s",
-        "rate at which a tilting plane turns about its upright axis at the release, anticlockwise from above",
-        ge=-FASTEST_TAP,
-        le=FASTEST_TAP,
-    )
-    charm_link: int = number_field(0, "1", "link that carries a charm", ge=0, le=MOST_LINKS - 1)
-    charm_mass: float = number_field(0.0, "kg", "mass at the centre of charm_link, added to its own", ge=0, le=1e6)
-    charm_inertia: float = number_field(
-        0.0, "kg m²", "moment of inertia of the charm about that centre, added likewise", ge=0, le=1e12
-    )
-    stiff_joint: int = number_field(
-        0, "1", "joint that is stiff: the one at the end of this link", ge=0, le=MOST_LINKS - 1
-    )
-    stiff_joint_factor: float = number_field(
-        1.0, "1", "by which viscous and Coulomb friction of stiff_joint are multiplied", ge=0, le=1e6
-    )
-    mass_gradient: float = number_field(
-        0.0,
-        "1",
-        "mass and inertia of links grow evenly along the chain, from 1 − this times their own to 1 + this times",
-        gt=-1,
-        lt=1,
-    )
-    link_masses: _Numbers = number_field(None, "kg", "mass of each link; null: of its kind")
-    link_inertias: _Numbers = number_field(None, "kg m²", "moment of inertia of each link; null: of its kind")
-    viscous_frictions: _Numbers = number_field(None, "N m s", "viscous_friction of each joint; null: the same for all")
-    coulomb_frictions: _Numbers = number_field(None, "N m", "coulomb_friction of each joint; null: the same for all")
+    links: Whole = number_field(60, "1", symbol="n", ge=4, le=MOST_LINKS)
+    """number of links around the loop, even where inner and outer links alternate"""
+    frequency: float = number_field(15.0, "Hz", symbol="ν", ge=0, le=HIGHEST_FREQUENCY)
+    """turns of the sprocket per second at the release"""
+    start: Literal["rest", "spinning", "ellipse"] = "rest"
+    """at rest on the sprocket, circulating on it, or a circulating ellipse without sprocket"""
+    phase: float = number_field(0.0, "1", ge=0, lt=1)
+    """moment of the release as a fraction of a loop period"""
+    clearance: float = number_field(0.01, "m", ge=0, le=HIGHEST)
+    """height of the lowest circle above the floor, of the chain that clearance_of names"""
+    clearance_of: Literal["spinning", "hanging"] = "spinning"
+    """the chain that clearance is measured at: spinning at the release, or hanging at rest"""
+    sprocket_radius_is: Literal["contact", "pitch"] = "contact"
+    """what sprocket_radius measures: where circles touch (contact) or joints ride (pitch)"""
+    ellipse_aspect: float = number_field(1.5, "1", ge=0.05, le=20)
+    """height over width of the starting ellipse"""
+    settle_time: float | None = number_field(None, "s", ge=0, le=LONGEST)
+    """time for the chain to settle on the sprocket at rest; null: 0.1, or 2 if the clearance is that of the hanging
+    chain"""
+    spin_up_time: float = number_field(0.3, "s", gt=0, le=LONGEST)
+    """time in which the sprocket reaches its frequency"""
+    load_factor: float | None = number_field(None, "1", ge=1, le=HIGHEST_LOAD)
+    """by which gravity, joint friction and rotary inertia are multiplied while the loop becomes stationary; null: as
+    many times as suits the chain, at most 50; 1: not at all"""
+    steady_time: float | None = number_field(None, "s", ge=0, le=LONGEST)
+    """the loop is steady once it has kept shape and speed under its own loads for this long; null: a loop period or, if
+    its loads were never multiplied, as long as slow waves need to cross it"""
+    steady_tolerance: float = number_field(0.01, "1", gt=0, le=1)
+    """change of the loop's height, width and place, relative to height or width, that counts as kept"""
+    further_hold: float = number_field(0.0, "s", ge=0, le=LONGEST)
+    """time for which a loop that is steady is held on before its release"""
+    hold_limit: float = number_field(30.0, "s", gt=0, le=LONGEST)
+    """longest time at full frequency to become steady; then the walk ends as not_steady"""
+    walk_limit: float = number_field(20.0, "s", gt=0, le=LONGEST)
+    """longest time from the release to rest; then the walk ends as time_limit"""
+    release: Annotated[Rows | None, _COMPOUND] = None
+    """motion of the sprocket after the release: rows [time in s, x and y in m from its place, frequency in Hz]; it
+    vanishes after the last, or at once (null); what sinks too deep presses the chain into the floor"""
+    floor: Annotated[FloorField, _COMPOUND] = "flat"
+    """flat, or a profile [[x, y], …] in m, whose ends go on straight; [x, y, e, μ] gives the line from there its own e
+    and μ"""
+    slope: float = number_field(0.0, "°", ge=-STEEPEST, le=STEEPEST)
+    """of an endless floor; positive: it falls the way the chain walks"""
+    distance_limit: float | None = number_field(None, "m", gt=0, le=HIGHEST)
+    """distance along the floor at which a walk ends as distance_limit; null: none"""
+    walk_until: float | None = number_field(None, "s", gt=0, le=LONGEST)
+    """time from the release after which a walk that is not at rest is finished, as planned, without Δx; null: none"""
+    plane: Literal["fixed", "tilting"] = "fixed"
+    """whether the chain stays in an upright plane, or walks in one that moves, turns and may fall over"""
+    lateral_speed: float = number_field(0.0, "m/s", ge=-FASTEST_TAP, le=FASTEST_TAP)
+    """of the centre of mass at the release, across a plane that tilts; positive to the right of the way it walks"""
+    tilt: float = number_field(0.0, "rad", ge=-RIGHT_ANGLE, le=RIGHT_ANGLE)
+    """of a tilting plane at the release, about the way it walks; positive: its top leans to the left"""
+    tilt_rate: float = number_field(0.0, "rad/s", ge=-FASTEST_TAP, le=FASTEST_TAP)
+    """rate of tilt of a tilting plane at the release"""
+    yaw_rate: float = number_field(0.0, "rad/s", ge=-FASTEST_TAP, le=FASTEST_TAP)
+    """rate at which a tilting plane turns about its upright axis at the release, anticlockwise from above"""
+    charm_link: int = number_field(0, "1", ge=0, le=MOST_LINKS - 1)
+    """link that carries a charm"""
+    charm_mass: float = number_field(0.0, "kg", ge=0, le=1e6)
+    """mass at the centre of charm_link, added to its own"""
+    charm_inertia: float = number_field(0.0, "kg m²", ge=0, le=1e12)
+    """moment of inertia of the charm about that centre, added likewise"""
+    charm_radius: float | None = number_field(None, "m", gt=0, le=1e3)
+    """radius of circles of charm_link; null: its own"""
+    stiff_joint: int = number_field(0, "1", ge=0, le=MOST_LINKS - 1)
+    """joint that is stiff: the one at the end of this link"""
+    stiff_joint_factor: float = number_field(1.0, "1", ge=0, le=1e6)
+    """by which viscous and Coulomb friction of stiff_joint are multiplied"""
+    mass_gradient: float = number_field(0.0, "1", gt=-1, lt=1)
+    """mass and inertia of links grow evenly along the chain, from 1 − this times their own to 1 + this times"""
+    link_masses: _Numbers = number_field(None, "kg")
+    """mass of each link; null: of its kind"""
+    link_inertias: _Numbers = number_field(None, "kg m²")
+    """moment of inertia of each link; null: of its kind"""
+    viscous_frictions: _Numbers = number_field(None, "N m s")
+    """viscous_friction of each joint; null: the same for all"""
+    coulomb_frictions: _Numbers = number_field(None, "N m")
+    """coulomb_friction of each joint; null: the same for all"""
+    link_radii: _Numbers = number_field(None, "m")
+    """radius of circles of each link; null: circle_radius"""
+
+    @property
+    def is_level(self) -> bool:
+        """Whether the floor is y = 0."""
+        return self.floor == "flat" and self.slope == 0
 
     @model_validator(mode="after")
     def _goes_together(self) -> Self:
@@ -213,10 +155,10 @@ class Scene(Section):
             if values is not None and len(values) != self.links:
                 raise InputError(f"{name}: {len(values)} numbers for {self.links} links; give one for each")
             if values is not None and name.startswith("link") and min(values) == 0:
-                raise InputError(f"{name}[{values.index(0)}]: 0 is no {name[5:-2]}; give more")
+                raise InputError(f"{name}[{values.index(0)}]: 0 is too little; give more")
         if self.slope != 0 and self.floor != "flat":
             raise InputError(f"slope: {self.slope} of a floor that is a profile; give slope: 0, or floor: flat")
-        if self.plane == "tilting" and floor_points(self) is not None:
+        if self.plane == "tilting" and not self.is_level:
             raise InputError("plane: 'tilting' needs a flat floor; give plane: fixed, or floor: flat and slope: 0")
         if self.plane == "fixed" and (name := next((name for name in TAP if getattr(self, name) != 0), "")):
             raise InputError(
@@ -233,33 +175,15 @@ class Scene(Section):
         return self
 
 
-def floor_points(scene: Scene) -> Array | None:
-    """Points of the floor's profile [m], shape (p, 2); None if it is flat."""
-    if scene.floor != "flat":
-        return np.array(scene.floor)
-    return slope_points(scene.slope) if scene.slope != 0 else None
-
-
-def floor_body(scene: Scene) -> str:
-    """Name of the body that is the floor, see `warpchain.kernels.contacts.fixed_body`."""
-    points = floor_points(scene)
-    if points is None:
-        return "floor"
-    return "slope" if len(points) == 2 else "terrain"
-
-
-def face_count(scene: Scene) -> int:
-    """Number of straight faces of the floor; 1 if it is flat, which a drawn slope may change."""
-    return 1 if scene.floor == "flat" else len(scene.floor) - 1
+COMPOUND: Final = tuple(name for name, field in Scene.model_fields.items() if _COMPOUND in field.metadata)
+"""Fields whose values may be lists or mappings, so that on an axis of a sweep they have names."""
 
 
 def link_values(scene: Scene, parameters: Parameters) -> LinkValues:
     """What each link and joint of the chain of a walk has of its own."""
     values = alternating(parameters, scene.links)
-    given = (scene.link_masses, scene.link_inertias, scene.viscous_frictions, scene.coulomb_frictions)
-    rows = (values.mass, values.inertia, values.viscous_friction, values.coulomb_friction)
-    for row, own in zip(rows, given, strict=True):
-        if own is not None:
+    for row, name in zip(vars(values).values(), OF_LINKS, strict=True):
+        if (own := getattr(scene, name)) is not None:
             row[:] = own
     if scene.mass_gradient:
         growth = 1 + scene.mass_gradient * np.linspace(-1.0, 1.0, scene.links)
@@ -267,17 +191,28 @@ def link_values(scene: Scene, parameters: Parameters) -> LinkValues:
         values.inertia[:] *= growth
     values.mass[scene.charm_link] += scene.charm_mass
     values.inertia[scene.charm_link] += scene.charm_inertia
+    if scene.charm_radius is not None:
+        values.radius[scene.charm_link] = scene.charm_radius
     values.viscous_friction[scene.stiff_joint] *= scene.stiff_joint_factor
     values.coulomb_friction[scene.stiff_joint] *= scene.stiff_joint_factor
     return values
 
 
-def check_parity(scene: Scene, parameters: Parameters, path: str = "scene.links") -> None:
-    """Check that the links of a chain can alternate between two kinds, if they do.
+def check_links(scene: Scene, parameters: Parameters) -> None:
+    """Check that links that have circles of their own are longer than these are wide; else an `InputError`."""
+    if scene.link_radii is None and scene.charm_radius is None:
+        return
+    radii = link_values(scene, parameters).radius
+    if not radii.max() < parameters.link_length / 2:
+        field = "charm_radius" if scene.charm_radius == radii.max() else f"link_radii[{radii.argmax()}]"
+        raise InputError(
+            f"scene.{field}: {radii.max()} is not smaller than half the link length {parameters.link_length / 2}; "
+            "give less"
+        )
 
-    Raises:
-        InputError: their number is odd; the message begins with `path`.
-    """
+
+def check_parity(scene: Scene, parameters: Parameters, path: str = "scene.links") -> None:
+    """Check that links of two kinds are even in number; else an `InputError` that begins with `path`."""
     is_one_kind = (parameters.inner_mass, parameters.inner_inertia) == (parameters.outer_mass, parameters.outer_inertia)
     if scene.links % 2 and not is_one_kind and (scene.link_masses is None or scene.link_inertias is None):
         raise InputError(
@@ -299,7 +234,7 @@ def joint_radius(scene: Scene, parameters: Parameters) -> float:
     """Distance from the sprocket's centre at which the joints ride, in m."""
     if scene.sprocket_radius_is == "pitch":
         return parameters.sprocket_radius
-    return parameters.sprocket_radius + parameters.circle_radius
+    return parameters.sprocket_radius + link_values(scene, parameters).riding_radius
 
 
 def loop_speed(scene: Scene, parameters: Parameters) -> float:
@@ -312,19 +247,10 @@ def loop_speed(scene: Scene, parameters: Parameters) -> float:
 
 
 def contact_radius(scene: Scene, parameters: Parameters) -> float:
-    """Radius of the sprocket that the circles of the links touch, in m.
-
-    Raises:
-        InputError: the sprocket radius is that of the joints and leaves nothing to touch.
-    """
+    """Radius of the sprocket that the circles of the links touch, in m."""
     if scene.sprocket_radius_is == "contact":
         return parameters.sprocket_radius
-    if parameters.sprocket_radius <= parameters.circle_radius:
-        raise InputError(
-            f"parameters.sprocket_radius: {parameters.sprocket_radius} is not greater than the circle radius "
-            f"{parameters.circle_radius}, as sprocket_radius_is: pitch needs; give a larger radius"
-        )
-    return parameters.sprocket_radius - parameters.circle_radius
+    return parameters.sprocket_radius - link_values(scene, parameters).riding_radius
 
 
 def fewest_links(scene: Scene, parameters: Parameters) -> int:
@@ -340,11 +266,7 @@ def fewest_links(scene: Scene, parameters: Parameters) -> int:
 
 
 def check_links_on_gpu(links: int, device: str, field: str) -> None:
-    """Check that a device can carry a chain of this many links.
-
-    Raises:
-        InputError: it cannot; the message begins with the field that says how many links there are.
-    """
+    """Check that a device can carry a chain of this many links; else an `InputError` that begins with `field`."""
     if on_gpu(device) and links > MOST_LINKS_ON_GPU:
         raise InputError(
             f"{field}: {links} links are more than a GPU's block has threads; "
@@ -353,26 +275,21 @@ def check_links_on_gpu(links: int, device: str, field: str) -> None:
 
 
 def check_scene(scene: Scene, parameters: Parameters) -> None:
-    """Check what a scene and its parameters must fulfil together.
+    """Check what a scene and its parameters must fulfil together; else an `InputError`.
 
     A scene that starts as an ellipse has no sprocket, so nothing is asked of that.
-
-    Raises:
-        InputError: links of two kinds are odd in number, the chain is too short for its sprocket, or the sprocket too
-            small, or `contact_radius` finds none, or the links are too point-like for the load factor that is given, or
-            the frequency is one of minutes.
     """
+    check_links(scene, parameters)
     check_parity(scene, parameters)
     if scene.start == "ellipse":
         return
-    if scene.frequency > LIKELY_FREQUENCY:
+    if contact_radius(scene, parameters) <= 0:
         raise InputError(
-            f"scene.frequency: {scene.frequency:g} Hz is far above what a loop holds, 35 Hz with 60 links; if that is "
-            f"in turns a minute, give {scene.frequency / 60:g}"
+            f"parameters.sprocket_radius: {parameters.sprocket_radius} is not greater than the circle radius "
+            f"{link_values(scene, parameters).riding_radius}, as sprocket_radius_is: pitch needs; give a larger radius"
         )
-    contact_radius(scene, parameters)
     highest = scene.clearance + scene.links * parameters.link_length / 2  # of the sprocket's lowest point
-    if scene.release and floor_points(scene) is None and (lowest := min(row[2] for row in scene.release)) < -highest:
+    if scene.release and scene.is_level and (lowest := min(row[2] for row in scene.release)) < -highest:
         raise InputError(
             f"scene.release: y = {lowest:g} m takes the sprocket through the floor, at most {highest:g} m "
             "below it; give a higher place"

@@ -54,11 +54,7 @@ def takes_fields(*sections: str, without: Container[str] = (), beside: Iterable[
 
 
 def by_section(settings: Mapping[str, object]) -> dict[str, dict[str, object]]:
-    """Values by name or symbol, sorted into `SECTIONS`; the values are not checked.
-
-    Raises:
-        InputError: there is no such field, or a value is given twice.
-    """
+    """Values by name or symbol, sorted into `SECTIONS`, unchecked; an `InputError` if there is no such field."""
     sections: dict[str, dict[str, object]] = {section: {} for section in SECTIONS}
     for name, value in by_name(settings).items():
         sections[SECTION_OF[dotted_name(name, shown(name))]][name] = value
@@ -68,8 +64,7 @@ def by_section(settings: Mapping[str, object]) -> dict[str, dict[str, object]]:
 def dotted_name(written: str, path: str) -> str:
     """Name of the field that is written as name or symbol, with or without its section: `parameters.mu_fc`.
 
-    Raises:
-        InputError: there is none; the message begins with `path`.
+    An `InputError` that begins with `path` says that there is none.
     """
     section, _, last = written.rpartition(".")
     name: str = full_name(last)

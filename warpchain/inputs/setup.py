@@ -8,11 +8,17 @@ from dataclasses import replace
 from typing import Final
 
 from warpchain.inputs.distributions import random_generator, sampled
-from warpchain.inputs.floor import check_above
 from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL, Options, replaced_by
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.parameters import preset as parameter_preset
-from warpchain.inputs.scene import OF_LINKS, Scene, check_links_on_gpu, check_parity, check_scene, floor_points
+from warpchain.inputs.scene import (
+    OF_LINKS,
+    Scene,
+    check_links,
+    check_links_on_gpu,
+    check_parity,
+    check_scene,
+)
 from warpchain.inputs.state import DEFAULT_PRESET, Setup, State
 from warpchain.inputs.validation import InputError, shown, validated
 from warpchain.kernels.methods.method import find_method
@@ -21,7 +27,8 @@ __all__ = ["DEFAULT_PRESET", "Setup", "combined", "continued", "options_beside",
 
 OF_THE_WALK: Final = (
     *("walk_limit", "walk_until", "distance_limit", "floor", "slope"),
-    *(*OF_LINKS, "mass_gradient", "charm_mass", "charm_inertia", "charm_link", "stiff_joint", "stiff_joint_factor"),
+    *("charm_mass", "charm_inertia", "charm_radius", "charm_link", "stiff_joint", "stiff_joint_factor"),
+    *("mass_gradient", *OF_LINKS),
 )
 """Fields of the scene that matter after the release, and may change there."""
 
@@ -35,21 +42,18 @@ def resolve(
     seed: int | None = None,
     records_loads: bool = False,
 ) -> Setup:
-    """Check a user's values, complete them, and draw the sample of a seed.
+    """Check a user's values, complete them, and draw the sample of a seed, if there is one.
 
     From the seed's generator come first the parameters, then phase and clearance, of what is not given, as in the first
-    walk of a sweep.
+    walk of a sweep. An `InputError` has one line with the field's path and the remedy.
 
     Args:
         preset: name of the parameter preset to start from.
         scene: fields of `Scene` that differ from their defaults.
         options: fields of `Options` that differ from their defaults.
         parameters: fields of `Parameters` that differ from the preset.
-        seed: of the sample; None: nothing is drawn.
+        seed: of the sample.
         records_loads: whether joint forces of the walk will be recorded.
-
-    Raises:
-        InputError: anything is wrong; one line with the field's path and the remedy.
     """
     checked = validated(Scene, scene, "scene")
     changed = parameter_preset(preset).with_values(parameters)
@@ -58,30 +62,14 @@ def resolve(
 
 
 def options_beside(plane: str, options: Mapping[str, object], records_loads: bool = False) -> Options:
-    """The checked options of a scene with this `Scene.plane`.
-
-    The plane, and whether joint forces are recorded, may decide what method `standard` is.
-
-    Raises:
-        InputError: a value is refused.
-    """
+    """The checked options; `Scene.plane`, and whether joint forces are recorded, may decide what `standard` is."""
     if (plane == "tilting" or records_loads) and options.get("method", "standard") == "standard":
         options = {**options, "method": "explicit"}
     return validated(Options, options, "options")
 
 
 def combined(preset: str, parameters: Parameters, scene: Scene, options: Options) -> Setup:
-    """Check what parameters, scene and options must fulfil together.
-
-    Args:
-        preset: name of the preset that the parameters started from.
-        parameters: of the chain, its sprocket and the floor.
-        scene: what happens.
-        options: how it is computed.
-
-    Raises:
-        InputError: they contradict one another.
-    """
+    """The setup of these values, if they do not contradict one another; else an `InputError`."""
     _check_can_tilt(scene, options)
     check_scene(scene, parameters)
     check_links_on_gpu(scene.links, options.device, "scene.links")
@@ -104,11 +92,7 @@ def _check_can_tilt(scene: Scene, options: Options) -> None:
 
 
 def check_has_joint_forces(options: Options) -> None:
-    """Check that the method has forces in the joints that can be recorded.
-
-    Raises:
-        InputError: it does not.
-    """
+    """Check that the method has forces in the joints that can be recorded; else an `InputError`."""
     if not find_method(options.method).has_joint_forces:
         raise InputError(
             f"options.method: {shown(options.method)} makes joints rigid between impulses, without forces that "
@@ -117,11 +101,7 @@ def check_has_joint_forces(options: Options) -> None:
 
 
 def continued(state: State, sections: Mapping[str, Mapping[str, object]]) -> Setup:
-    """The setup of a walk from a state, with other parameters, options or limit of the walk.
-
-    Raises:
-        InputError: a value is refused, or is one of what comes before the release.
-    """
+    """The setup of a walk from a state, with other values of what comes behind the release; else an `InputError`."""
     if early := [name for name in sections["scene"] if name not in OF_THE_WALK]:
         raise InputError(
             f"{', '.join(early)}: given together with a state, whose chain is formed and released; leave it out"
@@ -131,6 +111,7 @@ def continued(state: State, sections: Mapping[str, Mapping[str, object]]) -> Set
     scene = validated(Scene, {**vars(before.scene), **sections["scene"]}, "scene")
     parameters = before.parameters.with_values(sections["parameters"]) if sections["parameters"] else before.parameters
     _check_can_tilt(scene, options)
+    check_links(scene, parameters)
     check_parity(scene, parameters)
     check_links_on_gpu(scene.links, options.device, "start")
     for name in OF_THE_WALK[:2]:
@@ -138,5 +119,5 @@ def continued(state: State, sections: Mapping[str, Mapping[str, object]]) -> Set
             raise InputError(f"{name}: {end:g} s is before the state at {state.time:g} s; give a later time")
     setup = Setup(before.preset, parameters, scene, options)
     if scene.plane == "fixed" and not state.is_placed_as_in(setup):  # a moving sprocket may have left it in the floor
-        check_above(floor_points(scene), state.position, state.parameters.link_length, "start")
+        setup.floor.check_above(state.position, state.parameters.link_length, "start")
     return replace(setup, start=replace(state, setup=setup))

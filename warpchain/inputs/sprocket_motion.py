@@ -3,6 +3,8 @@
 import itertools
 from typing import Annotated, Final
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from pydantic import AfterValidator, Field, Strict
 
 Motion = tuple[tuple[float, float, float, float], ...]
@@ -29,3 +31,21 @@ Rows = Annotated[
     AfterValidator(_in_order),
 ]
 """A motion: rows [time, x, y, frequency]."""
+
+
+def sprocket_places(motion: Motion | None, times: ArrayLike) -> NDArray[np.float64]:
+    """Places x, y of the sprocket relative to that at the release [m], shape (t, 2); NaN where it has vanished.
+
+    Args:
+        motion: its rows; None: it vanishes at once.
+        times: since the release [s], shape (t,).
+    """
+    if motion is None:
+        return np.full((np.size(times), 2), np.nan)
+    from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
+
+    knots, places = np.split(np.array([(0.0, 0.0, 0.0), *(row[:3] for row in motion)]), [1], axis=1)
+    speeds = PchipInterpolator(knots[:, 0], places).derivative()(knots[:, 0])
+    speeds[0] = 0.0  # it starts at rest
+    there = CubicHermiteSpline(knots[:, 0], places, speeds)(times)
+    return np.where(np.reshape(times, (-1, 1)) < motion[-1][0], there, np.nan)

@@ -8,9 +8,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpchain.inputs.floor import Floor, circles_of, floor_from
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters, preset
-from warpchain.inputs.scene import MOST_LINKS, Scene, check_parity, check_scene
+from warpchain.inputs.scene import Scene, check_parity, check_scene
 from warpchain.inputs.sections import SECTION_OF
 from warpchain.inputs.start_shapes import links_between
 from warpchain.inputs.validation import InputError, validated
@@ -50,6 +51,12 @@ class Setup:
         return self.start is None and self.scene.start != "ellipse"
 
     @property
+    def floor(self) -> Floor:
+        """The floor of the walk."""
+        usual = self.parameters.floor_restitution, self.parameters.floor_friction
+        return floor_from(self.scene.floor, self.scene.slope, usual)
+
+    @property
     def described(self) -> str:
         """The chain and how it was spun, in a few words."""
         links, start = f"{self.scene.links} links", self.start
@@ -67,14 +74,7 @@ class Setup:
         return np.frombuffer(hashlib.sha256("\n".join(parts).encode()).digest(), dtype=np.uint8)
 
     def with_drawn(self, drawn: Mapping[str, float]) -> "Setup":
-        """A copy with drawn values in place of its own.
-
-        Args:
-            drawn: fields of `Parameters` or `Scene` → value.
-
-        Raises:
-            InputError: the values together make no possible walk.
-        """
+        """A copy with drawn values of parameters and scene, if they make a possible walk; else an `InputError`."""
         sections: dict[str, dict[str, float]] = {"parameters": {}, "scene": {}}
         for name, value in drawn.items():
             sections[SECTION_OF[name]][name] = value
@@ -195,16 +195,11 @@ class State:
     @property
     def joints(self) -> Array:
         """Joints x, y [m], (n, 2), as the end of link i; if the plane tilts, in the plane."""
-        return self.position[:, :2] + self._arms()
-
-    def _arms(self) -> Array:
-        """From the centres of the links to their right ends [m], (n, 2)."""
-        angle = self.position[:, 2]
-        return self.parameters.link_length / 2 * np.column_stack([np.cos(angle), np.sin(angle)])
+        return circles_of(self.position, self.parameters.link_length)[self.links :]
 
     def _check_closed(self) -> None:
-        left = np.roll(self.position[:, :2] - self._arms(), -1, axis=0)
-        opening = np.linalg.norm(left - self.joints, axis=1)
+        left, right = np.split(circles_of(self.position, self.parameters.link_length), 2)
+        opening = np.linalg.norm(np.roll(left, -1, axis=0) - right, axis=1)
         if (widest := float(opening.max())) > WIDEST_OPENING * self.parameters.link_length:
             link = int(opening.argmax())
             raise InputError(
@@ -214,15 +209,9 @@ class State:
 
 
 def checked_array(given: object, path: str, *shape: int | str) -> Array:
-    """Anything like an array of finite real numbers as a new float64 array of this shape.
+    """Anything like an array of finite real numbers as a new float64 array of this shape; a letter is any number.
 
-    Args:
-        given: of the user.
-        path: its name, for errors.
-        shape: a letter stands for any number.
-
-    Raises:
-        InputError: it is another thing; the message begins with `path`.
+    Of anything else an `InputError` that begins with `path`.
     """
     wanted = f"({', '.join(map(str, shape))}{',' * (len(shape) == 1)})"
     try:
@@ -241,13 +230,9 @@ def checked_array(given: object, path: str, *shape: int | str) -> Array:
 
 def _setup(links: int, parameters: Parameters | str, field_name: str) -> Setup:
     """The setup of a chain that no sprocket has moved."""
-    if links < 4:
-        raise InputError(f"{field_name}: {links} links; a closed chain has at least 4")
-    if links > MOST_LINKS:
-        raise InputError(f"{field_name}: {links} links; give at most {MOST_LINKS}")
     name = DEFAULT_PRESET if isinstance(parameters, Parameters) else parameters
     chain = parameters if isinstance(parameters, Parameters) else preset(parameters)
-    scene = Scene(links=links, frequency=0.0, start="ellipse")
+    scene = validated(Scene, {"links": links, "frequency": 0.0, "start": "ellipse"}, field_name)
     check_parity(scene, chain, field_name)
     return Setup(name, chain, scene, Options())
 

@@ -8,10 +8,8 @@ import difflib
 import functools
 import math
 import reprlib
-import sys
 import textwrap
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final, TypeVar, get_args
 
@@ -70,33 +68,13 @@ class InputWarning(UserWarning):
     """Input that is possible but probably not meant; its text reads like that of an `InputError`."""
 
 
-@dataclass(frozen=True)
-class Bounds:
-    """An interval of physical values.
-
-    Attributes:
-        lower: lower end, in the unit of the quantity.
-        upper: upper end; included when finite.
-        lower_included: whether the lower end itself is physical.
-    """
-
-    lower: float
-    upper: float = math.inf
-    lower_included: bool = True
-
-    def admit(self, value: float) -> bool:
-        """Whether `value` is finite and inside the interval."""
-        above = value >= self.lower if self.lower_included else value > self.lower
-        return math.isfinite(value) and above and value <= self.upper
-
-
-def number_field(default: Any, unit: str, description: str, **more: Any) -> Any:
+def number_field(default: Any, unit: str, description: str | None = None, **more: Any) -> Any:
     """A pydantic field that holds a number.
 
     Args:
         default: its default, in `unit`; `...` for none.
         unit: SI unit, `DIMENSIONLESS` for pure numbers.
-        description: its meaning, in one line.
+        description: its meaning; that of a field of a section may stand below it.
         more: limits `ge`, `gt`, `le`, `lt` in `unit`, as of `pydantic.Field`; anything else stands beside the unit.
     """
     limits = {name: more.pop(name) for name in ("ge", "gt", "le", "lt") if name in more}
@@ -129,11 +107,11 @@ def field_choices(field: FieldInfo) -> tuple[Any, ...]:
     return (True, False) if field.annotation is bool else tuple(words)
 
 
-def field_bounds(field: FieldInfo) -> Bounds:
-    """The interval that the limits of a field leave."""
+def field_bounds(field: FieldInfo) -> tuple[float, float]:
+    """Least and greatest value that the limits of a field leave."""
     limits = field_limits(field)
-    upper = math.nextafter(limits["lt"], -math.inf) if "lt" in limits else limits.get("le", math.inf)
-    return Bounds(limits.get("ge", limits.get("gt", -math.inf)), upper, "gt" not in limits)
+    least = limits["ge"] if "ge" in limits else math.nextafter(limits.get("gt", -math.inf), math.inf)
+    return least, limits["le"] if "le" in limits else math.nextafter(limits.get("lt", math.inf), -math.inf)
 
 
 FIELDS: Final[dict[str, FieldInfo]] = {}
@@ -157,13 +135,14 @@ def spelled(symbol: str) -> str:
 class Section(BaseModel):
     """A section of a user's values: parameters, scene or options; its fields have their names from then on."""
 
-    model_config = STRICT
+    model_config = STRICT | ConfigDict(use_attribute_docstrings=True)
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
-        """Tell the names of the fields."""
+        """Tell the names of the fields; those without a description have the text that stands below them."""
         for name, field in cls.model_fields.items():
             FIELDS[name], SECTION_OF[name] = field, cls.__name__.lower()
+            field.description = " ".join((field.description or "").split())
             if isinstance(field.json_schema_extra, dict) and "symbol" in field.json_schema_extra:
                 SYMBOL_OF[name] = spelled(str(field.json_schema_extra["symbol"]))
                 NAME_OF_SYMBOL[SYMBOL_OF[name]] = name
@@ -178,15 +157,7 @@ T = TypeVar("T")
 
 
 def by_name(values: Mapping[Any, T], path: str = "") -> dict[Any, T]:
-    """Values by the full names of their fields; neither names nor values are checked.
-
-    Args:
-        values: name or symbol → value.
-        path: where the values were given.
-
-    Raises:
-        InputError: a value is given twice, by name and by symbol.
-    """
+    """Values by the full names of their fields, unchecked; an `InputError` if one is given twice."""
     named: dict[Any, T] = {}
     for written, value in values.items():
         name = full_name(written)
@@ -243,7 +214,7 @@ def refusals(error: ValidationError, path: str, keys: Iterable[str] = (), unit: 
     for problem in error.errors(include_url=False)[:MOST_PROBLEMS]:
         where, cause = path, problem.get("ctx", {}).get("error")
         for part in problem["loc"]:
-            if not (isinstance(part, str) and part.startswith("(")):  # the branch of a union
+            if not (isinstance(part, str) and part.startswith(("(", "["))):  # the branch of a union, "[key]" of a key
                 where = path_of(where, part)
         if isinstance(cause, InputError):
             lines.append(f"{where}.{cause}".removeprefix("."))
@@ -312,16 +283,13 @@ def _adapter(kind: Any) -> TypeAdapter[Any]:
 
 
 def checked(value: object, path: str, kind: Any, unit: str = DIMENSIONLESS) -> Any:
-    """A value that is no field, such as an argument of a function, in Python's own types.
+    """A value that is no field, such as an argument of a function, in Python's own types; else an `InputError`.
 
     Args:
         value: of the user.
         path: its name, for errors.
         kind: an annotation that pydantic can check, such as `bool` or `Annotated[float, Field(gt=0)]`.
         unit: of a number.
-
-    Raises:
-        InputError: it is of another kind; the message begins with `path`.
     """
     try:
         return _adapter(kind).validate_python(plain(value, path))
@@ -329,23 +297,8 @@ def checked(value: object, path: str, kind: Any, unit: str = DIMENSIONLESS) -> A
         raise InputError(refusals(error, path, unit=unit)[0]) from None
 
 
-def checked_positive(value: object, path: str, kind: str = "number") -> float:
-    """The value, if it is a positive finite number.
-
-    Raises:
-        InputError: it is not; the message begins with `path` and asks for a `kind`.
-    """
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value <= sys.float_info.max:
-        raise InputError(f"{path}: {shown(value)} is no positive {kind}; give one")
-    return value
-
-
 def checked_path(value: object, path: str) -> Path:
-    """The value as a path, if a file system can have it.
-
-    Raises:
-        InputError: it is none; the message begins with `path`.
-    """
+    """The value as a path, if a file system can have it; else an `InputError` that begins with `path`."""
     try:
         return given_path(value)  # type: ignore[arg-type]
     except (OSError, TypeError):
@@ -353,12 +306,7 @@ def checked_path(value: object, path: str) -> Path:
 
 
 def suggestion(given: object, known: Mapping[str, str] | Iterable[str]) -> str:
-    """The remedy for an unknown name: the closest known one, or as many as find room.
-
-    Args:
-        given: the name.
-        known: names that may be given; a mapping says how each is shown.
-    """
+    """The remedy for an unknown name: the closest of the known, or as many as find room, shown as a mapping says."""
     names = known if isinstance(known, Mapping) else {name: name for name in known if name != given}
     close = difflib.get_close_matches(str(given)[:_LONGEST_VALUE], names, n=1) if isinstance(given, str) else []
     if close:
@@ -384,13 +332,9 @@ def printable(text: str) -> str:
 
 
 def one_line(text: str, kind: str = "") -> str:
-    """A message as one printable line of at most `LONGEST_LINE` characters.
+    """A message as one printable line of at most `LONGEST_LINE` characters, behind its kind, such as `error: `.
 
     What is too long lacks its end, and the middle of a path of more than `_LONGEST_PATH` characters at its beginning.
-
-    Args:
-        text: the message.
-        kind: what stands before it, such as `error: `.
     """
     ends = text if len(text) < 10 * LONGEST_LINE else text[: 5 * LONGEST_LINE] + text[-5 * LONGEST_LINE :]
     text, room = printable(" ".join(ends.split())), LONGEST_LINE - len(kind)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.hdf5_files import Stored, stored_fields
-from warpchain.inputs.link_values import LinkValues, alternating, mean_value
+from warpchain.inputs.link_values import mean_value
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import joint_radius, link_values
 from warpchain.inputs.setup import Setup
@@ -70,54 +70,6 @@ FIELDS: Final[dict[str, Stored]] = stored_fields(BeforeRelease)
 """Arrays of a `BeforeRelease`: name → unit, meaning and shape."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class LoopParameters:
-    """The quantities of a chain in the balances of its loop.
-
-    Attributes:
-        link_length: ℓ [m].
-        density: ρ = m̄/ℓ, mass per length [kg/m].
-        inertia: j = (Ī − m̄ ℓ²/6)/ℓ [kg m]; may be negative.
-        gravity: g [m/s²].
-        viscous_friction: β of a joint [N m s].
-        coulomb_friction: τ_c of a joint [N m].
-        friction_smoothing: ω_c of a joint on the sprocket [rad/s].
-    """
-
-    link_length: float
-    density: float
-    inertia: float
-    gravity: float
-    viscous_friction: float
-    coulomb_friction: float
-    friction_smoothing: float
-
-    def moment(self, spin: Array) -> Array:
-        """Friction moment f(w) = β w + τ_c tanh(w / ω_c) [N m] of a joint that turns at w [rad/s]."""
-        coulomb: Array = self.coulomb_friction * np.tanh(spin / self.friction_smoothing)
-        return self.viscous_friction * spin + coulomb
-
-    @classmethod
-    def of(
-        cls, parameters: Parameters, links: LinkValues | None = None, friction_smoothing: float | None = None
-    ) -> "LoopParameters":
-        """Take them from the parameters of a chain and means over its links, which else are of two kinds in turn.
-
-        `friction_smoothing` replaces the chain's own.
-        """
-        links = links or alternating(parameters, 2)
-        mass, inertia, length = mean_value(links.mass), mean_value(links.inertia), parameters.link_length
-        return cls(
-            link_length=length,
-            density=mass / length,
-            inertia=(inertia - mass * length**2 / 6) / length,
-            gravity=parameters.gravity,
-            viscous_friction=mean_value(links.viscous_friction),
-            coulomb_friction=mean_value(links.coulomb_friction),
-            friction_smoothing=friction_smoothing or parameters.friction_smoothing,
-        )
-
-
 class Kink(NamedTuple):
     """The greatest and the least curvature [1/m] near the lowest point, and their places s [m].
 
@@ -135,7 +87,8 @@ class StationaryLoop:
     """The mean loop, as functions of the arc length s at g points; signs as in the module's docstring.
 
     Attributes:
-        parameters: parameters of the chain.
+        parameters: parameters of the chain, with the friction smoothing that its joints had on the sprocket.
+        density: ρ = m̄/ℓ, mass per length [kg/m].
         speed: v along the loop [m/s].
         length: length of the mean loop [m].
         radius: distance of joints on the sprocket from its centre [m].
@@ -153,7 +106,8 @@ class StationaryLoop:
         free: where the free part begins and ends, s [m]: lift-off from the sprocket and touch-down.
     """
 
-    parameters: LoopParameters
+    parameters: Parameters
+    density: float
     speed: float
     length: float
     radius: float
@@ -205,19 +159,23 @@ def average_loop(setup: Setup, before: BeforeRelease | None, center: Array | Non
                 "walk: it began without a sprocket, so it has no loop on one; take a walk from its drive on"
             )
         raise ValueError("walk: nothing was kept of the time before its release; run it again with record_before")
-    smoothing = setup.parameters.friction_smoothing
+    scene, parameters = setup.scene, setup.parameters
     if setup.options.soften_drive:
-        smoothing = max(smoothing, preset("soft").friction_smoothing)  # of joints that are softened on the sprocket
-    parameters = LoopParameters.of(setup.parameters, link_values(setup.scene, setup.parameters), smoothing)
-    return average_frames(before, parameters, center, joint_radius(setup.scene, setup.parameters))
+        smoothing = max(parameters.friction_smoothing, preset("soft").friction_smoothing)
+        parameters = parameters.with_values({"friction_smoothing": smoothing})
+    mass = mean_value(link_values(scene, parameters).mass)
+    return average_frames(before, parameters, mass, center, joint_radius(scene, parameters))
 
 
-def average_frames(before: BeforeRelease, parameters: LoopParameters, center: Array, radius: float) -> StationaryLoop:
+def average_frames(
+    before: BeforeRelease, parameters: Parameters, mass: float, center: Array, radius: float
+) -> StationaryLoop:
     """The mean loop of frames.
 
     Args:
         before: frames of a loop that runs clockwise.
         parameters: parameters of the chain.
+        mass: m̄, mean mass of its links [kg].
         center: the sprocket's centre x, y [m].
         radius: distance of joints on the sprocket from its centre [m].
 
@@ -240,7 +198,6 @@ def average_frames(before: BeforeRelease, parameters: LoopParameters, center: Ar
     tangent = first / per_q[:, None]
     normal = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
     curvature = np.sum(second * normal, axis=1) / per_q**2
-    mass = parameters.density * parameters.link_length
     effective = force - mass * rate**2 * (first + third / 12)
 
     step = links / len(per_q)
@@ -268,6 +225,7 @@ def average_frames(before: BeforeRelease, parameters: LoopParameters, center: Ar
     angle = np.unwrap(np.arctan2(on_grid(tangent[:, 1]), -on_grid(tangent[:, 0])))
     return StationaryLoop(
         parameters=parameters,
+        density=mass / parameters.link_length,
         speed=rate * parameters.link_length,
         length=length,
         radius=radius,

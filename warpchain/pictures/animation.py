@@ -18,19 +18,24 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from warpchain.files import checked_output, replacing, write_whole
 from warpchain.pictures.chain import (
     SIDE,
+    circle_radii,
     draw_chain,
     draw_ground,
+    draw_release,
+    draw_sprocket,
     floor_height,
     floor_line,
+    sprocket_centers,
     sprocket_circle,
-    view_from,
+    stretches,
     walk_box,
 )
-from warpchain.pictures.style import BLUE, FAINT, GROUND, INK, tidy
+from warpchain.pictures.style import BLUE, GROUND, INK, tidy
 from warpchain.pictures.walk_shape import center_in_room, checked_joints, headline
 
 if TYPE_CHECKING:
@@ -45,8 +50,8 @@ DPI: Final = 100
 INNER, OUTER, EDGE = "#9CCBE6", BLUE, "#00385A"
 """Colours of inner links, of outer links and of their edges."""
 
-_CORNER: Final = view_from(*np.radians((35.0, 22.0)))
-"""The view from the front right, slightly above."""
+_CORNER: Final = (-35.0, 22.0)
+"""View from the front right, slightly above: angles about the vertical, then about what points to the right."""
 _PADDING: Final = np.array([[50, 50], [50, 30]])
 """Pixels to the left and below, and to the right and above."""
 
@@ -164,16 +169,19 @@ def player(walk: "WalkResult", slow: float = 4.0) -> str:
     times, box = walk.frame_time[frames], side_box(walk, joints)
     marks = floor_marks(*box[0])
     center = np.stack([np.interp(times, walk.time, walk.center[:, axis]) for axis in (0, 1)], axis=1)
+    places, ends = sprocket_centers(walk, times), box[0] + np.array([-3, 3]) * np.ptp(box[0])
     data = {
         "time": _whole(times, 1e6),
         "joints": _whole(joints[frames, :, :2].reshape(count, -1)),
         "center": _whole(center),
-        "radius": walk.setup.parameters.circle_radius * 1e4,
+        "radii": _whole(circle_radii(walk)),
         "sprocket": None if sprocket is None else _whole(np.array([*sprocket, walk.sprocket_radius])),
+        "places": _whole(places[~np.isnan(places[:, 0])]),
         "view": _whole(box.ravel()),
         "marks": marks,
         "heights": _whole(np.array(floor_height(walk, np.array(marks)))),
-        "floor": _whole(floor_line(walk, *(box[0] + np.array([-3, 3]) * np.ptp(box[0])))),
+        "floor": _whole(floor_line(walk, *ends)),
+        "stretches": [[color, label, _whole(faces)] for color, label, faces in stretches(walk, *ends)],
         "slow": slow,
         "colors": {"inner": INNER, "outer": OUTER, "edge": EDGE},
     }
@@ -195,13 +203,18 @@ def floor_marks(low: float, high: float, most: int = 9) -> list[float]:
 
 
 def side_box(walk: "WalkResult", joints: Array) -> Array:
-    """Left and right, bottom and top of what is shown from the side [m], shape (2, 2), with some of the floor."""
+    """Left and right, bottom and top of what is shown from the side [m], shape (2, 2), with some of the floor.
+
+    It is at least as broad as high, so that titles and marks have room.
+    """
     low, high = walk_box(walk, joints)
+    broad = max(0.0, (high[1] - low[1]) - (high[0] - low[0])) / 2
+    low[0], high[0] = low[0] - broad, high[0] + broad
     return np.array([[low[0], low[1] - 0.045 * max(high[:2] - low[:2])], high[:2]]).T
 
 
 class Film:
-    """Draws the frames of one walk.
+    """Draws the frames of one walk; dashed is where the sprocket was at the release.
 
     Attributes:
         figure: the picture of the frame that was drawn last; an even number of pixels wide and high, for video.
@@ -214,15 +227,19 @@ class Film:
             ValueError: the walk has no frames or broken ones.
         """
         self._walk, self._joints, self._center = walk, checked_joints(walk), center_in_room(walk)
-        self._view = SIDE if walk.joints_in_room is None else _CORNER
+        self._radii = circle_radii(walk)
+        self._tilts = walk.joints_in_room is not None
+        self._view = Rotation.from_euler("yx", _CORNER, degrees=True).as_matrix() if self._tilts else SIDE
         low, high = walk_box(walk, self._joints)
-        if self._view is SIDE:
+        if not self._tilts:
             box = side_box(walk, self._joints)
         else:  # the floor at least as broad as the chain is high
             broad = max(0.0, high[1] - (high[2] - low[2])) / 2
             low[2], high[2] = low[2] - broad, high[2] + broad
             corners = np.array([[x, 0.0, z] for z in (low[2], high[2]) for x in (low[0], high[0])])
-            seen = np.concatenate([corners, self._joints.reshape(-1, 3)]) @ self._view[:2].T
+            circle = sprocket_circle(walk)
+            shown = [corners, self._joints.reshape(-1, 3), *([] if circle is None else [circle])]
+            seen = np.concatenate(shown) @ self._view[:2].T
             box = np.array([seen.min(axis=0), seen.max(axis=0)]).T
         space = np.array([WIDTH, TALLEST]) - _PADDING.sum(axis=0)
         scale = float((space / np.diff(box)[:, 0]).min())
@@ -231,38 +248,37 @@ class Film:
         self._canvas: Any = FigureCanvasAgg(self.figure)
         share = _PADDING / size
         self._axes = self.figure.add_axes((*share[0], *(1 - share.sum(axis=0))), xlim=box[0], ylim=box[1])
-        if self._view is SIDE:
-            draw_ground(self._axes, floor_line(walk, *box[0]), box[1, 0])
-            self._axes.set(xlabel="$x$ / m", yticks=[], xticks=floor_marks(*box[0]))
+        draw_release(self._axes, walk, self._view)
+        if not self._tilts:
+            draw_ground(self._axes, walk, floor_line(walk, *box[0]), box[1, 0])
+            self._axes.set(yticks=[], xticks=floor_marks(*box[0]))
+            self._axes.set_xlabel("$x$ / m", loc="right")
+            labels = self._axes.get_legend_handles_labels()
+            self.figure.legend(*labels, loc="lower left", frameon=False, ncols=4, fontsize="small")
             tidy(self._axes)
             self._axes.spines[["left", "bottom"]].set_visible(False)
         else:
             self._axes.set_axis_off()
             self._draw_floor(low, high)
-        circle = sprocket_circle(walk)
-        if circle is not None:
-            center = circle[:-1].mean(axis=0)
-            foot = np.array([center[0], floor_height(walk, center[0]), center[2]])
-            for path in (circle, np.stack([center, foot])):
-                self._axes.plot(*self._project(path), color=FAINT, linewidth=0.8)
         self.figure.text(0.015, 0.975, headline(walk), va="top", fontsize=11, color=INK)
         self._moving: list[Any] = []
 
     def draw(self, frame: int) -> None:
-        """Draw one frame: the chain, its shadow on the floor, the path of its centre of mass so far, the time."""
+        """Draw one frame: chain, sprocket while it is there, shadow, path of the centre of mass so far, time."""
         for artist in self._moving:
             artist.remove()
         walk, axes, joints = self._walk, self._axes, self._joints[frame]
-        parameters, moment = walk.setup.parameters, walk.frame_time[frame]
+        moment = walk.frame_time[frame]
         path = self._project(self._center[: max(1, int(np.searchsorted(walk.time, moment, side="right")))])
         clock: dict[str, Any] = {"ha": "right", "va": "top", "fontsize": 11, "color": INK}
         self._moving = [
-            draw_chain(axes, joints, parameters.circle_radius, self._view, (INNER, OUTER, EDGE), edge=0.45, halo=False),
+            *draw_sprocket(axes, walk, moment),
+            draw_chain(axes, joints, self._radii, self._view, (INNER, OUTER, EDGE), edge=0.45, halo=False),
             *axes.plot(*path, color=INK, linewidth=0.8, zorder=4),
             *axes.plot(*path[:, -1:], "o", color=INK, markersize=5, zorder=4),
             self.figure.text(0.985, 0.975, f"{moment:.3f} s", **clock),
         ]
-        if self._view is not SIDE:
+        if self._tilts:
             shadow = self._project(np.concatenate([joints, joints[:1]]) * (1.0, 0.0, 1.0))
             self._moving += axes.plot(*shadow, color="#BDBDBD", linewidth=3.0, zorder=1.5)
 

@@ -7,14 +7,16 @@ up, and what points towards the viewer.
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
-from matplotlib.patches import Polygon
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import to_hex
+from matplotlib.patches import Circle, Patch, Polygon
 from numpy.typing import NDArray
 
-from warpchain.inputs.floor import distances, heights
-from warpchain.inputs.scene import floor_points
-from warpchain.pictures.style import GROUND, INK
+from warpchain.inputs.scene import link_values
+from warpchain.inputs.sprocket_motion import sprocket_places
+from warpchain.pictures.style import DASHES, FAINT, GROUND, INK
 
 if TYPE_CHECKING:
     from warpchain.walks.walk_result import WalkResult
@@ -26,24 +28,17 @@ ABOVE: Final = np.eye(3)[[0, 2, 1]]
 """Its upper axis is z, which such a viewer sees grow downwards: invert it."""
 
 
-def view_from(azimuth: float, elevation: float) -> Array:
-    """A view with the vertical upright in the picture.
-
-    Args:
-        azimuth: angle [rad] of the viewer about the vertical: 0 beside the chain, a right angle in front of it.
-        elevation: angle [rad] of the viewer above the floor.
-    """
-    sine, cosine, high, far = np.sin(azimuth), np.cos(azimuth), np.sin(elevation), np.cos(elevation)
-    right, toward = np.array([cosine, 0.0, -sine]), np.array([sine * far, high, cosine * far])
-    return np.stack([right, np.cross(toward, right), toward])
+def circle_radii(walk: "WalkResult") -> Array:
+    """Radius of the circles of each link [m], shape (n,)."""
+    return link_values(walk.setup.scene, walk.setup.parameters).radius
 
 
-def link_outlines(joints: Array, radius: float) -> Array:
+def link_outlines(joints: Array, radius: Array | float) -> Array:
     """Outlines of the links of one chain in a picture: two circles and a waist between them.
 
     Args:
         joints: joint positions [m], shape (n, 2); link i reaches from joint i − 1 to joint i.
-        radius: radius of the circles at the joints [m].
+        radius: of the circles of all links, or of each, shape (n,) [m].
 
     Returns:
         Corners of a polygon for each link [m], anticlockwise, shape (n, c, 2).
@@ -62,20 +57,20 @@ def link_outlines(joints: Array, radius: float) -> Array:
     outlines: Array = (
         middle[:, None]
         + corners[:, :1] * half[:, None]
-        + radius * (corners[:, 1:2] * along[:, None] + corners[:, 2:] * across[:, None])
+        + np.reshape(radius, (-1, 1, 1)) * (corners[:, 1:2] * along[:, None] + corners[:, 2:] * across[:, None])
     )
     return outlines
 
 
 def draw_chain(
-    axes: Axes, joints: Array, radius: float, view: Array, colors: Any, *, edge: float, halo: bool = True
+    axes: Axes, joints: Array, radius: Array, view: Array, colors: Any, *, edge: float, halo: bool = True
 ) -> PolyCollection:
     """Draw one chain, its rearmost link first; odd links, the outer ones, cover their neighbours.
 
     Args:
         axes: where to draw.
         joints: joints in the room [m], shape (n, 3).
-        radius: radius of the circles at the joints [m].
+        radius: of the circles of each link [m], shape (n,).
         view: where the viewer is.
         colors: of inner links, of outer links and of edges.
         edge: width of the edges [points].
@@ -97,7 +92,7 @@ def draw_chain(
 
 
 def sprocket_circle(walk: "WalkResult") -> Array | None:
-    """Points of the sprocket's circle x, y, z [m], shape (100, 3); None without one."""
+    """Points of the sprocket's circle at the release x, y, z [m], shape (100, 3); None without one."""
     if walk.sprocket_center is None:
         return None
     angle = np.linspace(0.0, 2 * np.pi, 100)
@@ -105,40 +100,91 @@ def sprocket_circle(walk: "WalkResult") -> Array | None:
     return np.asarray(circle + np.array([*walk.sprocket_center, 0.0]))
 
 
+def draw_release(axes: Axes, walk: "WalkResult", view: Array) -> None:
+    """Dashed, where the sprocket was at the release, if there was one, and how high above the floor."""
+    circle = sprocket_circle(walk)
+    if circle is None:
+        return
+    middle = circle[:-1].mean(axis=0)
+    upright = np.stack([middle, [middle[0], floor_height(walk, middle[0]), middle[2]]])
+    if view is ABOVE:  # from its edge the circle is a line
+        circle = np.stack([circle.min(axis=0), circle.max(axis=0)])
+    title = "sprocket until release" if walk.setup.scene.release is None else "sprocket at the release"
+    for part, label in ((circle, title), (upright, "_")):
+        axes.plot(*(view @ part.T)[:2], color=FAINT, linewidth=1.0, linestyle=DASHES, zorder=1.5, label=label)
+
+
+def sprocket_centers(walk: "WalkResult", times: Array) -> Array:
+    """The sprocket's centre x, y at times since the release [m], shape (t, 2); NaN where it has vanished."""
+    center = (np.nan, np.nan) if walk.sprocket_center is None else walk.sprocket_center
+    return sprocket_places(walk.setup.scene.release, times) + center
+
+
+def draw_sprocket(axes: Axes, walk: "WalkResult", time: float, **style: Any) -> list[Patch]:
+    """The sprocket at a time since the release [s], if it has not vanished."""
+    (center,) = sprocket_centers(walk, np.array([time]))
+    if np.isnan(center[0]):
+        return []
+    style = {"facecolor": GROUND, "edgecolor": FAINT, "zorder": 1.5, **style}
+    return [axes.add_patch(Circle(tuple(center), walk.sprocket_radius, **style))]
+
+
 def walk_box(walk: "WalkResult", joints: Array) -> tuple[Array, Array]:
     """Least and greatest x, y, z of a walk and its sprocket, with a margin; from the floor on [m], each shape (3,)."""
-    parameters = walk.setup.parameters
-    margin = parameters.circle_radius + 2 * max(parameters.circle_radius, parameters.half_width)
+    widest = circle_radii(walk).max()
+    margin = widest + 2 * max(widest, walk.setup.parameters.half_width)
     low, high = joints.min(axis=(0, 1)) - margin, joints.max(axis=(0, 1)) + margin
     circle = sprocket_circle(walk)
     if circle is not None:
         low, high = np.minimum(low, circle.min(axis=0)), np.maximum(high, circle.max(axis=0))
+        moved = sprocket_centers(walk, walk.frame_time)
+        low[:2] = np.fmin(low[:2], np.fmin.reduce(moved) - walk.sprocket_radius)
+        high[:2] = np.fmax(high[:2], np.fmax.reduce(moved) + walk.sprocket_radius)
     low[1] = floor_line(walk, low[0], high[0])[:, 1].min()
     return low, high
 
 
 def floor_line(walk: "WalkResult", left: float, right: float) -> Array:
     """The floor's profile from one x to another [m], shape (p, 2)."""
-    points = floor_points(walk.setup.scene)
-    inner = np.empty((0, 2)) if points is None else points[(points[:, 0] > left) & (points[:, 0] < right)]
-    ends = np.array([left, right])
-    first, last = np.column_stack([ends, floor_height(walk, ends)])
-    return np.vstack([first, inner, last])
+    return walk.setup.floor.line(left, right)
 
 
 def floor_height(walk: "WalkResult", x: Any) -> Any:
     """Height of the floor at x [m]."""
-    points = floor_points(walk.setup.scene)
-    return 0.0 * x if points is None else heights(points, x)
+    return walk.setup.floor.heights(x)
 
 
 def from_floor(walk: "WalkResult", joints: Array) -> Array:
     """Distance of joints x, y from the floor [m], shape (…, n, 2) → (…, n)."""
-    points = floor_points(walk.setup.scene)
-    return joints[..., 1] if points is None else distances(points, joints.reshape(-1, 2)).reshape(joints.shape[:-1])
+    return walk.setup.floor.distances(joints.reshape(-1, 2)).reshape(joints.shape[:-1])
 
 
-def draw_ground(axes: Axes, line: Array, bottom: float) -> None:
-    """The floor along a line from left to right, from the side, down to `bottom` [m]."""
+def stretches(walk: "WalkResult", left: float, right: float) -> list[tuple[str, str, Array]]:
+    """What of the floor has coefficients of its own, between two x [m].
+
+    Returns:
+        For each pair of coefficients a colour, a label, and ends of the straight faces that have it [m], (f, 2, 2).
+    """
+    floor, parameters = walk.setup.floor, walk.setup.parameters
+    points, laws = floor.points.copy(), floor.laws
+    usual = parameters.floor_restitution, parameters.floor_friction
+    own = [law for law in dict.fromkeys(map(tuple, laws.tolist())) if law != usual]
+    if not own:
+        return []
+    ends = np.array([min(left, points[0, 0]), max(right, points[-1, 0])])
+    points[[0, -1]] = np.column_stack([ends, floor.heights(ends)])
+    faces = np.stack([points[:-1], points[1:]], axis=1)
+    in_sight = (faces[:, 0, 0] < right) & (faces[:, 1, 0] > left)
+    colors = colormaps["plasma"](np.linspace(0.6, 0.0, len(own)))
+    found = ((color, law, faces[in_sight & (laws == law).all(axis=1)]) for color, law in zip(colors, own, strict=True))
+    return [(to_hex(color), "e = {:g}, μ = {:g}".format(*law), its) for color, law, its in found if len(its)]
+
+
+def draw_ground(axes: Axes, walk: "WalkResult", line: Array, bottom: float) -> None:
+    """The floor along its `floor_line`, from the side, down to `bottom` [m], with labelled `stretches`."""
     axes.add_patch(Polygon([(line[0, 0], bottom), *line, (line[-1, 0], bottom)], facecolor=GROUND, zorder=3))
     axes.plot(*line.T, color=INK, linewidth=1.0, zorder=3)
+    for color, label, faces in stretches(walk, line[0, 0], line[-1, 0]):
+        axes.add_collection(
+            LineCollection(list(faces), colors=color, linewidths=3.5, label=label, zorder=3), autolim=False
+        )

@@ -4,15 +4,12 @@ Sizes on paper are in inches: constrained layout clips labels of axes with a fix
 would take a third of the time that this figure takes, and every walk has one.
 """
 
-from dataclasses import dataclass
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
@@ -20,16 +17,18 @@ from numpy.typing import NDArray
 from warpchain.pictures.chain import (
     ABOVE,
     SIDE,
+    circle_radii,
     draw_chain,
     draw_ground,
+    draw_release,
+    draw_sprocket,
     floor_height,
     floor_line,
     from_floor,
-    sprocket_circle,
     walk_box,
 )
 from warpchain.pictures.inline import InlineFigure
-from warpchain.pictures.style import DASHES, DOTS, FAINT, GROUND, INK, tidy
+from warpchain.pictures.style import DOTS, GROUND, INK, tidy
 from warpchain.pictures.walk_shape import center_in_room, checked_joints, setting
 from warpchain.status import Status
 
@@ -58,7 +57,9 @@ def film_strip(walk: "WalkResult", figure: Figure | None = None) -> Figure:
 
     In the strip the centre of mass moves equally far from each instant to the next. Above each chain stands its time;
     outer links are darker than inner ones. The close-ups show the first touch of the floor, the first self-contact, the
-    collapse and the end. A chain whose plane tilts is seen from above instead, to the same scale: z grows downwards.
+    collapse and the end, if they happen. A sprocket that goes on after the release is a circle in the chain's colour;
+    stretches of the floor with coefficients of their own are thick and have labels. A chain whose plane tilts is seen
+    from above instead, to the same scale: z grows downwards.
 
     Args:
         walk: a walk with frames.
@@ -70,17 +71,13 @@ def film_strip(walk: "WalkResult", figure: Figure | None = None) -> Figure:
     joints = checked_joints(walk)
     tilts = walk.joints_in_room is not None
     low, high = walk_box(walk, joints)
-    close_ups = [] if tilts else _close_ups(walk)
-    for close_up in close_ups:
-        margin = 0.1 * (close_up.high[1] - close_up.low[1])
-        low[:2] = np.minimum(low[:2], close_up.low + np.array([-margin, margin]))
-        high[:2] = np.maximum(high[:2], close_up.high + margin)
+    moments = [] if tilts else _moments(walk)
     size = high - low
     broad = max(size[2], 0.15 * size[0]) if tilts else 0.0
     across = _WIDTH - _LEFT - _RIGHT
     scale = min(across / size[0], _HIGHEST / size[1], (_DEEPEST - _FLOOR) / (size[1] + broad))
-    close_up_width = min((across + 0.1) / max(1, len(close_ups)), _WIDTH / 3)
-    lower = scale * broad + 0.5 if tilts else (close_up_width - 0.1) / _CLOSE_UP_ASPECT
+    close_up_width = min((across + 0.1) / max(1, len(moments)), _WIDTH / 3)
+    lower = 0.5 + (scale * broad if tilts else (close_up_width - 0.1) / _CLOSE_UP_ASPECT)
     width, height, depth, top = scale * size[0], scale * size[1] + _FLOOR + _CLOCK, _FLOOR / scale, _CLOCK / scale
     paper = np.array([_WIDTH, _TOP + height + _BELOW + lower + _FOOT])
     figure = InlineFigure(tuple(paper)) if figure is None else figure
@@ -93,7 +90,7 @@ def film_strip(walk: "WalkResult", figure: Figure | None = None) -> Figure:
     side = panel(left, bottom, width, height)
     side.set(xlim=(low[0], high[0]), ylim=(low[1] - depth, high[1] + top), xlabel="x / m", ylabel="y / m")
     views = [(setting(walk), side, SIDE)]
-    draw_ground(side, floor_line(walk, low[0], high[0]), low[1] - depth)
+    draw_ground(side, walk, floor_line(walk, low[0], high[0]), low[1] - depth)
     _draw_distance(side, walk, low[1], 0.5 * depth)
     if tilts:
         z = (low[2] + high[2]) / 2 + np.array([0.5, -0.5]) * broad
@@ -105,19 +102,28 @@ def film_strip(walk: "WalkResult", figure: Figure | None = None) -> Figure:
     colors = colormaps["viridis"](0.9 * walk.frame_time / (walk.frame_time[-1] or 1.0))[:, :3]
     center = center_in_room(walk)
     path = np.stack([np.interp(walk.frame_time, walk.time, row) for row in center.T], axis=1)
-    radius = walk.setup.parameters.circle_radius
+    radius = circle_radii(walk)
     shown = _instants(path, float(np.ptp(joints[0, :, 0])))
     for title, axes, view in views:
         for frame in shown:
             draw_chain(axes, joints[frame], radius, view, _link_colors(colors[frame]), edge=0.25)
+            draw_sprocket(axes, walk, walk.frame_time[frame], facecolor="none", edgecolor=colors[frame])
         _draw_way(axes, walk, center, view)
         tidy(axes)
         axes.set_title(title, fontsize="medium", loc="left")
-    for number, close_up in enumerate(close_ups):
-        axes = panel(_LEFT + number * close_up_width, _FOOT, close_up_width - 0.1, lower)
-        draw_chain(axes, joints[close_up.frame], radius, SIDE, _link_colors(colors[close_up.frame]), edge=0.6)
-        _frame_close_up(axes, side, walk, close_up, "abcd"[number], walk.frame_time[close_up.frame])
-    _write_times(side, walk.frame_time[shown], joints[shown, :, :2], colors[shown], 1.2 * radius, 1 / scale)
+    for number, (frame, title, spot) in enumerate(moments):
+        axes = panel(_LEFT + number * close_up_width, _FOOT + 0.5, close_up_width - 0.1, lower - 0.5)
+        half = 0.5 * _CLOSE_UP_LINKS * walk.setup.parameters.link_length
+        line = floor_line(walk, spot[0] - half, spot[0] + half)
+        half_height = half / _CLOSE_UP_ASPECT
+        bottom = max(spot[1] - half_height, line[:, 1].min() - 0.2 * half_height)
+        draw_chain(axes, joints[frame], radius, SIDE, _link_colors(colors[frame]), edge=0.6)
+        draw_sprocket(axes, walk, walk.frame_time[frame], facecolor="none", edgecolor=colors[frame])
+        draw_ground(axes, walk, line, min(bottom, line[:, 1].min()))
+        axes.set(xlim=line[[0, -1], 0], ylim=(bottom, bottom + 2 * half_height), yticks=[], xlabel="x / m")
+        axes.set_xticks([x for x in MaxNLocator(4).tick_values(*line[[0, -1], 0]) if abs(x - spot[0]) < 0.8 * half])
+        axes.set_title(f"{title}, {walk.frame_time[frame]:.3f} s", fontsize="medium", loc="left")
+    _write_times(side, walk.frame_time[shown], joints[shown, :, :2], colors[shown], 1.2 * radius.max(), 1 / scale)
     style: dict[str, Any] = {"frameon": False, "ncols": 2, "borderaxespad": 0.0, "fontsize": "small"}
     place = (1 - _RIGHT / paper[0], 1 - 0.08 / paper[1])
     figure.legend(*side.get_legend_handles_labels(), loc="upper right", bbox_to_anchor=place, **style)
@@ -153,14 +159,7 @@ def _write_times(axes: Axes, times: Array, joints: Array, colors: Array, gap: fl
 
 def _draw_way(axes: Axes, walk: "WalkResult", center: Array, view: Array) -> None:
     """The sprocket, its height above the floor, and the path of the centre of mass."""
-    circle = sprocket_circle(walk)
-    if circle is not None:
-        style: dict[str, Any] = {"color": FAINT, "linewidth": 1.0, "linestyle": DASHES, "zorder": 1.5}
-        middle = circle[:-1].mean(axis=0)
-        upright = np.stack([middle, [middle[0], floor_height(walk, middle[0]), middle[2]]])
-        ends = np.stack([circle.min(axis=0), circle.max(axis=0)])  # from its edge the circle is a line
-        for part, label in ((circle if view is SIDE else ends, "sprocket until release"), (upright, "_")):
-            axes.plot(*(view @ part.T)[:2], label=label, **style)
+    draw_release(axes, walk, view)
     axes.plot(*(view @ center.T)[:2], color=INK, linewidth=1.4, linestyle=DOTS, label="centre of mass", zorder=4)
 
 
@@ -180,38 +179,9 @@ def _draw_distance(axes: Axes, walk: "WalkResult", low: float, depth: float) -> 
     axes.text(x.mean(), y.mean(), text, rotation=-slope, ha="center", va="center", bbox=box, zorder=6)
 
 
-@dataclass(frozen=True)
-class _CloseUp:
-    """Title, number of the frame, and lower left and upper right corner of the picture [m], shape (2,) each."""
-
-    title: str
-    frame: int
-    low: Array
-    high: Array
-
-
-def _frame_close_up(
-    axes: Axes, strip: Axes, walk: "WalkResult", close_up: _CloseUp, letter: str, moment: float
-) -> None:
-    """The floor and the title of a close-up, and its box with a letter in the strip."""
-    (x, y), (right, top) = close_up.low, close_up.high
-    line = floor_line(walk, x, right)
-    draw_ground(axes, line, min(y, line[:, 1].min()))
-    axes.set(xlim=(x, right), ylim=(y, top), xticks=[], yticks=[])
-    axes.set_title(f"{close_up.title}, {moment:.3f} s", fontsize="medium", loc="left", x=0.07)
-    axes.annotate(
-        letter, (0.0, 1.0), xycoords="axes fraction", xytext=(0, 6), textcoords="offset points", weight="bold"
-    )
-    strip.add_patch(Rectangle((x, y), right - x, top - y, fill=False, edgecolor=INK, linewidth=0.8, zorder=5))
-    strip.text(x, top, letter, ha="left", va="bottom", weight="bold", zorder=6, path_effects=_HALO)
-
-
-def _close_ups(walk: "WalkResult") -> list[_CloseUp]:
-    """At most four moments in order of time, no frame twice, whose boxes lie side by side if their spots allow it.
-
-    They are the first touch of the floor, the first self-contact, the collapse and the end, as far as they happen.
-    """
-    joints, radius = walk.frame_joints, walk.setup.parameters.circle_radius
+def _moments(walk: "WalkResult") -> list[tuple[int, str, Array]]:
+    """At most four frames in order of time, no frame twice, with what happens there and where, (2,)."""
+    joints, radius = walk.frame_joints, circle_radii(walk).max()
     above, last = from_floor(walk, joints), len(joints) - 1
     found: dict[int, tuple[str, Array]] = {}
     touching = np.flatnonzero(above.min(axis=1) < 1.02 * radius)
@@ -228,26 +198,7 @@ def _close_ups(walk: "WalkResult") -> list[_CloseUp]:
     middle = np.median(joints[last, :, 0])
     title = "rest" if walk.status is Status.AT_REST else "end"
     found[last] = title, np.array([middle, floor_height(walk, middle)])
-    size = np.array([1.0, 1.0 / _CLOSE_UP_ASPECT]) * _CLOSE_UP_LINKS * walk.setup.parameters.link_length
-    moments = sorted(found.items())
-    middles = _side_by_side(np.array([spot[0] for _, (_, spot) in moments]), size[0])
-    close_ups = []
-    for (frame, (title, spot)), x in zip(moments, middles, strict=True):
-        deepest = floor_line(walk, x - size[0] / 2, x + size[0] / 2)[:, 1].min() - 0.1 * size[1]
-        low = np.array([x, max(spot[1], deepest + size[1] / 2)]) - size / 2
-        close_ups.append(_CloseUp(title, frame, low, low + size))
-    return close_ups
-
-
-def _side_by_side(spots: Array, width: float) -> Array:
-    """Middles of boxes, moved apart where boxes overlap, but at most 0.3 of a box off their spots [m]."""
-    middles = spots.copy()
-    for _ in range(10):
-        for left, right in pairwise(np.argsort(spots, kind="stable")):
-            shift = max(0.0, (width - middles[right] + middles[left]) / 2)
-            middles[[left, right]] += (-shift, shift)
-        middles = np.clip(middles, spots - 0.3 * width, spots + 0.3 * width)
-    return middles
+    return [(frame, *found[frame]) for frame in sorted(found)]
 
 
 def _meeting(joints: Array) -> Array:

@@ -7,7 +7,7 @@ the lines, or the rows of a map if both have many values; all other axes give pa
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 import numpy as np
 from matplotlib import colormaps
@@ -53,17 +53,12 @@ _PANEL_SIZES: Final = {1: (5.2, 3.6), 2: (3.6, 2.9), 3: (3.0, 2.6), 4: (2.6, 2.4
 """Number of columns → width and height of a panel [inches]."""
 
 
-@dataclass(frozen=True, eq=False)
-class Axis:
+class Axis(NamedTuple):
     """An axis of a grid: numbers in rising order, or names in the order given."""
 
     name: str
-    values: Array
-
-    @property
-    def is_numeric(self) -> bool:
-        """Whether the values are numbers."""
-        return self.values.dtype.kind in "if"
+    values: tuple[Any, ...]
+    is_numeric: bool
 
 
 @dataclass(frozen=True)
@@ -84,10 +79,8 @@ class Panel:
 def draw_grid(
     blocks: "Mapping[str, CellStatistics]",
     quantity: str = "dx",
-    kind: Kind | None = None,
     *,
     x: str | None = None,
-    ax: Axes | None = None,
     figure: Figure | SubFigure | None = None,
 ) -> Figure | SubFigure:
     """Draw a quantity over the grids of one block or several.
@@ -98,30 +91,19 @@ def draw_grid(
     Args:
         blocks: name of each block → the statistics of its cells.
         quantity: name of the quantity, for labels.
-        kind: as `x`, `ax`, `figure`, what is returned and errors, see `SweepResult.plot`.
-        x: see there.
-        ax: see there.
+        x: as `figure`, what is returned and errors, see `SweepResult.plot`.
         figure: see there.
 
     Raises:
-        NothingToShow: no block has an axis of several values, or two for a map, or there is no mean.
+        NothingToShow: no block has an axis of several values, or there is no mean.
     """
-    if kind not in (None, "lines", "map"):
-        raise ValueError(f"kind: {kind!r} is unknown; give 'lines', 'map' or None")
-    if ax is not None and figure is not None:
-        raise ValueError("ax: given together with figure; leave one out")
-    panels, left_out = _all_panels(blocks, kind, x)
-    if ax is not None and len(panels) > 1:
-        raise ValueError(f"ax: this figure has {len(panels)} panels; leave ax out, or give figure")
+    panels, left_out = _all_panels(blocks, x)
     label = with_unit(quantity_text(quantity), next(iter(blocks.values())).unit)
     are_lines = all(panel.kind == "lines" for panel in panels)
-    alike = len({(panel.kind, *map(_signature, (panel.across, panel.along))) for panel in panels}) == 1
+    alike = len({(panel.kind, panel.across, panel.along) for panel in panels}) == 1
     columns = len(panels) if len(panels) <= 3 else min(4, math.ceil(len(panels) ** 0.5))
-    if ax is not None:
-        areas, owner = [ax], None
-    else:
-        owner = InlineFigure(figsize=_size(panels, columns), layout="constrained") if figure is None else figure
-        areas, _ = panel_grid(owner, len(panels), columns, sharex=alike, sharey=alike or are_lines)
+    owner = InlineFigure(figsize=_size(panels, columns), layout="constrained") if figure is None else figure
+    areas, _ = panel_grid(owner, len(panels), columns, sharex=alike, sharey=alike or are_lines)
     palettes = _palettes(panels)
     image = None
     for axes, panel in zip(areas, panels, strict=True):
@@ -136,21 +118,21 @@ def draw_grid(
         axes.set_xlabel(f"{name}\n{note}".strip())
         if not (alike or are_lines) or axes in areas[::columns]:
             axes.set_ylabel(quantity_label(panel.along.name) if panel.kind == "map" and panel.along else label)
-    if owner is not None and left_out:
+    if left_out:
         owner.suptitle(f"{len(panels)} of {len(panels) + left_out} panels", fontsize="medium", color=RED)
     if image is not None:
         maps = [axes for axes, panel in zip(areas, panels, strict=True) if panel.kind == "map"]
-        areas[0].figure.colorbar(image, ax=maps, label=label).outline.set_visible(False)
+        owner.colorbar(image, ax=maps, label=label).outline.set_visible(False)
     lines = [axes for axes, panel in zip(areas, panels, strict=True) if panel.kind == "lines"]
     low = min((axes.dataLim.y0 for axes in lines), default=0.0)
     high = max((axes.dataLim.y1 for axes in lines), default=0.0)
     if 0 <= low < 0.5 * high:
         lines[0].set_ylim(0.0, 1.05 * high)
     _draw_legends(owner, areas, panels, palettes)
-    return areas[0].figure if owner is None else owner
+    return owner
 
 
-def _all_panels(blocks: "Mapping[str, CellStatistics]", kind: Kind | None, x: str | None) -> tuple[list[Panel], int]:
+def _all_panels(blocks: "Mapping[str, CellStatistics]", x: str | None) -> tuple[list[Panel], int]:
     """The panels of all blocks, and the number of those that are left out because there are too many."""
     axes = {name: [name for name, values in cells.axes.items() if len(values) > 1] for name, cells in blocks.items()}
     if x is not None and not any(x in own for own in axes.values()):
@@ -159,15 +141,14 @@ def _all_panels(blocks: "Mapping[str, CellStatistics]", kind: Kind | None, x: st
     panels: list[Panel] = []
     left_out = 0
     for name, cells in blocks.items():
-        if len(axes[name]) < (2 if kind == "map" else 1) or (x is not None and x not in axes[name]):
+        if not axes[name] or (x is not None and x not in axes[name]):
             continue
         is_named = sum(set(own) == set(axes[name]) for own in axes.values()) > 1
-        found = list(_panels(cells, kind, x, name if is_named else ""))
+        found = list(_panels(cells, x, name if is_named else ""))
         panels += found[:MOST_PANELS]
         left_out += len(found[MOST_PANELS:])
     if not panels:
-        needed = "two axes of several values" if kind == "map" else "an axis of several values"
-        raise NothingToShow(f"a figure of a grid takes a block with {needed}; give a sweep that has one")
+        raise NothingToShow("a figure of a grid takes an axis of several values; give a sweep that has one")
     if not any(np.isfinite(panel.cells.mean).any() for panel in panels):
         if any(panel.cells.absent.any() for panel in panels):
             raise NothingToShow("no walk has this quantity; give another, such as quantity='walk_time'")
@@ -175,13 +156,14 @@ def _all_panels(blocks: "Mapping[str, CellStatistics]", kind: Kind | None, x: st
     return [each for each in panels if np.isfinite(each.cells.mean).any() or each.cells.failed.any()], left_out
 
 
-def _panels(cells: "CellStatistics", kind: Kind | None, x: str | None, block: str) -> Iterator[Panel]:
+def _panels(cells: "CellStatistics", x: str | None, block: str) -> Iterator[Panel]:
     """The panels of a block; titles begin with `block`, if it is not empty."""
-    given = [Axis(name, np.asarray(values)) for name, values in cells.axes.items()]
-    rising = [np.argsort(axis.values) if axis.is_numeric else np.arange(len(axis.values)) for axis in given]
-    axes = [Axis(axis.name, axis.values[order]) for axis, order in zip(given, rising, strict=True)]
+    numeric = {name: values.dtype.kind in "if" for name, values in cells.axes.items()}
+    rising = [np.argsort(cells.axes[name]) if numeric[name] else np.arange(len(cells.axes[name])) for name in numeric]
+    given = zip(cells.axes.items(), rising, strict=True)
+    axes = [Axis(name, tuple(values[order].tolist()), numeric[name]) for (name, values), order in given]
     several = [axis for axis in axes if len(axis.values) > 1]
-    chosen, across, along, others = _roles(several, kind, x)
+    kind, across, along, others = _roles(several, x)
     order = [several.index(axis) for axis in (*others, along, across) if axis is not None]
 
     def arranged(table: Array) -> Array:
@@ -196,10 +178,10 @@ def _panels(cells: "CellStatistics", kind: Kind | None, x: str | None, block: st
     for place in np.ndindex(*(len(axis.values) for axis in others)):
         title = ", ".join([*[block] * bool(block), *(own[number] for own, number in zip(texts, place, strict=True))])
         here: dict[str, Any] = {name: table[place] for name, table in tables.items()}
-        yield Panel(chosen, across, along, title, replace(cells, **here))
+        yield Panel(kind, across, along, title, replace(cells, **here))
 
 
-def _roles(axes: Sequence[Axis], kind: Kind | None, x: str | None) -> tuple[Kind, Axis, Axis | None, list[Axis]]:
+def _roles(axes: Sequence[Axis], x: str | None) -> tuple[Kind, Axis, Axis | None, list[Axis]]:
     """What the axes of a grid become: kind, x axis, lines or rows, panels."""
 
     def fit(axis: Axis) -> tuple[bool, bool, bool, int]:
@@ -208,19 +190,15 @@ def _roles(axes: Sequence[Axis], kind: Kind | None, x: str | None) -> tuple[Kind
 
     across = max(reversed(axes), key=fit)
     others = [axis for axis in axes if axis is not across]
-    others.sort(key=lambda axis: (kind == "map" and axis.is_numeric, len(axis.values)))
+    others.sort(key=lambda axis: len(axis.values))
     along = others.pop() if others else None
+    kind: Kind = "lines"
     if along is not None and len(along.values) > MOST_LINES:
-        is_short = len(across.values) <= MOST_LINES
-        kind = kind or ("lines" if is_short else "map")
-        if kind == "lines" and is_short and x is None:  # a long axis beside a short one
+        if len(across.values) > MOST_LINES:
+            kind = "map"
+        elif x is None:  # a long axis beside a short one
             across, along = along, across
-    return kind or "lines", across, along, [axis for axis in axes if axis in others]
-
-
-def _signature(axis: Axis | None) -> tuple[object, ...] | None:
-    """Equal for axes that are the same."""
-    return None if axis is None else (axis.name, *axis.values.tolist())
+    return kind, across, along, [axis for axis in axes if axis in others]
 
 
 def _size(panels: Sequence[Panel], columns: int) -> tuple[float, float]:
@@ -232,13 +210,11 @@ def _size(panels: Sequence[Panel], columns: int) -> tuple[float, float]:
 
 def _palettes(panels: Sequence[Panel]) -> dict[str, dict[Any, str]]:
     """Each axis that gives lines → its values in all panels → their colours, from dark to light if they are many."""
-    found: dict[str, list[Axis]] = {}
-    for panel in panels:
-        if panel.along is not None and panel.kind == "lines":
-            found.setdefault(panel.along.name, []).append(panel.along)
+    found = dict.fromkeys(panel.along for panel in panels if panel.along and panel.kind == "lines")
     palettes = {}
-    for name, axes in found.items():
-        values = list(dict.fromkeys(value for axis in axes for value in axis.values.tolist()))
+    for name in dict.fromkeys(axis.name for axis in found):
+        axes = [axis for axis in found if axis.name == name]
+        values = list(dict.fromkeys(value for axis in axes for value in axis.values))
         values = sorted(values) if all(axis.is_numeric for axis in axes) else values
         colors = list(LINE_COLORS)
         if len(values) > MOST_LINES:
@@ -249,9 +225,9 @@ def _palettes(panels: Sequence[Panel]) -> dict[str, dict[Any, str]]:
 
 def _draw_lines(axes: Axes, panel: Panel, palette: Mapping[Any, str]) -> None:
     """The lines of a panel with their bars; names along x have the points of several lines side by side."""
-    cells, values, is_numeric = panel.cells, panel.across.values, panel.across.is_numeric
+    cells, values, is_numeric = panel.cells, np.array(panel.across.values), panel.across.is_numeric
     count = len(cells.mean)
-    colors = [palette[value] for value in panel.along.values.tolist()] if panel.along else [BLUE]
+    colors = [palette[value] for value in panel.along.values] if panel.along else [BLUE]
     shifts = np.zeros(count) if is_numeric else (np.arange(count) - (count - 1) / 2) * 0.7 / count
     places = values if is_numeric else np.arange(len(values))
     for number, (shift, color) in enumerate(zip(shifts, colors, strict=True)):
@@ -307,7 +283,7 @@ def _draw_map(axes: Axes, panel: Panel, limits: tuple[float, float]) -> Any:
 
 
 def _draw_legends(
-    owner: Figure | SubFigure | None,
+    owner: Figure | SubFigure,
     areas: Sequence[Axes],
     panels: Sequence[Panel],
     palettes: Mapping[str, Mapping[Any, str]],
@@ -334,9 +310,7 @@ def _draw_legends(
     if any(panel.cells.failed.any() for panel in panels):
         marker = "x" if panels[0].kind == "lines" else "o"
         handles.append(Line2D([], [], color=RED, marker=marker, linestyle="", label="walks failed"))
-    place: dict[str, Any] = {}
-    if owner is not None:
-        beside = any(panel.along for panel in panels if panel.kind == "lines")
-        place = {"loc": "outside right upper", "ncols": 1} if beside else {"loc": "outside upper right", "ncols": 2}
+    beside = any(panel.along for panel in panels if panel.kind == "lines")
+    place: Any = {"loc": "outside right upper", "ncols": 1} if beside else {"loc": "outside upper right", "ncols": 2}
     if handles:
-        (areas[0] if owner is None else owner).legend(handles=handles, title=title, **style, **place)
+        owner.legend(handles=handles, title=title, **style, **place)

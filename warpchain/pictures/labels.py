@@ -1,7 +1,7 @@
 """Texts on figures and in tables: numbers, units, quantities, cells, and walks that are in no mean."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.sections import SECTION_OF
 from warpchain.inputs.validation import DIMENSIONLESS, FIELDS, field_unit, short
+
+if TYPE_CHECKING:
+    from warpchain.store.cell_statistics import CellStatistics
 
 _SYMBOLS: Final = {"dx": "Δx", "links": "n", "frequency": "ν"}
 """The paper's symbols of what is not in Table 1."""
@@ -110,6 +113,23 @@ def cell_text(values: Mapping[str, Any]) -> str:
     """
     texts = (f"{axis_symbol(name)} = {value_text(value)} {unit_text(name)}" for name, value in values.items())
     return ", ".join(text.rstrip() for text in texts)
+
+
+def cell_table(found: "CellStatistics") -> tuple[list[str], Iterator[list[str]]]:
+    """Head and rows of a table: mean and spread of the distance in each cell, and numbers of walks."""
+    lengths = {"mean Δx / m": found.mean, "s.d. / m": found.sd, "s.e. / m": found.standard_error}
+    counts = {"at rest": found.count, "failed": found.failed}
+    counts |= {"ended as asked": found.absent} if found.absent.any() else {}
+    counts |= {"not run yet": found.missing} if found.missing.any() else {}
+    rows = (
+        [
+            *(value_text(value) for value in cell_values(found.axes, place).values()),
+            *(f"{values[place]:.4f}".replace("nan", "–") for values in lengths.values()),
+            *(f"{values[place]}" for values in counts.values()),
+        ]
+        for place in np.ndindex(*found.mean.shape)
+    )
+    return [*(with_unit(axis_symbol(name), unit_text(name)) for name in found.axes), *lengths, *counts], rows
 
 
 def lost_note(cells: Sequence[Mapping[str, Any]]) -> str:

@@ -12,9 +12,8 @@ from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from warpchain.inputs.scene import floor_points
 from warpchain.loop.stationary_loop import StationaryLoop
-from warpchain.pictures.chain import floor_height
+from warpchain.pictures.chain import floor_height, stretches
 from warpchain.pictures.film_strip import film_strip
 from warpchain.pictures.inline import InlineFigure
 from warpchain.pictures.style import BLUE, DASHES, DOTS, FAINT, GREEN, GROUND, INK, RED, tidy
@@ -60,17 +59,23 @@ def draw(walk: "WalkResult", kind: Kind, *, figure: Figure | None = None, ax: Ax
 def _height_and_speed(walk: "WalkResult", figure: Figure) -> None:
     """Height and horizontal speed of the centre of mass against time since the release, as in Figure 5.
 
-    A thin line is the height of a floor that is not flat, below the centre of mass.
+    A thin line is the height of a floor that is not flat, below the centre of mass; it is thick and has a label where
+    the floor has coefficients of its own.
     """
     height, speed = figure.subplots(2, 1, sharex=True)
     height.plot(walk.time, walk.center[:, 1], color=BLUE, linewidth=1.4)
     speed.plot(walk.time, walk.center_velocity[:, 0], color=BLUE, linewidth=1.4)
     height.set_ylabel("height $y^\\mathrm{cm}$ / m")
     speed.set_ylabel("speed $v_x^\\mathrm{cm}$ / (m/s)")
-    if floor_points(walk.setup.scene) is None:
+    if walk.setup.scene.is_level:
         height.set_ylim(bottom=0.0)
     else:
-        height.plot(walk.time, floor_height(walk, walk.center[:, 0]), color=FAINT, linewidth=0.8)
+        x, floor = walk.center[:, 0], floor_height(walk, walk.center[:, 0])
+        height.plot(walk.time, floor, color=FAINT, linewidth=0.8)
+        for color, label, faces in stretches(walk, x.min(), x.max()):
+            is_above = ((faces[:, 0, 0, None] <= x) & (x < faces[:, 1, 0, None])).any(axis=0)
+            height.plot(walk.time, np.where(is_above, floor, np.nan), color=color, linewidth=3.5, label=label)
+            height.legend(frameon=False)
     _finish(walk, height, speed)
 
 
@@ -165,7 +170,7 @@ def _loop(walk: "WalkResult", figure: Figure) -> None:
     inset = IN_LINKS * loop.parameters.link_length
     inside = (loop.s > loop.free[0] + inset) & (loop.s < loop.free[1] - inset)
     _draw_line(pull, "effective_tension", loop, inside)
-    carried = loop.parameters.density * loop.speed**2
+    carried = loop.density * loop.speed**2
     pull.set_title(f"$\\rho v^2$ = {carried:.2f} N", fontsize="small", loc="left")
     pull.set(xlim=(loop.free[0] - 0.03, loop.free[1] + 0.03), ylabel="tension $T - \\rho v^2$ / N")
     pull.set_xlabel("arc length $s$ from the lowest point, along the motion / m")

@@ -13,7 +13,7 @@ from warpchain.pictures.style import BLUE, INK, LINE_COLORS, RED, NothingToShow,
 from warpchain.status import Status
 from warpchain.store.block_result import BlockResult
 from warpchain.store.sweep_result import SweepResult
-from warpchain.sweeps.designs import saltelli_outputs, sobol_indices, walks_per_sample
+from warpchain.sweeps.designs import sobol_indices, walks_per_sample
 
 Array = NDArray[np.float64]
 
@@ -63,14 +63,15 @@ def _sensitivities(block: BlockResult, name: str) -> Iterator[Sensitivity]:
     """The cells of a block, named so, that have two complete samples of different distances."""
     for place in np.ndindex(*block.shape[:-1]):
         rested = block.columns["status"][place] == Status.AT_REST
-        outputs = saltelli_outputs(np.where(rested, block.columns["dx"][place], np.nan), len(block.drawn))
-        samples = outputs["f_A"].shape[1]
-        indices = np.array(sobol_indices(outputs))
+        walks = np.where(rested, block.columns["dx"][place], np.nan)
+        whole = walks.reshape(-1, walks_per_sample("saltelli", len(block.drawn)))
+        complete = whole[np.isfinite(whole).all(axis=1)]
+        samples, indices = len(complete), np.array(sobol_indices(complete))
         if samples < 2 or not np.isfinite(indices).all():
             continue
         rng = random_generator(0)
         draws = (rng.integers(0, samples, samples) for _ in range(_RESAMPLES))
-        resampled = [sobol_indices({key: values[..., draw] for key, values in outputs.items()}) for draw in draws]
+        resampled = [sobol_indices(complete[draw]) for draw in draws]
         # The indices are NaN for a resample without variance, which repeats a single sample.
         intervals = np.nanpercentile(resampled, (50 * (1 - CONFIDENCE), 50 * (1 + CONFIDENCE)), axis=0)
         cell = cell_text(cell_values(block.axes, place))
@@ -80,7 +81,7 @@ def _sensitivities(block: BlockResult, name: str) -> Iterator[Sensitivity]:
             indices=indices,
             intervals=intervals.transpose(1, 2, 0),
             samples=samples,
-            lost=block.shape[-1] // walks_per_sample("saltelli", len(block.drawn)) - samples,
+            lost=len(whole) - samples,
         )
 
 

@@ -1,4 +1,4 @@
-"""Figures of sweeps: the paper's Figure 6, grids, sensitivity, how walks ended.
+"""Figures of sweeps: the paper's Figure 6, grids, sensitivity.
 
 Means and standard deviations are those of the walks that came to rest. The number of walks that failed, or have not
 been run yet, is on the figure.
@@ -13,7 +13,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from warpchain.pictures.grid_figure import draw_grid
@@ -31,7 +30,6 @@ from warpchain.pictures.style import (
     tidy,
 )
 from warpchain.reports.sensitivity import sensitivity
-from warpchain.status import Status
 from warpchain.store.block_result import BlockResult
 from warpchain.store.sweep_result import SweepResult
 from warpchain.walks.rows import quantity_of
@@ -86,8 +84,6 @@ def figures(result: SweepResult, quantity: str = "dx") -> Iterator[Picture]:
             text = quantity_name(quantity_of(quantity))
             caption = f"{text[:1].upper()}{text[1:]} against {words}: means of the walks at rest."
             yield Picture(f"{'distance' if quantity == 'dx' else quantity}_{over}", caption, figure)
-    if quantity == "dx" and len([count for count in result.summary().values() if count]) > 1:
-        yield status_counts(result)
 
 
 def _varied(block: BlockResult) -> list[str]:
@@ -169,20 +165,3 @@ def figure6(result: SweepResult) -> Picture:
         figure.legend(handles=handles, loc="outside upper center", ncols=columns, frameon=False, fontsize="small")
     caption = "Distance walked against the frequency of the sprocket, as in the paper's Figure 6: mean, box of one and "
     return Picture("distance", caption + "bar of two standard deviations.", figure)
-
-
-def status_counts(result: SweepResult) -> Picture:
-    """Number of walks by status, missing ones included."""
-    counts = {label: count for label, count in result.summary().items() if count}
-    figure = Figure(figsize=(7.0, 0.9 + 0.32 * len(counts)), layout="constrained")
-    axes = figure.subplots()
-    texts = ["not run yet" if label == "missing" else label.replace("_", " ") for label in counts]
-    colors = [{Status.AT_REST.label: BLUE, "missing": FAINT}.get(label, RED) for label in counts]
-    bars = axes.barh(texts, list(counts.values()), 0.7, color=colors)
-    axes.bar_label(bars, [f" {count:,} ({count / result.walk_count:.2%})" for count in counts.values()], color=INK)
-    axes.invert_yaxis()
-    axes.margins(x=0.22)
-    axes.xaxis.set_major_locator(MaxNLocator(6, integer=True))
-    axes.set_xlabel("walks")
-    tidy(axes)
-    return Picture("status_counts", "How the walks ended.", figure)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from warpchain.files import Kind, checked_output, write_whole
 from warpchain.inputs.validation import short
 from warpchain.pictures.inline import image, png
-from warpchain.pictures.labels import axis_symbol, cell_text, cell_values, unit_text, value_text, with_unit
+from warpchain.pictures.labels import cell_table, cell_text, cell_values, unit_text
 from warpchain.status import Status
 from warpchain.store.block_result import BlockResult
 from warpchain.store.manifest import Folder
@@ -119,21 +119,9 @@ def _cells(result: SweepResult) -> str:
     ]
     for block in result.blocks.values():
         found = block.statistics("dx")
-        head = [with_unit(axis_symbol(name), unit_text(name)) for name in block.axes]
-        lengths = {"mean Δx / m": found.mean, "s.d. / m": found.sd, "s.e. / m": found.standard_error}
-        counts = {"at rest": found.count, "failed": found.failed}
-        counts |= {"ended as asked": found.absent} if found.absent.any() else {}
-        counts |= {"not run yet": found.missing} if found.missing.any() else {}
-        rows = [
-            [
-                *(value_text(value) for value in cell_values(block.axes, place).values()),
-                *(_meters(float(values[place])) for values in lengths.values()),
-                *(f"{values[place]}" for values in counts.values()),
-            ]
-            for place in np.ndindex(*block.shape[:-1])
-        ]
+        head, rows = cell_table(found)
         parts += [f"<h3>{escape(block.name)}</h3>"] * (len(result.blocks) > 1)
-        parts.append(_table([*head, *lengths, *counts], rows, numeric=True, marked=found.failed.ravel() > 0))
+        parts.append(_table(head, rows, numeric=True, marked=found.failed.ravel() > 0))
     return "\n".join(parts)
 
 
@@ -164,7 +152,7 @@ def _walk(result: SweepResult, index: int, device: str | None) -> str:
     from warpchain.walks.one_walk import run_walk
 
     block, place = result.located(index)
-    sweep = block.sweep_at(place)
+    sweep = result.origin
     planned = (sweep if device is None else on_device(sweep, device)).planned(index)
     cell = cell_values(block.axes, place[:-1])
     names = [f"block {block.name}"] * (len(result.blocks) > 1) + [cell_text(cell)] * bool(cell)
@@ -175,7 +163,7 @@ def _walk(result: SweepResult, index: int, device: str | None) -> str:
     else:
         walk = run_walk(planned.setup, frame_interval=FRAME_INTERVAL)
         again, source = ", run again for this page", _compared(walk, block, place)
-    distance = f"Δx = {walk.dx:.4f} m in {walk.walk_time:.2f} s with {walk.bounces} bounces"
+    distance = f"Δx = {walk.dx:.4f} m in {walk.walk_time:.2f} s with {walk.bounces} bounce{'s' * (walk.bounces != 1)}"
     end = distance if math.isfinite(walk.dx) else walk.status.label
     text = f"Walk {index} ({', '.join(names)}){again}: {end}. {source}"
     parts = [f"<p>{escape(text)}</p>", _player(walk)]
@@ -229,11 +217,6 @@ def _provenance(result: SweepResult) -> str:
     rows.append(["this page", f"warpchain {VERSION}"])
     again = "<p>With the text under Sweep in a file: <code>warpchain sweep FILE.yaml -o DIR</code></p>"
     return _table(["", ""], rows) + again
-
-
-def _meters(length: float) -> str:
-    """A length [m] to tenths of a millimetre, a dash for none."""
-    return f"{length:.4f}" if math.isfinite(length) else "–"
 
 
 def _page(title: str, tiles: Mapping[str, tuple[int, str]], sections: Mapping[str, str]) -> str:

@@ -1,6 +1,7 @@
 """The progress of a sweep, shown where somebody looks: in a terminal or in a notebook."""
 
 import contextlib
+import math
 import shutil
 import sys
 import time
@@ -59,19 +60,24 @@ def counts_text(progress: SweepProgress) -> str:
 
 
 @contextlib.contextmanager
-def changing_line(in_terminals: bool = True) -> Iterator[Callable[[str], None] | None]:
-    """Yield a function that shows a text in the place of the one before; None without a terminal and a notebook."""
+def changing_line(in_terminals: bool = True, every: float = math.inf) -> Iterator[Callable[[str], None]]:
+    """Yield a function that shows a text in the place of the one before.
+
+    Without a terminal and a notebook it prints a line on standard error, so often [s], by default never.
+    """
     in_notebook = type(sys.stdout).__module__.startswith("ipykernel")
-    if not in_notebook and not (in_terminals and sys.stderr.isatty()):
-        yield None
-        return
-    stream, shown = sys.stdout if in_notebook else sys.stderr, False
+    stays = not in_notebook and not (in_terminals and sys.stderr.isatty())
+    stream, last, shown = sys.stdout if in_notebook else sys.stderr, time.monotonic(), False
 
     def show(text: str) -> None:
-        nonlocal shown
-        room = shutil.get_terminal_size((120, 24)).columns - 1
-        print(f"\r{text[:room]:{room}}", end="", file=stream, flush=True)
-        shown = True
+        nonlocal last, shown
+        if not stays:
+            room = shutil.get_terminal_size((120, 24)).columns - 1
+            print(f"\r{text[:room]:{room}}", end="", file=stream, flush=True)
+            shown = True
+        elif time.monotonic() - last >= every:
+            print(text, file=stream, flush=True)
+            last = time.monotonic()
 
     try:
         yield show
@@ -82,22 +88,9 @@ def changing_line(in_terminals: bool = True) -> Iterator[Callable[[str], None] |
 
 @contextlib.contextmanager
 def progress_bar() -> Iterator[OnProgress]:
-    """Yield a function that shows progress as a bar; without a terminal and a notebook it prints a line a minute."""
-    last = time.monotonic()
-
-    def log(progress: SweepProgress) -> None:
-        nonlocal last
-        if time.monotonic() - last >= LINE_EVERY:
-            print(progress_text(progress), file=sys.stderr, flush=True)
-            last = time.monotonic()
-
-    with changing_line() as show:
-        if show is None:
-            yield log
-        else:
-            yield lambda progress: show(
-                f"[{'#' * (10 * progress.done // progress.walks):10}] {progress_text(progress)}"
-            )
+    """Yield a function that shows progress as a bar, without a terminal and a notebook once a minute."""
+    with changing_line(every=LINE_EVERY) as show:
+        yield lambda progress: show(progress_text(progress))
 
 
 def progress_text(progress: SweepProgress) -> str:
@@ -106,7 +99,8 @@ def progress_text(progress: SweepProgress) -> str:
         return COMPILING
     left = "" if progress.time_left is None else f"   {duration_text(progress.time_left)} left"
     rate = f"{progress.rate:.2f} a second{left}"
-    return f"{progress.done:,} of {progress.walks:,} walks   {rate}   {counts_text(progress)}"
+    bar = f"[{'#' * (10 * progress.done // progress.walks):10}]"
+    return f"{bar} {progress.done:,} of {progress.walks:,} walks   {rate}   {counts_text(progress)}"
 
 
 def walk_progress_text(progress: Progress) -> str:

@@ -1,6 +1,7 @@
 """The motion of any given chain: what tests and analysts use."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -10,15 +11,13 @@ from pydantic import Field
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import gpu_turn
 from warpchain.engine.tallies import LOST
-from warpchain.inputs.floor import check_above
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.scene import Scene, check_links_on_gpu, floor_body, floor_points, link_values
+from warpchain.inputs.scene import Scene, check_links_on_gpu
 from warpchain.inputs.sections import takes_fields
 from warpchain.inputs.state import State, checked_array
 from warpchain.inputs.validation import InputError, checked, plain, shown, validated
 from warpchain.status import Status
-from warpchain.walks.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
@@ -30,6 +29,39 @@ _UNSOFTENED = {"soften_pile": False, "soften_drive": False}
 """A given chain has no phases in which joints soften."""
 
 
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Trajectory:
+    """Motion of a chain of n links at t chosen instants, as `warpchain.simulate` returns it.
+
+    Attributes:
+        status: how the simulation ended.
+        time: instants [s], shape (t,).
+        position: x, y [m] and θ [rad] of each link's centre of mass, shape (t, n, 3).
+        velocity: their rates [m/s, m/s, rad/s], shape (t, n, 3).
+        steps_accepted: number of accepted steps.
+        steps_rejected: number of rejected steps.
+        impulses: number of impulses by kind of contact.
+        losses: energy lost by cause [J], positive.
+        greatest_opening: greatest distance between two joined link ends [m].
+        greatest_penetration: greatest overlap by kind of contact [m].
+    """
+
+    status: Status
+    time: Array
+    position: Array
+    velocity: Array
+    steps_accepted: int
+    steps_rejected: int
+    impulses: dict[str, int]
+    losses: dict[str, float]
+    greatest_opening: float
+    greatest_penetration: dict[str, float]
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"<Trajectory of {self.position.shape[1]} links, {len(self.time)} instants: {self.status.label}>"
+
+
 @takes_fields("options", without=("soften_pile", "soften_drive"))
 def simulate(
     parameters: State | Parameters | str,
@@ -38,7 +70,7 @@ def simulate(
     duration: float | None = None,
     *,
     times: Sequence[float] | Array | None = None,
-    floor: bool | Sequence[Sequence[float]] | Array | None = None,
+    floor: Any = None,
     gravity: bool = True,
     self_contact: bool = True,
     method: str = "rkf78",
@@ -56,8 +88,8 @@ def simulate(
         duration: Simulated time [s], from time 0, which is that of the state.
         times: Instants of the trajectory [s], rising, in [0, duration]; steps land on them exactly. Default: 101
             instants evenly spread.
-        floor: True (at y = 0), False (none) or points ``[[x, y], …]`` [m] like ``floor`` of a scene; None: that of the
-            state's scene, for arrays at y = 0.
+        floor: True (at y = 0), False (none) or what ``floor`` of a scene may be, such as points ``[x, y]`` [m] or
+            ``[x, y, e, μ]``; None: that of the state's scene, for arrays at y = 0.
         gravity: Whether gravity acts.
         self_contact: Whether links touch one another.
         method: A key of ``warpchain.inputs.methods.METHODS``, such as ``"dp5"``.
@@ -83,9 +115,10 @@ def simulate(
     state = _checked_state(parameters, position, velocity)
     scene = state.setup.scene
     if floor is not None:
-        scene = validated(Scene, {} if isinstance(floor, bool) else {"floor": floor}, "")
-    points = floor_points(scene)
+        given = {"floor": "flat" if isinstance(floor, bool) else floor, "slope": 0.0}
+        scene = validated(Scene, {**vars(scene), **given}, "")
     chain = state.parameters if gravity else state.parameters.with_values({"gravity": 0.0})
+    setup = replace(state.setup, scene=scene, parameters=chain)
     check_links_on_gpu(state.links, options.device, "position")
     instants = _checked_times(end, times)
     if len(instants) * state.links > MOST_PLACES:
@@ -94,10 +127,12 @@ def simulate(
             f"give at most {MOST_PLACES // state.links}"
         )
     if floor is not False and not (floor is None and state.is_placed_as_in(state.setup)):
-        check_above(points, state.position, chain.link_length, "position")
+        setup.floor.check_above(state.position, chain.link_length, "position")
     with gpu_turn([options.device]):
-        body = "none" if floor is False else floor_body(scene)
-        return _follow(options, state, chain, instants, end, body, points)
+        batch = Batch(1, state.links, options, faces=len(setup.floor.laws))
+        batch.set_up(0, setup)
+        batch.load(0, state.position, state.velocity, stop_time=instants[0], stop_status=Status.FINISHED)
+        return _follow(batch, "none" if floor is False else setup.floor.body, instants, end)
 
 
 def _checked_state(given: State | Parameters | str, position: Array | None, velocity: Array | None) -> State:
@@ -188,7 +223,7 @@ class Chains:
         numbers = self._numbers(chains)
         rates = checked_array(velocity, "velocity", len(numbers), self._links, 3)
         if numbers:
-            self._batch.set_velocities(numbers, rates)
+            self._batch.place(numbers, self.motions(numbers)[0], rates)
 
     def run(
         self,
@@ -224,15 +259,8 @@ class Chains:
         return list(range(count)) if numbers is None else numbers
 
 
-def _follow(
-    options: Options, state: State, chain: Parameters, instants: Array, end: float, body: str, points: Array | None
-) -> Trajectory:
-    """Integrate a chain whose values are checked, see `simulate`; ``chain``: the state's parameters, or weightless."""
-    batch = Batch(1, state.links, options, faces=1 if points is None else len(points) - 1)
-    batch.set_chain(0, chain, state.links, own=link_values(state.setup.scene, state.parameters))
-    if points is not None:
-        batch.set_floor(0, points, chain)
-    batch.load(0, state.position, state.velocity, stop_time=instants[0], stop_status=Status.FINISHED)
+def _follow(batch: Batch, body: str, instants: Array, end: float) -> Trajectory:
+    """Carry the chain of a batch on from instant to instant until the end [s]; ``body``: its floor."""
     features = batch.features(fixed_body=body)
     reached, positions, velocities = [], [], []
     for instant in instants:

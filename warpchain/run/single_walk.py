@@ -94,7 +94,7 @@ def walk(
             frame_interval=frame_interval,
             record_before=record_before,
             record_loads=loads,
-            on_progress=on_progress or (show and (lambda progress: show(walk_progress_text(progress)))),
+            on_progress=on_progress or (lambda progress: show(walk_progress_text(progress))),
         )
 
 

@@ -5,11 +5,13 @@ any executor in the style of ``concurrent.futures`` will do, on this machine or 
 """
 
 import concurrent.futures
-import contextlib
+import itertools
 import os
 import re
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Final, TypeVar
 
@@ -17,7 +19,6 @@ import numpy as np
 from pydantic import Field
 
 from warpchain.engine.devices import gpu_turn, has_gpu_turn, start_device
-from warpchain.engine.kernel_choice import shared_threads
 from warpchain.engine.processors import processors
 from warpchain.inputs.options import Options, on_gpu
 from warpchain.inputs.sections import SECTION_OF, by_section, takes_fields
@@ -30,9 +31,11 @@ from warpchain.store.folder import SweepFolder
 from warpchain.store.manifest import Shard
 from warpchain.store.shards import read_shard, write_shard
 from warpchain.store.sweep_result import SweepResult, load
+from warpchain.sweeps.axes import is_axis
 from warpchain.sweeps.plan import PlannedWalk, Sweep, load_sweep
 from warpchain.sweeps.sweep_file import VERSION, BlockKeys
-from warpchain.walks.rows import LENGTHS, MISSING, derived_columns, faults_of_columns, fill_row, missing_rows
+from warpchain.walks.faults import LENGTHS
+from warpchain.walks.rows import MISSING, derived_columns, faults_of_columns, fill_row, missing_rows
 from warpchain.walks.scheduler import compile_kernels, run_setups
 
 T = TypeVar("T")
@@ -45,6 +48,8 @@ GPU_TASK_WALKS = 262144
 """Upper bound on the walks of a GPU's task, about; the GPU idles while the last walks finish."""
 POLL = 1.0
 """Time [s] between two checks for shards that tasks under way have written."""
+PASSES = 8
+"""Times that a sweep on a CPU is gone through."""
 SHARDS = 32
 """Least number of shards of a sweep, about, if it has as many walks: the grain of a restart.
 
@@ -76,7 +81,8 @@ def sweep(
         out: Folder of the results. A sweep that was killed goes on where it was, and leaves the same bytes. A sweep
             with more samples than the folder, and else the same, adds them; latin hypercubes do not grow.
         settings: Whatever :func:`walk` takes; a list, an array or a range ``{"from":, "to":, "step":}`` is an axis of
-            the grid. The last axis varies fastest. Beside these the keys of a sweep file:
+            the grid, and so are names with floors, releases or lists of numbers for links. The last axis varies
+            fastest. Beside these the keys of a sweep file:
         grid: Further axes, which come before those of the settings.
         points: Parameter sets, as a table or a mapping: quantity → its value in each set. They are one more axis,
             ``point``, beside the grid.
@@ -113,7 +119,7 @@ def sweep(
     if hasattr(executor, "get_executor"):
         count = count or sum(executor.nthreads().values())
         executor = executor.get_executor(pure=False)  # pure: a task that failed would fail again, unrun
-    with contextlib.ExitStack() as shown:
+    with ExitStack() as shown:
         if on_progress is None:
             on_progress = shown.enter_context(progress_bar()) if progress else lambda progress: None
         _run_in_folder(planned, folder, executor, count, fresh, own, on_progress)
@@ -178,7 +184,7 @@ def sweep_of_keywords(given: Mapping[str, object], out: str | os.PathLike[str] |
     if isinstance(content.get("preset"), list):
         values = {"preset": content.pop("preset"), **values}
     for name, value in by_name(values).items():
-        key = "grid" if isinstance(value, list | dict) else SECTION_OF[name]
+        key = "grid" if is_axis(name, value) else SECTION_OF[name]
         others = content.setdefault(key, {})
         if isinstance(others, dict):  # the check of the content refuses anything else
             if name in by_name(others):
@@ -210,32 +216,33 @@ def _run_in_folder(
     report: OnProgress,
 ) -> None:
     """Run what is missing in a folder."""
-    at_once = workers or processors()
+    kinds, pulse, at_once = kinds_of(planned), None, workers or processors()
     if executor is None:
-        kinds = _Kinds(planned)
-        if has_gpu_turn() and any(map(on_gpu, kinds.devices)):
+        devices = {setup.options.device for setup in kinds}
+        if has_gpu_turn() and any(map(on_gpu, devices)):
             raise InputError("device: this thread is in the middle of a walk on a GPU; begin a sweep when it is over")
-        for device in kinds.devices:
+        for device in devices:
             start_device(device)  # refuses one that is not there before anything is written
-        if kinds.on_gpu:
+        if all(map(on_gpu, devices)):
             at_once = 1  # the others would wait for it
     size = shard_size(planned.walk_count)
-    with SweepFolder.open(folder, planned, fresh=fresh, shard_size=size, part=part) as store:
+    with SweepFolder.open(folder, planned, fresh=fresh, shard_size=size, part=part) as store, ExitStack() as held:
         missing = store.missing()
         walks = sum(map(len, store.manifest.wanted))
         before = walks - sum(map(len, missing))
         progress = SweepProgress(walks=walks, done=before, before=before)
         store.log(f"{len(missing)} shards to do, {before} of {walks} walks done")
+        if missing and executor is None:
+            progress.compiling = True
+            report(progress)
+            compile_kernels(kinds, walks - before)
+            progress.compiling = False
+            executor, pulse = held.enter_context(pulsing_threads(at_once))
         if missing:
-            if executor is not None:
-                _run(executor, None, planned, store, missing, at_once, progress, report)
-            else:
-                progress.compiling = True
-                report(progress)
-                prepare(planned)
-                progress.compiling = False
-                with pulsing_threads(at_once) as (threads, pulse):
-                    _run(threads, pulse, planned, store, missing, at_once, progress, report)
+            tasks = _tasks(planned, missing, at_once if pulse is None else 1)  # threads take turns on a GPU
+            where = str(store.directory), store.stamp
+            submitted = (executor.submit(run_shards, planned, *where, tuple(task), pulse) for task in tasks)
+            _follow(submitted, 2 * at_once, pulse, planned, store, missing, progress, report)
         counts = counts_text(progress) or "nothing to do"
         store.log(f"complete after {progress.seconds:.1f} s: {counts}")
 
@@ -251,13 +258,14 @@ def on_device(planned: Sweep, device: str) -> Sweep:
     """
     if any("device" in block.varied for block in planned.blocks):
         raise InputError(f"device: {device} is given, but the sweep's grid goes over devices; leave one of them out")
-    canonical = planned.canonical()
-    for block, content in zip(planned.blocks, canonical["blocks"], strict=True):
-        first = {name: values[0] for name, values in block.varied.items() if name in Options.model_fields}
-        given = {**block.sections["options"], **first, "device": device}
-        options = validated(Options, given, "options").model_dump()
-        content["options"] = {name: options[name] for name in content["options"]}
-    return load_sweep(canonical)
+    validated(Options, {"device": device}, "options")
+    blocks = []
+    for block in planned.blocks:
+        options = {**block.sections["options"], "device": device}
+        blocks.append(replace(block, sections={**block.sections, "options": options}))
+    moved = replace(planned, blocks=tuple(blocks))
+    moved.check()
+    return moved
 
 
 def shard_size(walks: int) -> int:
@@ -265,14 +273,7 @@ def shard_size(walks: int) -> int:
     return max(1, min(SHARD_WALKS, walks // SHARDS))
 
 
-def run_shards(
-    planned: Sweep,
-    directory: str,
-    stamp: str,
-    shards: Sequence[Shard],
-    threads: int | None = None,
-    pulse: Pulse | None = None,
-) -> None:
+def run_shards(planned: Sweep, directory: str, stamp: str, shards: Sequence[Shard], pulse: Pulse | None = None) -> None:
     """Run the walks of some shards and write each shard as soon as its walks are over; what a worker does.
 
     Args:
@@ -280,7 +281,6 @@ def run_shards(
         directory: The sweep's folder.
         stamp: What the folder has to be, see `SweepFolder.stamp`.
         shards: The shards.
-        threads: Of every block on a GPU; None: as many as its chain needs.
         pulse: Counts the walks that are over, and stops the work: unfinished shards are not written.
     """
     stop = None if pulse is None else pulse.stop
@@ -296,10 +296,8 @@ def run_shards(
         return under_way[number].setup
 
     with gpu_turn((setup.options.device for setup in setups), stop):
-        # all at once, and in this process: a walk that needs one would wait for it alone
-        kinds = _Kinds(planned)
-        compile_kernels(kinds.setups if kinds.on_gpu else setups, threads)
-        for number, run in run_setups(setups, draw=draw, keeps=keeps, threads=threads, stop=stop):
+        compile_kernels(setups)  # all at once: a walk that needs one would wait for it alone
+        for number, run in run_setups(setups, draw=draw, keeps=keeps, stop=stop):
             shard, row = places[number]
             if pulse is not None:
                 pulse.beat()
@@ -310,85 +308,48 @@ def run_shards(
                 write_shard(directory, stamp, shard, rows.pop(shard), motions.pop(shard))
 
 
-def prepare(planned: Sweep) -> None:
-    """Load every kernel that the walks of a sweep need into this process, compiled if need be."""
-    kinds = _Kinds(planned)
-    compile_kernels(kinds.setups, kinds.threads)
+def kinds_of(planned: Sweep) -> list[Setup]:
+    """Setups with all options, numbers of links and starts that walks of a sweep have, but not with all else."""
+    axes = (*Options.model_fields, "links", "start", "plane")
+    return [setup for block in planned.blocks for setup in block.fixed_in(block.cells_along(axes))]
 
 
-class _Kinds:
-    """Setups with all options, numbers of links and starts that walks of a sweep have, but not with all else.
-
-    Attributes:
-        setups: these.
-        devices: of all walks.
-        on_gpu: Whether all walks go to a GPU.
-        threads: Of every block if the sweep runs on a GPU with one method; None: as many as a chain needs.
-    """
-
-    def __init__(self, planned: Sweep) -> None:
-        axes = (*Options.model_fields, "links", "start", "plane")
-        self.setups = [setup for block in planned.blocks for setup in block.fixed_in(block.cells_along(axes))]
-        self.devices = {setup.options.device for setup in self.setups}
-        self.on_gpu, methods = all(map(on_gpu, self.devices)), {setup.options.method for setup in self.setups}
-        links = (setup.scene.links for setup in self.setups)
-        alike = self.on_gpu and len(methods) == 1
-        self.threads = shared_threads(methods.pop(), links, planned.walk_count) if alike else None
-
-
-def _run(
-    executor: Any,
+def _follow(
+    tasks: Iterator[concurrent.futures.Future[None]],
+    at_once: int,
     pulse: Pulse | None,
     planned: Sweep,
     store: SweepFolder,
     missing: Sequence[Shard],
-    workers: int,
     progress: SweepProgress,
     report: OnProgress,
 ) -> None:
-    """Give each worker two tasks at a time, so that memory does not grow with the sweep."""
+    """Ask for so many tasks at once, so that memory does not grow with the sweep, and count the shards they write."""
     report(progress)
-    began, written_walks = time.perf_counter(), 0
-    threads = _Kinds(planned).threads
-    waiting = _tasks(planned, missing, workers if pulse is None else 1)  # threads take turns on a GPU
-    folder, stamp = store.directory / "shards", store.stamp
-    pending: dict[concurrent.futures.Future[None], list[Shard]] = {}  # with the shards still to be counted
-
-    def submit() -> bool:
-        task = next(waiting, None)
-        if task is None:
-            return False
-        given = (planned, str(store.directory), stamp, tuple(task), threads, pulse)
-        with losses_named():
-            pending[executor.submit(run_shards, *given)] = task
-        return True
-
-    blocks = planned.blocks
+    began, written, blocks = time.perf_counter(), 0, planned.blocks
+    folder, left = store.directory / "shards", {shard.name: shard for shard in missing}
     lengths = {name: np.concatenate([block.parameter(name).ravel() for block in blocks]) for name in LENGTHS}
-    while len(pending) < 2 * workers and submit():
-        pass
+    pending: set[concurrent.futures.Future[None]] = set()
     try:
-        while pending:
-            finished, _ = concurrent.futures.wait(pending, POLL, concurrent.futures.FIRST_COMPLETED)
-            written: list[Shard] = []
-            for future in finished:
-                written += pending.pop(future)
-                with losses_named():
+        while True:
+            with losses_named():
+                for future in itertools.islice(tasks, at_once - len(pending)):
+                    pending.add(future)
+                if not pending:
+                    break
+                finished, pending = concurrent.futures.wait(pending, POLL, concurrent.futures.FIRST_COMPLETED)
+                for future in finished:
                     future.result()
-                submit()
-            for task in pending.values():
-                there = [shard for shard in task if (folder / shard.name).exists()]
-                task[:] = [shard for shard in task if shard not in there]
-                written += there
-            for shard in written:
+            for name in left.keys() & set(os.listdir(folder)):
+                shard = left.pop(name)
                 rows = read_shard(store.directory, shard)
                 columns = {name: rows[name] for name in rows.dtype.names or ()}
                 own = {name: values[shard.walks % blocks[0].stride] for name, values in lengths.items()}
                 found = faults_of_columns(columns | derived_columns(columns), own)
                 progress.statuses.update(Status(int(code)).label for code in rows["status"])
                 progress.inaccurate += int(np.any([*found.values()], axis=0).sum())
-                written_walks += len(shard)
-            progress.done = progress.before + max(written_walks, 0 if pulse is None else pulse.over)
+                written += len(shard)
+            progress.done = progress.before + max(written, 0 if pulse is None else pulse.over)
             progress.seconds = time.perf_counter() - began
             report(progress)
     finally:
@@ -399,12 +360,13 @@ def _run(
 def _tasks(planned: Sweep, missing: Sequence[Shard], gpus: int) -> Iterator[list[Shard]]:
     """The shards of each task: one on a CPU; on a GPU enough to fill it, if there are enough.
 
-    Neighbouring shards are alike, and a GPU has few tasks. So each task takes every n-th shard, and all take equally
-    long.
+    Neighbouring shards are alike. So on a GPU, which has few tasks, each takes every n-th shard, and all take equally
+    long; on a CPU every `PASSES`-th shard comes first, and the rate is soon that of the whole sweep.
     """
     for_gpus: list[Shard] = []
-    firsts = planned.undrawn(int(shard.walks[0]) for shard in missing)
-    for shard, first in zip(missing, firsts, strict=True):
+    spread = [shard for number in range(PASSES) for shard in missing[number::PASSES]]
+    firsts = planned.undrawn(int(shard.walks[0]) for shard in spread)
+    for shard, first in zip(spread, firsts, strict=True):
         if on_gpu(first.setup.options.device):
             for_gpus.append(shard)
         else:

@@ -16,10 +16,10 @@ def losses_named() -> Iterator[None]:
     try:
         yield
     except Exception as error:
-        is_lost = isinstance(error, concurrent.futures.BrokenExecutor | concurrent.futures.CancelledError)
-        if (
-            not is_lost and type(error).__module__.partition(".")[0] != "distributed"
-        ):  # Dask, which need not be installed
+        is_of_dask = type(error).__module__.partition(".")[0] == "distributed"  # which need not be installed
+        if not is_of_dask and not isinstance(
+            error, concurrent.futures.BrokenExecutor | concurrent.futures.CancelledError
+        ):
             raise
         raise LostWorkersError(
             f"the workers ended before the sweep ({type(error).__name__}): killed, out of memory, or their scheduler "

@@ -1,10 +1,8 @@
 """One block of a sweep as arrays with named axes."""
 
-import itertools
 import math
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -17,11 +15,11 @@ from warpchain.inputs.setup import Setup
 from warpchain.inputs.validation import InputError, InputWarning, plain, shown, suggestion
 from warpchain.status import Status
 from warpchain.store.cell_statistics import CellStatistics
-from warpchain.sweeps.block import POINT
+from warpchain.sweeps.block import POINT, Block
 from warpchain.sweeps.plan import Sweep
+from warpchain.walks.faults import LENGTHS
 from warpchain.walks.rows import (
     COLUMNS,
-    LENGTHS,
     MISSING,
     Column,
     drawn_column,
@@ -41,26 +39,6 @@ Array = NDArray[Any]
 
 _Variables = dict[str, tuple[tuple[str, ...], Array, dict[str, Any]]]
 """Name → axes, values and attributes, as xarray takes them."""
-Motion = tuple[Callable[[], "AbstractContextManager[h5py.File]"], str]
-"""What opens the file with a kept motion, and the group in there."""
-
-
-@dataclass(frozen=True, eq=False)
-class Origin:
-    """What a result was computed from.
-
-    Attributes:
-        sweeps: the sweeps whose samples stand one behind the other.
-        provenance: digest of the sweep, version of the numerics, and versions of the software that began it.
-    """
-
-    sweeps: tuple[Sweep, ...]
-    provenance: dict[str, Any]
-
-    def samples(self, block: int) -> list[tuple[int, int]]:
-        """For each sample of a block, given its number, the number of its sweep and its own number there."""
-        counts = [sweep.blocks[block].samples for sweep in self.sweeps]
-        return [(number, sample) for number, count in enumerate(counts) for sample in range(count)]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -76,8 +54,9 @@ class BlockResult:
         axes: name of each axis of the grid → its values, in order; null is None. The samples are one more axis.
         drawn: names of the quantities that samples draw; the values are in the columns NAME_drawn.
         columns: name → values.
-        origin: what it was computed from.
-        motions: place of a walk in a flat column → where its kept motion is, file by file.
+        origin: the sweep.
+        versions: of the software that began it.
+        motions: of each walk what opens the file with its kept motion, and the group in there; None if there is none.
     """
 
     name: str
@@ -85,8 +64,14 @@ class BlockResult:
     axes: dict[str, Array]
     drawn: tuple[str, ...]
     columns: dict[str, Array]
-    origin: Origin
-    motions: Mapping[int, Motion]
+    origin: Sweep
+    versions: dict[str, str]
+    motions: Array
+
+    @property
+    def planned(self) -> Block:
+        """The block of the sweep that it is of."""
+        return self.origin.blocks[self.number]
 
     @property
     def dims(self) -> tuple[str, ...]:
@@ -126,8 +111,7 @@ class BlockResult:
         if name in ("sample", POINT):
             of = "sample in its cell" if name == "sample" else "parameter set"
             return Column("<i8", "1", f"number of the {of}")
-        points = self.origin.sweeps[0].blocks[self.number].points
-        if not any(name in known for known in (self.columns, self.axes, points)):
+        if not any(name in known for known in (self.columns, self.axes, self.planned.points)):
             raise KeyError(f"{shown(name)}: {suggestion(name, (*self.columns, *self.axes))}")
         return COLUMNS[name] if name in COLUMNS else field_column(name)
 
@@ -139,21 +123,24 @@ class BlockResult:
 
     def filled_from(self, other: "BlockResult") -> "BlockResult":
         """The same block with the walks that only another result of it has."""
-        columns = {name: np.where(self.is_there, values, other.columns[name]) for name, values in self.columns.items()}
-        return replace(self, columns=columns, motions={**other.motions, **self.motions})
+        there = self.is_there
+        columns = {name: np.where(there, values, other.columns[name]) for name, values in self.columns.items()}
+        return replace(self, columns=columns, motions=np.where(there, self.motions, other.motions))
 
-    @cached_property
+    @property
     def kept(self) -> NDArray[np.bool_]:
         """Whether the motion of a walk was kept and is there, shape `shape`."""
-        return np.isin(np.arange(self.columns["index"].size), list(self.motions)).reshape(self.shape)
+        return np.asarray(self.motions != None)  # noqa: E711 - of each element
 
     def kept_motions(self, places: Iterable[int]) -> "Iterator[tuple[int, h5py.Group]]":
-        """Places in a flat column, of those given, and groups of kept motions, file by file; errors as of `series`."""
-        wanted = set(places)
-        here = ((*self.motions[place], place) for place in self.motions if place in wanted)
-        for opened, walks in itertools.groupby(here, lambda walk: walk[0]):
+        """Places in a flat column and groups of kept motions, file by file; errors as of `series`."""
+        files: dict[Any, list[tuple[int, str]]] = {}
+        for place in places:
+            opened, group = self.motions.flat[place]
+            files.setdefault(opened, []).append((place, group))
+        for opened, walks in files.items():
             with opened() as file:
-                yield from ((place, file[group]) for _, group, place in walks)
+                yield from ((place, file[group]) for place, group in walks)
 
     def series(self, *, sample: int = 0, **at: float | str | None) -> WalkResult:
         """One walk whose motion was kept: `series(links=60, frequency=15, sample=2).time`.
@@ -184,13 +171,9 @@ class BlockResult:
             raise InputError(f"sample: there is no sample {shown(sample)}; give 0 to {self.shape[-1] - 1}")
         return (*place, sample)
 
-    def sweep_at(self, place: tuple[int, ...]) -> Sweep:
-        """The sweep that has the walk at a place along the axes and samples."""
-        return self.origin.sweeps[self.origin.samples(self.number)[place[-1]][0]]
-
     def setup_at(self, place: tuple[int, ...]) -> Setup:
         """Everything that says what the walk at a place is, its draws included."""
-        return self.sweep_at(place).planned(int(self.columns["index"][place])).setup
+        return self.origin.planned(int(self.columns["index"][place])).setup
 
     def walk(
         self,
@@ -216,8 +199,7 @@ class BlockResult:
             at: value of each axis; of an axis with just one value it may be left out.
 
         Raises:
-            InputError: there is no such walk, several have this number (of merged sweeps with other seeds), or a value
-                is refused.
+            InputError: there is no such walk, or a value is refused.
 
         Warns:
             InputWarning: the sweep has another Δx or status of this walk.
@@ -231,7 +213,7 @@ class BlockResult:
         from warpchain.walks.one_walk import run_walk
 
         recording = {"frame_interval": frame_interval, "record_before": record_before, "record_loads": record_loads}
-        walk = run_walk(self.setup_at(place), seed=self.sweep_at(place).seed, **recording)  # type: ignore[arg-type]
+        walk = run_walk(self.setup_at(place), seed=self.origin.seed, **recording)  # type: ignore[arg-type]
         dx, number = self.columns["dx"][place], self.columns["index"][place]
         if self.is_there[place] and not self.has_same(walk, place):
             warnings.warn(
@@ -264,8 +246,8 @@ class BlockResult:
             **motion,
             wall_time=math.nan,
             setup=setup,
-            seed=self.sweep_at(place).seed,
-            versions=self.origin.provenance["versions"],
+            seed=self.origin.seed,
+            versions=self.versions,
         )
 
     def summary(self) -> dict[str, int]:
@@ -275,8 +257,7 @@ class BlockResult:
     @cached_property
     def faults(self) -> dict[str, NDArray[np.bool_]]:
         """What makes walks inaccurate, a key of `warpchain.walks.faults.FAULTS` → whether each walk has it."""
-        planned = self.origin.sweeps[0].blocks[self.number]
-        return faults_of_columns(self.columns, {name: planned.parameter(name) for name in LENGTHS})
+        return faults_of_columns(self.columns, {name: self.planned.parameter(name) for name in LENGTHS})
 
     @property
     def inaccurate(self) -> NDArray[np.bool_]:
@@ -300,7 +281,7 @@ class BlockResult:
 
         Values of parameter sets (`points`) and those that samples drew; NaN of a walk that is not there.
         """
-        points = [*self.origin.sweeps[0].blocks[self.number].points]
+        points = [*self.planned.points]
         whole = self.to_xarray().reset_coords(points)[[*points, *map(drawn_column, self.drawn)]]
         array = whole.to_dataarray("quantity").astype(float).assign_coords(quantity=[*points, *self.drawn])
         return array.transpose(*self.dims, "quantity")
@@ -320,10 +301,9 @@ class BlockResult:
 
     def variables(self) -> tuple[_Variables, _Variables]:
         """Coordinates and variables; null among numbers is NaN."""
-        points = self.origin.sweeps[0].blocks[self.number].points
         along = {name: (name, values) for name, values in self.axes.items()}
         along |= {"sample": ("sample", np.arange(self.shape[-1]))}
-        along |= {name: (POINT, np.array(values)) for name, values in points.items()}
+        along |= {name: (POINT, np.array(values)) for name, values in self.planned.points.items()}
         coordinates: _Variables = {
             name: ((dim,), values.astype(float) if values.dtype.kind == "O" else values, self.notes(name))
             for name, (dim, values) in along.items()
@@ -355,7 +335,7 @@ def counted(summary: Mapping[str, int]) -> str:
 
 
 def located(blocks: Sequence[BlockResult], index: object) -> tuple[BlockResult, tuple[int, ...]]:
-    """Block and place along axes and samples of the walk with a number; an `InputError` if there is not just one."""
+    """Block and place along axes and samples of the walk with a number; an `InputError` if there is none."""
     number = plain(index, "index")
     if isinstance(number, bool) or not isinstance(number, int):
         raise InputError(f"index: {shown(number)} is not the number of a walk; give a whole number")
@@ -363,9 +343,4 @@ def located(blocks: Sequence[BlockResult], index: object) -> tuple[BlockResult, 
     if not found:
         largest = max(int(block.columns["index"].max()) for block in blocks)
         raise InputError(f"index: the sweep has no walk {number}; give one of its column index, at most {largest}")
-    if len(found) > 1:
-        samples = ", ".join(str(place[-1]) for _, place in found)
-        raise InputError(
-            f"index: {len(found)} merged sweeps have a walk {number}; give the values of its axes, and sample={samples}"
-        )
     return found[0]

@@ -43,18 +43,13 @@ class CellStatistics:
         """Statistics of a column over its last axis, that of the samples; ``status`` of the same walks."""
         rested = np.isin(status, [code for code in Status if code.ok])
         had = rested & (column != MISSING if column.dtype.kind == "i" else ~np.isnan(column))
-        count = had.sum(axis=-1)
-        values = np.where(had, column, 0.0)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            mean = values.sum(axis=-1) / count
-            deviation = np.where(had, values - mean[..., np.newaxis], 0.0)
-            sd = np.sqrt((deviation**2).sum(axis=-1) / (count - 1))
+        values = np.ma.masked_array(column.astype(float), ~had)
         return cls(
             axes=axes,
             unit=unit,
-            mean=mean,
-            sd=np.where(count > 1, sd, np.nan),
-            count=count,
+            mean=np.ma.filled(values.mean(axis=-1), np.nan),
+            sd=np.ma.filled(values.std(axis=-1, ddof=1), np.nan),
+            count=had.sum(axis=-1),
             absent=(rested & ~had).sum(axis=-1),
             failed=(~rested & (status != MISSING)).sum(axis=-1),
             missing=(status == MISSING).sum(axis=-1),

@@ -1,16 +1,16 @@
 """The folder of a sweep, as the one process that runs the sweep holds it.
 
-    DIR/sweep.json     what the folder belongs to, see `Manifest`; written first, replaced when the sweep grows
+    DIR/sweep.h5       what the folder belongs to, see `Manifest`; written first, replaced when the sweep grows
     DIR/sweep.yaml     the resolved sweep, for people and to run again
-    DIR/shards/        0-000003.h5 holds the rows of some walks, 0-000003-motion.h5 what is kept of their motion
+    DIR/shards/        000003.h5 holds the rows of some walks, and what is kept of their motion
     DIR/log.txt        what the runs of the sweep did, with times
     DIR/lock           locked by the process that runs the sweep; the system unlocks it when that ends
 
 None of these is a symbolic link when a sweep is run: nothing is written or deleted outside of the folder. A damaged
 shard is deleted, named in log.txt and by a warning, and computed again.
 
-A sweep grows when its file is given more samples: the shards that are there stay, 1-000000.h5 and so on join them, see
-`warpchain.store.manifest`. Whatever happens between two of these lines, the next `SweepFolder.open` goes on from there.
+A sweep grows when its file is given more samples: the shards that are there stay, others join them. Whatever happens
+between two of these lines, the next `SweepFolder.open` goes on from there.
 """
 
 import datetime
@@ -19,32 +19,27 @@ import os
 import re
 import shutil
 import socket
-import time
 import warnings
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Final, Self
+from typing import Any, Final, Self
 
 import numpy as np
 import yaml
+from numpy.typing import NDArray
 
 from warpchain.files import given_path, make_folder, naming, remove_output, write_whole
-from warpchain.hdf5_files import open_regular
 from warpchain.inputs.validation import DamagedFileError, InputError, InputWarning
-from warpchain.store.manifest import OWN, Folder, Manifest, Shard, read_manifest
-from warpchain.store.shards import opened_motions, present_shards, read_shard, stamp
+from warpchain.store.manifest import EARLIER, OWN, Folder, Manifest, Shard, read_manifest
+from warpchain.store.shards import FOREIGN, opened_shard, rows_of, shard_files, stamp
 from warpchain.sweeps.designs import EXTENSIBLE
 from warpchain.sweeps.plan import Sweep
 from warpchain.version import NUMERICS_VERSION
-from warpchain.walks.rows import Rows
+from warpchain.walks.rows import KEYS, MISSING, Rows, missing_rows
 
-LOCK_TRIES: Final = 5
-"""Tries to lock a folder: `running_rate` of another process holds the lock for a moment."""
-LOCK_PAUSE: Final = 0.02
-"""Time [s] between two of them."""
-
-_PART: Final = re.compile(r"\.(?:sweep|\d+-\d{6,}(?:-motion)?)\.[0-9a-f]{8}\.part\.(?:json|yaml|h5)")
+_PART: Final = re.compile(r"\.(?:sweep|\d{6,})\.[0-9a-f]{8}\.part\.(?:yaml|h5)")
 _HOLDER: Final = re.compile(r"process \d+ on \S*")
 
 _YAML_HEAD: Final = """\
@@ -62,11 +57,13 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         directory: the folder.
         manifest: what it belongs to, and how its walks are laid out in shards.
         lock: descriptor of the lock.
+        found: of each walk in the order of `Manifest.keys` whether it was there when the folder was opened.
     """
 
     directory: Path
     manifest: Manifest
     lock: int
+    found: NDArray[np.bool_]
 
     @property
     def stamp(self) -> str:
@@ -90,7 +87,7 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         Raises:
             OSError: the folder cannot be made, locked, read or written.
             InputError: another process holds the folder, it belongs to another sweep or to something else, or a
-                shard is foreign. Nothing has been deleted.
+                shard is foreign. Nothing has been deleted, and nothing new is left.
 
         Warns:
             InputWarning: a shard was damaged; its walks are missing now.
@@ -98,12 +95,16 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         path = given_path(directory)
         make_folder(path)
         _refuse_strangers(path)
+        is_new = not (path / "lock").exists()
         lock = _locked(path)
         try:
-            folder = cls(path, _prepared(path, sweep, Manifest.of(sweep, shard_size, part), fresh), lock)
+            manifest = _prepared(path, sweep, Manifest.of(sweep, shard_size, part), fresh)
+            folder = cls(path, manifest, lock, np.zeros(len(manifest.keys), bool))
             folder._check()
             folder._describe()
-        except BaseException:
+        except BaseException as error:
+            if is_new and isinstance(error, InputError):
+                (path / "lock").unlink(missing_ok=True)
             _unlock(lock)
             raise
         return folder
@@ -116,9 +117,9 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
             file.write(f"{now}  {text}\n")
 
     def missing(self) -> list[Shard]:
-        """The shards that are not there yet, in order; errors as of `present_shards`."""
-        present = {shard.name for shard in present_shards(self.directory, self.manifest)}
-        return [shard for shard in self.manifest.wanted if shard.name not in present]
+        """The shards that are not there yet, in order; errors as of `shard_files`."""
+        written = set(shard_files(self.directory))
+        return [shard for shard in self.manifest.left(self.found) if shard.name not in written]
 
     def close(self) -> None:
         """Let other processes have the folder."""
@@ -129,72 +130,69 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         self.close()
 
     def _check(self) -> None:
-        """Refuse a folder with foreign shards, and delete damaged ones."""
-        problems, bad = [], {}
-        for shard in present_shards(self.directory, self.manifest):
-            try:
-                read_shard(self.directory, shard)
-                if shard.keeps_motion:
-                    with opened_motions(self.directory, shard):
-                        pass
-            except DamagedFileError as error:
-                bad[shard] = str(error).partition("; ")[0]
-            except InputError as error:
-                problems.append(str(error))
-        if problems:
-            raise InputError(problems[0] + (f" (and {len(problems) - 1} more)" if problems[1:] else ""))
-        for shard, problem in bad.items():
-            for name in reversed(shard.files):
-                remove_output(self.directory / "shards" / name)
+        """Refuse a folder with foreign shards, delete damaged ones, and note which walks are there."""
+        damaged: dict[str, str] = {}
+        rows, _ = read_rows(self.directory, self.manifest, damaged)
+        self.found[:] = np.concatenate([block["status"].ravel() for block in rows]) != MISSING
+        for name, problem in damaged.items():
+            remove_output(self.directory / "shards" / name)
             self.log(f"{problem}; deleted, its walks are computed again")
             warnings.warn(f"{problem}; its walks are computed again", InputWarning, stacklevel=4)
 
     def _describe(self) -> None:
-        """Write what the folder says of its sweep, if that is new; sweep.yaml is never older than sweep.json."""
+        """Write what the folder says of its sweep, if that is new; sweep.yaml is never older than sweep.h5."""
         description = self.directory / "sweep.yaml"
-        if read_manifest(self.directory).growth != self.manifest.growth:
+        if read_manifest(self.directory).sweep.digest() != self.manifest.sweep.digest():
             remove_output(description)
-            write_whole(self.directory / "sweep.json", self.manifest.text())
+            write_whole(self.directory / "sweep.h5", self.manifest.image())
         if not description.exists():
             sweep = self.manifest.sweep.canonical()
             text = yaml.safe_dump(sweep, sort_keys=False, allow_unicode=True)
             write_whole(description, _YAML_HEAD + text)
 
 
-def read_rows(directory: Folder, manifest: Manifest) -> tuple[list[Shard], Rows]:
-    """The shards that are in a folder, and the rows of all their walks, shape (walks,); needs no lock, at any moment.
+def read_rows(
+    directory: Folder, manifest: Manifest, damaged: dict[str, str] | None = None
+) -> tuple[list[Rows], list[NDArray[Any]]]:
+    """For each block the rows of its walks, and of each what opens the file with its motion, and the group in there.
+
+    Needs no lock, at any moment. Rows of walks that are not there yet are those of `missing_rows`; for a motion that is
+    not kept stands None.
+
+    Args:
+        directory: the folder.
+        manifest: what it holds.
+        damaged: takes the name of each damaged shard and what is wrong with it; None: that is an error.
 
     Raises:
         OSError: the folder or a shard cannot be read.
-        InputError: a shard is damaged or foreign.
+        InputError: a shard is foreign, or damaged.
     """
-    shards = present_shards(directory, manifest)
-    rows = [np.empty(0, manifest.row_type), *(read_shard(directory, shard) for shard in shards)]
-    return shards, np.concatenate(rows)
-
-
-def running_rate(directory: Folder) -> float | None:
-    """Walks per second that the process that runs a sweep has written since it began; None if none runs it.
-
-    The times of the files tell: a run writes the lock when it begins, and then its shards.
-
-    Raises:
-        OSError: the folder cannot be read.
-        InputError: there is no sweep in it.
-    """
-    present = present_shards(directory, read_manifest(directory))
-    try:
-        with open_regular(Path(directory) / "lock") as lock:
-            began = os.fstat(lock.fileno()).st_mtime
-            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        folder = Path(directory) / "shards"
-        done = sum(len(shard) for shard in present if (folder / shard.name).stat().st_mtime >= began)
-        seconds = time.time() - began  # negative if the clock was set back
-        return done / seconds if seconds > 0 else 0.0
-    except FileNotFoundError:
-        pass
-    return None
+    tables, motions = [], []
+    for number, block in enumerate(manifest.sweep.blocks):
+        keys = manifest.keys[manifest.keys["block"] == number]
+        tables.append(missing_rows(manifest.row_type, keys).reshape(-1, block.samples))
+        motions.append(np.full(tables[-1].shape, None))
+    for name in shard_files(directory):
+        try:
+            with opened_shard(directory, name, manifest.digest) as file:
+                rows, kept = rows_of(file, manifest.row_type), [int(row) for row in file.get("motion", ())]
+        except DamagedFileError as error:
+            if damaged is None:
+                raise
+            damaged[name] = str(error).partition("; ")[0]
+            continue
+        opened = partial(opened_shard, Path(directory).absolute(), name, manifest.digest)
+        numbers, cells, samples = (rows[key] for key in KEYS.names or ())
+        try:
+            for number, table in enumerate(tables):
+                own = numbers == number
+                table[cells[own], samples[own]] = rows[own]
+            for row in kept:
+                motions[numbers[row]][cells[row], samples[row]] = opened, f"motion/{row}"
+        except IndexError:
+            raise InputError(f"{Path(directory) / 'shards' / name}: {FOREIGN}") from None
+    return tables, motions
 
 
 def _prepared(folder: Path, sweep: Sweep, manifest: Manifest, fresh: bool) -> Manifest:
@@ -204,15 +202,15 @@ def _prepared(folder: Path, sweep: Sweep, manifest: Manifest, fresh: bool) -> Ma
         The manifest that the folder is to have; a grown one is not written yet.
     """
     _clear_leftovers(folder)
-    named = folder / "sweep.json"
+    named = folder / "sweep.h5"
     if not named.exists():
-        for name in OWN:
+        for name in (*OWN, EARLIER):
             if (folder / name).exists():
                 raise InputError(f"{folder / name}: in the way of a sweep; give another folder")
-        write_whole(named, manifest.text())
+        write_whole(named, manifest.image())
     elif fresh:
-        _discard(folder, read_manifest(folder))
-        write_whole(named, manifest.text())
+        _discard(folder)
+        write_whole(named, manifest.image())
     else:
         manifest = _continued(folder, sweep, manifest)
     make_folder(folder / "shards")
@@ -235,33 +233,29 @@ def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
         own, wanted = ("{}/{}".format(*part) if part[1] > 1 else "1/1 (all)" for part in (found.part, manifest.part))
         remedy = f"give --part {own}" if found.part[1] > 1 else "leave --part out"
         raise InputError(f"{folder}: holds part {own} of its sweep, not {wanted}; {remedy}, or another folder")
-    digest = found.sweep.digest()  # by this version, which may know of more fields than that which began the folder
-    if digest == manifest.digest:
-        return found
-    there = list(found.growth[-1].samples)
-    if len(there) != len(sweep.blocks) or sweep.digest(there) != digest:
+    there, asked = ([block.samples_given for block in one.blocks] for one in (found.sweep, sweep))
+    ones = [1] * len(there)  # digests by this version, which may know of more fields than that which began the folder
+    if len(there) != len(asked) or sweep.digest(ones) != found.sweep.digest(ones):
         raise InputError(
             f"{folder}: holds another sweep ({found.sweep.name}), or this one before it was changed; "
             "give another folder, or start anew with fresh, which deletes what is there"
         )
-    for count, block in zip(there, sweep.blocks, strict=True):
-        name, asked, sampler = block.name, block.samples_given, block.sampler
-        if asked < count:
+    for count, more, block in zip(there, asked, sweep.blocks, strict=True):
+        holds = f"{folder}: holds {count} samples of each cell of block {block.name}, but"
+        if more < count:
+            raise InputError(f"{holds} {more} are asked for; give samples: {count} or more, or another folder")
+        if more > count and block.sampler not in EXTENSIBLE:
             raise InputError(
-                f"{folder}: holds {count} samples of each cell of block {name}, but {asked} are asked for; "
-                f"give samples: {count} or more, or another folder"
+                f"{holds} a {block.sampler} of {more} samples has other points; give samples: {count}, sampler: random "
+                "from the start, or another folder"
             )
-        if asked > count and sampler not in EXTENSIBLE:
-            raise InputError(
-                f"{folder}: holds {count} samples of each cell of block {name}, but a {sampler} of {asked} samples "
-                f"has other points; give samples: {count}, sampler: random from the start, or another folder"
-            )
-    return manifest.grown_from(found)
+    return found if there == asked else replace(manifest, versions=found.versions)
 
 
-def _discard(folder: Path, manifest: Manifest) -> None:
+def _discard(folder: Path) -> None:
     """Delete what a sweep left, its shards first; nothing if there is a foreign file among them."""
-    present_shards(folder, manifest)
+    read_manifest(folder)
+    shard_files(folder)
     with naming(folder):
         if (folder / "shards").exists():
             shutil.rmtree(folder / "shards")
@@ -308,16 +302,14 @@ def _locked(folder: Path) -> int:
         holder = os.pread(descriptor, 200, 0).decode(errors="replace").strip()
         if holder and not _HOLDER.fullmatch(holder):
             raise InputError(f"{path}: in the way of a sweep; give another folder")
-        for tries_left in reversed(range(LOCK_TRIES)):
-            try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                break
-            except BlockingIOError:
-                if not tries_left:
-                    raise InputError(
-                        f"{folder}: in use by {holder or 'another process'}; wait for it to end, or give another folder"
-                    ) from None
-                time.sleep(LOCK_PAUSE)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise InputError(
+                f"{folder}: in use by {holder or 'another process'}; wait for it to end, or give another folder"
+            ) from None
+        if not path.exists():  # by a process that was refused the folder
+            raise InputError(f"{path}: was deleted at this moment; try again")
         os.ftruncate(descriptor, 0)
         os.pwrite(descriptor, f"process {os.getpid()} on {socket.gethostname()}\n".encode(), 0)
     except BaseException:

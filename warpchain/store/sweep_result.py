@@ -5,29 +5,29 @@ A folder can be read while its sweep runs: walks that are not there yet are miss
 
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.hdf5_files import reading_hdf5
 from warpchain.inputs.validation import InputError, shown, suggestion
-from warpchain.store.block_result import BlockResult, Motion, Origin, counted, located, status_counts
+from warpchain.store.block_result import BlockResult, counted, located, status_counts
 from warpchain.store.cell_statistics import CellStatistics
 from warpchain.store.folder import read_rows
 from warpchain.store.manifest import Folder, read_manifest, stored_sweep
-from warpchain.store.shards import opened_motions, stamp
-from warpchain.walks.rows import COLUMNS, KEYS, STORED_COLUMNS, derived_columns, drawn_column, missing_rows, quantity_of
+from warpchain.store.shards import stamp
+from warpchain.sweeps.plan import Sweep
+from warpchain.walks.rows import COLUMNS, STORED_COLUMNS, derived_columns, drawn_column, quantity_of
 from warpchain.walks.walk_result import WalkResult
 
 if TYPE_CHECKING:
     import pandas
     import xarray
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
 Array = NDArray[Any]
@@ -43,16 +43,18 @@ class SweepResult:
 
     Attributes:
         blocks: name → block.
-        origin: what it was computed from.
+        origin: the sweep.
+        provenance: its digest, version of the numerics, and versions of the software that began it.
     """
 
     blocks: dict[str, BlockResult]
-    origin: Origin
+    origin: Sweep
+    provenance: dict[str, Any]
 
     @cached_property
     def sweep(self) -> dict[str, Any]:
-        """The resolved sweep, as in sweep.yaml; of several that were merged the first one."""
-        return self.origin.sweeps[0].canonical()
+        """The resolved sweep, as in sweep.yaml."""
+        return self.origin.canonical()
 
     @property
     def name(self) -> str:
@@ -63,11 +65,6 @@ class SweepResult:
     def seed(self) -> int:
         """Its seed."""
         return int(self.sweep["seed"])
-
-    @property
-    def provenance(self) -> dict[str, Any]:
-        """Digest of the sweep, version of the numerics, and versions of the software that began it."""
-        return self.origin.provenance
 
     def __getattr__(self, name: str) -> Any:
         """An attribute of the only block."""
@@ -156,33 +153,28 @@ class SweepResult:
 
     def plot(
         self,
-        kind: Literal["lines", "map"] | None = None,
         quantity: str = "dx",
         x: str | None = None,
-        ax: "Axes | None" = None,
         figure: "Figure | SubFigure | None" = None,
     ) -> "Figure | SubFigure":
         """Draw the mean of a quantity over the grids of all blocks, with its standard error.
 
         Args:
-            kind: `lines` or `map`; None for lines, unless two axes have many values.
             quantity: a column of numbers, such as `dx`, `walk_time`, `bounces` or a drawn quantity.
             x: the axis along x, such as `frequency`; by default the frequency if it has three values or more, else the
                 longest axis of numbers.
-            ax: where to draw a figure of one panel.
             figure: an empty figure to draw into; by default a new one.
 
         Returns:
-            The figure, that of `ax` if it is given.
+            The figure.
 
         Raises:
             InputError: no block has such a column or axis, or there is nothing to show: no axis of several values, or
                 no walk that has the quantity.
-            ValueError: the kind is unknown, or `ax` is given together with `figure` or for several panels.
         """
         from warpchain.pictures.grid_figure import draw_grid
 
-        return draw_grid(self.cell_statistics(quantity), quantity_of(quantity), kind, x=x, ax=ax, figure=figure)
+        return draw_grid(self.cell_statistics(quantity), quantity_of(quantity), x=x, figure=figure)
 
     def to_xarray(self) -> "xarray.Dataset | xarray.DataTree":
         """The only block as a data set, or several as a tree with one child each."""
@@ -204,13 +196,12 @@ class SweepResult:
 
     def notes(self) -> dict[str, Any]:
         """Attributes of a file: what the result is and how to make it again."""
-        sweeps = [sweep.canonical() for sweep in self.origin.sweeps]
         return {
             "title": self.name,
-            "seed": ", ".join(str(sweep["seed"]) for sweep in sweeps),
+            "seed": str(self.seed),
             "walks": self.walk_count,
             **{f"walks_{label}": count for label, count in self.summary().items()},
-            "sweep": json.dumps(sweeps if len(sweeps) > 1 else sweeps[0], ensure_ascii=False),
+            "sweep": json.dumps(self.sweep, ensure_ascii=False),
             **self.provenance,
             "versions": json.dumps(self.provenance["versions"]),
         }
@@ -227,56 +218,52 @@ def load(path: Folder) -> SweepResult:
 
 
 def _load_folder(directory: Folder) -> SweepResult:
-    folder = Path(directory).absolute()
     while True:
         manifest, begun = read_manifest(directory), stamp(directory)
         try:
-            shards, rows = read_rows(directory, manifest)
+            rows, motions = read_rows(directory, manifest)
             break
         except (OSError, InputError):
             if stamp(directory) == begun:  # else a run has begun anew or added samples meanwhile
                 raise
-    sweep, series = manifest.sweep, manifest.sweep.recording.series
-    motions: list[dict[int, Motion]] = [{} for _ in sweep.blocks]
-    for shard in shards:
-        opened = partial(opened_motions, folder, shard)
-        for row, (number, cell, sample) in enumerate(shard.keys.tolist() if shard.keeps_motion else ()):
-            if series is not None and series.includes(sample):
-                motions[number][cell * sweep.blocks[number].samples + sample] = opened, str(row)
+    blocks = manifest.sweep.blocks
 
     def column(number: int, name: str) -> Array:
-        block, here = sweep.blocks[number], rows[rows["block"] == number]
-        if name == "index":
-            return block.indices
-        values = missing_rows(rows.dtype, np.empty(1, KEYS))[name].repeat(block.walk_count)
-        values[here["cell"].astype(np.int64) * block.samples + here["sample"]] = here[name]
-        return values.reshape(block.shape)
+        values = blocks[number].indices if name == "index" else rows[number][name]
+        return np.ascontiguousarray(values).reshape(blocks[number].shape)
 
-    provenance = {name: getattr(manifest, name) for name in ("digest", "numerics_version", "versions")}
-    return _result(Origin((sweep,), provenance), column, motions)
+    provenance = {"digest": manifest.sweep.digest(), "numerics_version": manifest.numerics_version}
+    provenance["versions"] = manifest.versions
+    return _result(manifest.sweep, provenance, column, lambda number: motions[number].reshape(blocks[number].shape))
 
 
 def _load_merged(path: Folder) -> SweepResult:
     opened = partial(reading_hdf5, Path(path).absolute(), KIND, REMEDY, WANTED)
     with reading_hdf5(path, KIND, REMEDY, WANTED) as file:
-        given = json.loads(file.attrs["sweep"])
-        sweeps = tuple(stored_sweep(path, each) for each in (given if isinstance(given, list) else [given]))
+        sweep = stored_sweep(path, json.loads(file.attrs["sweep"]))
         provenance = {"digest": file.attrs["digest"], "numerics_version": int(file.attrs["numerics_version"])}
-        origin = Origin(sweeps, provenance | {"versions": json.loads(file.attrs["versions"])})
-        groups = [block.name if len(sweeps[0].blocks) > 1 else "/" for block in sweeps[0].blocks]
-        motions: list[dict[int, Motion]] = [
-            {int(place): (opened, f"{group}/motion/{place}") for place in file[group].get("motion", ())}
-            for group in groups
-        ]
-        return _result(origin, lambda number, name: file[groups[number]][name][()], motions)
+        provenance["versions"] = json.loads(file.attrs["versions"])
+        groups = [file[block.name] if len(sweep.blocks) > 1 else file for block in sweep.blocks]
+
+        def motions(number: int) -> Array:
+            group = groups[number]
+            found = np.full(group["index"].shape, None)
+            for place in group.get("motion", ()):
+                found.flat[int(place)] = opened, f"{group.name}/motion/{place}"
+            return found
+
+        return _result(sweep, provenance, lambda number, name: groups[number][name][()], motions)
 
 
 def _result(
-    origin: Origin, column: Callable[[int, str], Array], motions: Sequence[Mapping[int, Motion]]
+    sweep: Sweep,
+    provenance: dict[str, Any],
+    column: Callable[[int, str], Array],
+    motions: Callable[[int], Array],
 ) -> SweepResult:
-    """A result, given what returns a stored column of a block by its number, and the motions of each block."""
+    """A result, given what returns a stored column of a block by its number, and the motions of a block."""
     blocks = {}
-    for number, block in enumerate(origin.sweeps[0].blocks):
+    for number, block in enumerate(sweep.blocks):
         drawn = [*map(drawn_column, block.drawn)]
         columns = {name: column(number, name) for name in ("index", "status", *STORED_COLUMNS, *drawn)}
         columns |= derived_columns(columns)
@@ -286,7 +273,8 @@ def _result(
             axes={name: np.array(values) for name, values in block.axes.items()},
             drawn=block.drawn,
             columns={name: columns[name] for name in (*COLUMNS, *drawn)},
-            origin=origin,
-            motions=motions[number],
+            origin=sweep,
+            versions=provenance["versions"],
+            motions=motions(number),
         )
-    return SweepResult(blocks=blocks, origin=origin)
+    return SweepResult(blocks=blocks, origin=sweep, provenance=provenance)

@@ -1,18 +1,21 @@
-"""Values of an axis in a sweep file: a list, or a range that is written out."""
+"""Values of an axis in a sweep file: a list, a range that is written out, or names with values that are lists."""
 
 from collections import Counter
 from collections.abc import Callable, Mapping
 from decimal import Decimal
 from typing import Annotated, Any, Final
 
-from pydantic import BaseModel, Field, ValidationError, ValidationInfo, WrapValidator
+from pydantic import BaseModel, BeforeValidator, Field, ValidationError, ValidationInfo, WrapValidator
 
-from warpchain.inputs.validation import MOST_VALUES, STRICT, InputError, refusals, shown
+from warpchain.inputs.scene import COMPOUND
+from warpchain.inputs.validation import FIELDS, LONGEST_NAME, MOST_VALUES, STRICT, InputError, checked, refusals, shown
 
 AXIS_LIMIT: Final = 10_000
 """Most values of one axis."""
 CELL_LIMIT: Final = 100_000
 """Most cells of a sweep, because each is checked when the sweep is loaded."""
+Name = Annotated[str, Field(pattern="^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=LONGEST_NAME)]
+"""Of a block, or of a value on an axis."""
 
 
 class _Range(BaseModel):
@@ -61,7 +64,34 @@ def _expanded(values: Any, check: Callable[[Any], list[Any]], info: ValidationIn
     return checked
 
 
+def list_of(kind: Any) -> Any:
+    """Annotation of a list of values."""
+    return Annotated[list[kind], Field(min_length=1, max_length=AXIS_LIMIT)]
+
+
 def axis(kind: Any) -> Any:
     """Annotation of the values of an axis, a list or a range."""
-    listed = Annotated[list[kind], Field(min_length=1, max_length=AXIS_LIMIT)]
-    return Annotated[listed, WrapValidator(_expanded, json_schema_input_type=listed | _Range)]
+    return Annotated[list_of(kind), WrapValidator(_expanded, json_schema_input_type=list_of(kind) | _Range)]
+
+
+def _with_names(values: Any) -> Any:
+    if not isinstance(values, Mapping):
+        raise ValueError("no names; give each value one, as in floor: {flat: flat, ramp: [[0, 0], [1, 0.1]]}")
+    return values
+
+
+def named_axis(kind: Any) -> Any:
+    """Annotation of the values of an axis whose values may be lists: name → value."""
+    named = Annotated[dict[Name, kind], Field(min_length=1, max_length=AXIS_LIMIT)]
+    return Annotated[named, BeforeValidator(_with_names, json_schema_input_type=named)]
+
+
+def is_axis(name: str, given: object) -> bool:
+    """Whether a list or mapping that is given for a field by its name is an axis, and no value of the field."""
+    if not isinstance(given, dict):
+        return isinstance(given, list) and name not in COMPOUND
+    try:
+        checked(given, name, Annotated[FIELDS[name].annotation, Field(), *FIELDS[name].metadata])
+    except InputError:
+        return True
+    return False

@@ -9,17 +9,18 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.inputs.distributions import Distribution, Gaussian, placed
+from warpchain.inputs.distributions import Distribution, Gaussian
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.parameters import preset as parameter_preset
 from warpchain.inputs.scene import Scene
 from warpchain.inputs.sections import SECTION_OF, SECTIONS
 from warpchain.inputs.setup import Setup, combined, options_beside
-from warpchain.inputs.validation import InputError, validated
+from warpchain.inputs.validation import InputError, json_value, path_of, validated
 from warpchain.sweeps.designs import walks_per_sample
+from warpchain.walks.faults import least
 
-Value = float | int | str | tuple[float, ...] | None
+Value = float | int | str | tuple[Any, ...] | None
 """A value of a field; truth values are integers to Python, and None is null."""
 POINT: Final = "point"
 """Name of the axis of parameter sets."""
@@ -40,6 +41,7 @@ class Block:
         preset: name of the parameter preset; None when the preset is an axis.
         sections: `scene`, `options` and `parameters` → values that differ from the defaults or the preset, axes apart.
         axes: name of each axis, a field, `preset` or `point` → its values; the last one varies fastest.
+        named: name of each axis that has names for values, such as `floor` → name → value of the field.
         points: name of each quantity that parameter sets have → its value in each, along the axis `point`.
         distributions: name → distribution, in the order of drawing.
         sampler: one of `warpchain.sweeps.designs.SAMPLERS`.
@@ -54,6 +56,7 @@ class Block:
     preset: str | None
     sections: Mapping[str, Mapping[str, Value]]
     axes: dict[str, tuple[Value, ...]]
+    named: Mapping[str, Mapping[str, Value]]
     points: Mapping[str, tuple[Value, ...]]
     distributions: Mapping[str, Distribution]
     sampler: str
@@ -94,16 +97,13 @@ class Block:
         return {**{name: values for name, values in self.axes.items() if name != POINT}, **self.points}
 
     def fixed(self, cell: tuple[int, ...]) -> Setup:
-        """The setup of a cell before anything is drawn: the values that Gaussians are centred on.
-
-        Raises:
-            InputError: the values of the cell contradict one another.
-        """
+        """The setup of a cell before anything is drawn: the values that Gaussians are centred on."""
         return next(self.fixed_in([cell]))
 
     def fixed_in(self, cells: Iterable[tuple[int, ...]]) -> Iterator[Setup]:
         """The `fixed` setups of some cells; those that are alike in a section share its checked values."""
         sections = self.sections
+        axes = self.axes | {name: tuple(values.values()) for name, values in self.named.items()}
 
         @lru_cache(_KEPT)
         def parameters(preset: str, at: _Place) -> Parameters:
@@ -120,7 +120,7 @@ class Block:
         for cell in cells:
             at: dict[str, _Place] = dict.fromkeys(SECTIONS, ())
             preset = str(self.preset)
-            for (name, values), place in zip(self.axes.items(), cell, strict=True):
+            for (name, values), place in zip(axes.items(), cell, strict=True):
                 if name == "preset":
                     preset = str(values[place])
                     continue
@@ -142,29 +142,26 @@ class Block:
     def _located(self, error: InputError, cell: tuple[int, ...]) -> str:
         """The text of an error about a cell, with the path of the value that it names."""
         where, _, problem = str(error).partition(": ")
-        name = where.rpartition(".")[2]
+        name, bracket, number = where.rpartition(".")[2].partition("[")
+        within = bracket + number  # of a value that is a list
         at = dict(zip(self.axes, cell, strict=True))
         if name in self.points:
-            return f"{self.path}.points.{name}[{at[POINT]}]: {problem}"
+            return f"{self.path}.points.{name}[{at[POINT]}]{within}: {problem}"
         if name in at:
-            return f"{self.path}.grid.{name}[{at[name]}]: {problem}"
+            key = self.axes[name][at[name]] if name in self.named else at[name]
+            return f"{path_of(f'{self.path}.grid.{name}', key)}{within}: {problem}"
         place = ", ".join(f"{name} {self.axes[name][number]}" for name, number in at.items())
         return f"{self.path}.{where}: {problem}" + (f" (in the cell {place})" if place else "")
 
     def parameter(self, name: str) -> NDArray[Any]:
-        """Values of a parameter before anything is drawn, along the axes and one for all samples, shape (…, 1)."""
-        along, values = (POINT, self.points[name]) if name in self.points else (name, self.axes.get(name))
-        if values is None and name in self.sections["parameters"]:
-            values = (self.sections["parameters"][name],)
-        if values is None:
-            presets = self.axes.get("preset", (self.preset,))
-            along, values = "preset", tuple(getattr(parameter_preset(str(preset)), name) for preset in presets)
-        sizes = [len(values) if axis == along else 1 for axis in self.axes]
-        return np.broadcast_to(np.reshape(np.array(values), (*sizes, 1)), (*self.shape[:-1], 1))
+        """Values of a parameter or length of the scene before anything is drawn: of several the least, ∞ for null.
 
-    def placed(self, fixed: Setup) -> dict[str, Distribution]:
-        """The distributions of a cell, given its `fixed` setup."""
-        return placed(self.distributions, fixed)
+        They lie along the axes, one for all samples, shape (…, 1).
+        """
+        cells, section = list(self.cells_along((name, "preset"))), SECTION_OF[name]
+        values = [least(getattr(getattr(setup, section), name)) for setup in self.fixed_in(cells)]
+        sizes = [1 + max(places) for places in zip(*cells, strict=True)]
+        return np.broadcast_to(np.reshape(values, (*sizes, 1)), (*self.shape[:-1], 1))
 
     def canonical(self) -> dict[str, Any]:
         """The block as JSON-able content of a file, with every default and range written out.
@@ -193,5 +190,9 @@ class Block:
             },
             "distributions": {"all": "fixed"} | {name: each.canonical() for name, each in self.distributions.items()},
             **({"points": {name: list(values) for name, values in self.points.items()}} if self.points else {}),
-            "grid": {name: list(values) for name, values in self.axes.items() if name != POINT},
+            "grid": {
+                name: json_value(self.named.get(name)) or list(values)
+                for name, values in self.axes.items()
+                if name != POINT
+            },
         }

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from warpchain.inputs.validation import InputError
 
@@ -40,16 +40,10 @@ def walks_per_sample(sampler: str, dimensions: int) -> int:
 
 
 def check_design(sampler: str, samples: int, dimensions: int, path: str) -> None:
-    """Check that a sampler can make a number of samples.
+    """Check that a sampler can make a number of samples of so many drawn quantities.
 
-    Args:
-        sampler: one of `SAMPLERS`.
-        samples: samples per cell, as the sweep states them.
-        dimensions: number of drawn quantities.
-        path: where sampler and samples were given, for errors.
-
-    Raises:
-        InputError: samples would all be equal, are too many, or break the balance of a Sobol' sequence.
+    An `InputError`, which begins with `path`, says that samples would all be equal, are too many, or break the balance
+    of a Sobol' sequence.
     """
     if dimensions == 0:
         if sampler == "saltelli":
@@ -116,40 +110,19 @@ def saltelli_points(first: Mapping[str, float], second: Mapping[str, float]) -> 
     return [dict(first), dict(second), *({**first, name: second[name]} for name in first)]
 
 
-def saltelli_outputs(values: ArrayLike, dimensions: int) -> dict[str, Array]:
-    """Results of the walks of a `saltelli` cell, in the form that `scipy.stats.sobol_indices` takes as `func`.
-
-    A sample with a result that is not finite (a failed walk) is left out as a whole, with its d + 2 walks. SciPy
-    refuses a number of samples that is no power of two, which may then be left; `sobol_indices` here does not.
-
-    Args:
-        values: one result for each walk of the cell, in the order of the walks, shape (N (d + 2),).
-        dimensions: number of drawn quantities d.
-
-    Returns:
-        `f_A` and `f_B`, shape (1, N'), and `f_AB`, shape (d, 1, N').
-
-    Raises:
-        ValueError: the number of values is no multiple of d + 2.
-    """
-    table = np.asarray(values, dtype=np.float64).reshape(-1, dimensions + 2)
-    table = table[np.isfinite(table).all(axis=1)]
-    return {"f_A": table[None, :, 0], "f_B": table[None, :, 1], "f_AB": table.T[2:, None, :]}
-
-
-def sobol_indices(outputs: Mapping[str, Array]) -> tuple[Array, Array]:
+def sobol_indices(samples: Array) -> tuple[Array, Array]:
     """First-order and total Sobol' indices, by the estimators of Saltelli et al. (2010), table 2 (b) and (f).
 
-    The same numbers as `scipy.stats.sobol_indices`, for any number of samples.
+    The same numbers as `scipy.stats.sobol_indices`, which takes powers of two of samples only.
 
     Args:
-        outputs: see `saltelli_outputs`.
+        samples: results of the d + 2 walks of each `saltelli` sample, in their order, shape (N, d + 2), all finite.
 
     Returns:
         First-order and total index of each drawn quantity, shape (d,) each; NaN where all results are equal or
-        none is left.
+        there is none.
     """
-    first, second, crossed = outputs["f_A"][0], outputs["f_B"][0], outputs["f_AB"][:, 0]
+    first, second, crossed = samples[:, 0], samples[:, 1], samples[:, 2:].T
     pooled = np.concatenate([first, second])
     variance = pooled.var() if len(pooled) else 0.0
     if not variance > 0:

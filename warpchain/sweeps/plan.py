@@ -20,7 +20,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.inputs.distributions import DRAW_LIMIT, Distribution, draw, random_generator
+from warpchain.inputs.distributions import DRAW_LIMIT, Distribution, draw, placed, random_generator
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS
 from warpchain.inputs.scene import Scene
@@ -95,15 +95,7 @@ class Sweep:
         return np.concatenate([block.indices.ravel() for block in self.blocks])
 
     def planned(self, index: int) -> PlannedWalk:
-        """The walk with a number.
-
-        Args:
-            index: number of the walk, one of `indices`.
-
-        Raises:
-            IndexError: there is no such walk.
-            InputError: no draw made a possible walk.
-        """
+        """The walk with a number, one of `indices`; an `IndexError` if there is none; errors as of `drawn`."""
         (walk,) = self.undrawn([index])
         return self.drawn(walk)
 
@@ -112,25 +104,18 @@ class Sweep:
 
         A sample may make no possible walk: with the drawn lengths, say, the chain does not reach round its sprocket.
         Then the whole sample is redrawn from its own random stream, which a designed sample does not use before. In
-        `saltelli` the d + 2 walks of a sample are redrawn together.
-
-        Raises:
-            InputError: no draw made a possible walk.
+        `saltelli` the d + 2 walks of a sample are redrawn together. An `InputError` says that no draw was possible.
         """
         block, fixed = self.blocks[walk.block], walk.setup
         if not block.drawn:
             return walk
         row, member = divmod(walk.sample, walks_per_sample(block.sampler, len(block.drawn)))
-        distributions, designed = block.placed(fixed), block.sampler != "random"
+        distributions, designed = placed(block.distributions, fixed), block.sampler != "random"
         points, setups = self._first_possible(block, walk.cell, fixed, distributions, row, designed=designed)
         return replace(walk, setup=setups[member], drawn=points[member])
 
     def undrawn(self, indices: Iterable[int]) -> Iterator[PlannedWalk]:
-        """Walks without their draws, which take most of the time; options and number of links never depend on them.
-
-        Raises:
-            IndexError: there is no such walk.
-        """
+        """Walks without their draws, which take most of the time; options and number of links never depend on them."""
         before: tuple[int, tuple[int, ...]] | None = None
         for index in map(int, indices):
             number, cell, sample = self._located(index)
@@ -158,11 +143,7 @@ class Sweep:
         return Keep(series_every=every.get("series"), frame_every=every.get("frames"), before=before)
 
     def check(self) -> None:
-        """Check every cell: its fixed values, its distributions, and that a random sample makes a possible walk.
-
-        Raises:
-            InputError: a cell is refused.
-        """
+        """Check every cell: its fixed values, its distributions, and that a random sample makes a possible walk."""
         most = max(block.samples for block in self.blocks)
         for name, choice in self.recording.choices.items():
             if choice.samples != "all" and choice.samples[-1] >= most:
@@ -179,7 +160,7 @@ class Sweep:
                 if fixed.options is not before:
                     before = fixed.options
                     self._check_options(block, first, before)
-                distributions = block.placed(fixed)
+                distributions = placed(block.distributions, fixed)
                 for name, distribution in distributions.items():
                     if distribution != checked.get(name) and distribution.share() < LEAST_SHARE:
                         raise InputError(
@@ -240,10 +221,7 @@ class Sweep:
         return block.first_stream + number
 
     def canonical(self) -> dict[str, Any]:
-        """The sweep as JSON-able content of a file, with every default and range written out.
-
-        `load_sweep` of it gives the same sweep.
-        """
+        """The sweep as JSON-able content of a file, with every default and range written out."""
         return {
             "version": VERSION,
             "name": self.name,
@@ -254,13 +232,10 @@ class Sweep:
         }
 
     def digest(self, samples: Sequence[int] | None = None) -> str:
-        """SHA-256 of all that decides the numbers and their order: the canonical form without names and defaults.
+        """SHA-256 of all that decides the numbers and their order, with other numbers of samples if these are given.
 
-        Without defaults, so that a field that a later version adds changes no digest; `NUMERICS_VERSION` tells of
-        defaults and presets that changed.
-
-        Args:
-            samples: samples of each block, in place of the sweep's own.
+        That is the canonical form without names and without defaults, so that a field that a later version adds changes
+        no digest; `NUMERICS_VERSION` tells of defaults and presets that changed.
         """
         content = {name: value for name, value in self.canonical().items() if name != "name"}
         for number, block in enumerate(content["blocks"]):

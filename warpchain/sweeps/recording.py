@@ -2,16 +2,7 @@
 
 from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    BeforeValidator,
-    Discriminator,
-    Field,
-    Strict,
-    Tag,
-    model_validator,
-)
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Discriminator, Field, Strict, Tag, model_validator
 
 from warpchain.inputs.options import Options
 from warpchain.inputs.validation import STRICT, InputError, number_field
@@ -23,14 +14,11 @@ FRAME_INTERVAL: Final = 2e-3
 """Default time [s] between two frames."""
 
 
-def _rising(samples: tuple[int, ...]) -> tuple[int, ...]:
-    if len(set(samples)) < len(samples):
-        raise ValueError("a number is given twice; leave one out")
-    return tuple(sorted(samples))
-
-
 _Numbers = Annotated[
-    tuple[Annotated[int, Field(ge=0, le=2**30)], ...], Strict(False), Field(min_length=1), AfterValidator(_rising)
+    tuple[Annotated[int, Field(ge=0, le=2**30)], ...],
+    Strict(False),
+    Field(min_length=1),
+    AfterValidator(lambda given: tuple(sorted(set(given)))),
 ]
 _Samples = Annotated[
     Annotated[Literal["all"], Tag("(all)")] | Annotated[_Numbers, Tag("(numbers)")],
@@ -103,8 +91,8 @@ class Recording(BaseModel):
 
     model_config = STRICT
 
-    series: Annotated[Series | None, _SWITCH] = Field(None, description="time series of the centre of mass")
-    frames: Annotated[Frames | None, _SWITCH] = Field(None, description="positions of all joints")
+    series: Annotated[Series | None, _SWITCH] = Field(default=None, description="time series of the centre of mass")
+    frames: Annotated[Frames | None, _SWITCH] = Field(default=None, description="positions of all joints")
 
     @model_validator(mode="after")
     def _frames_beside_series(self) -> Self:
@@ -121,8 +109,3 @@ class Recording(BaseModel):
     def canonical(self) -> dict[str, Any]:
         """Its form in a sweep file."""
         return {"series": False} | self.model_dump(mode="json", exclude_none=True)
-
-    @classmethod
-    def of(cls, canonical: object) -> "Recording":
-        """The recording of a canonical form."""
-        return cls.model_validate(canonical)

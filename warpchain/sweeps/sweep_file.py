@@ -26,7 +26,7 @@ from pydantic import (
 
 from warpchain.inputs.distributions import DRAWABLE, LARGEST_SEED, TABLE, Distribution, Gaussian, Uniform
 from warpchain.inputs.parameters import PRESETS
-from warpchain.inputs.scene import LISTS
+from warpchain.inputs.scene import COMPOUND
 from warpchain.inputs.sections import SECTIONS
 from warpchain.inputs.validation import (
     FIELDS,
@@ -47,7 +47,7 @@ from warpchain.inputs.validation import (
     suggestion,
 )
 from warpchain.inputs.yaml_files import read_yaml
-from warpchain.sweeps.axes import AXIS_LIMIT, CELL_LIMIT, axis
+from warpchain.sweeps.axes import CELL_LIMIT, Name, axis, list_of, named_axis
 from warpchain.sweeps.block import POINT, Block, Value
 from warpchain.sweeps.designs import SAMPLERS, check_design
 from warpchain.sweeps.recording import Frames, Recording
@@ -99,9 +99,7 @@ _TYPES: Final[Mapping[str, Any]] = {
     ]
     for name, field in FIELDS.items()
 }
-
-
-_AXES: Final = {name: kind for name, kind in _TYPES.items() if name not in LISTS}
+_AXES: Final = {name: (named_axis if name in COMPOUND else axis)(kind) for name, kind in _TYPES.items()}
 
 
 def _mapping_of(title: str, types: Mapping[str, Any]) -> Any:
@@ -143,17 +141,20 @@ def _distribution(given: Any, info: ValidationInfo) -> Distribution | None:
     if (given.uniform is None) == (given.gaussian is None):
         raise ValueError("no distribution; give {uniform: [lower, upper]} or {gaussian: {mean: …, sigma: …}}")
     bounds = field_bounds(FIELDS[name])
+    law: Distribution
     if given.gaussian is not None:
-        if given.gaussian.mean is not None and not bounds.admit(given.gaussian.mean):
-            raise InputError(f"gaussian.mean: {given.gaussian.mean} is not physical; see `warpchain parameters {name}`")
-        return Gaussian(given.gaussian.mean, given.gaussian.sigma, bounds)
-    lower, upper = given.uniform
-    if lower >= upper:
-        raise InputError(f"uniform[1]: {upper} is not greater than {lower}; give a greater value")
-    for place, end, inwards in ((0, lower, math.inf), (1, upper, -math.inf)):  # an end may be an open bound
-        if not (bounds.admit(end) or bounds.admit(math.nextafter(end, inwards))):
-            raise InputError(f"uniform[{place}]: {end} is not physical; see `warpchain parameters {name}`")
-    return Uniform(lower, upper, bounds)
+        law = Gaussian(given.gaussian.mean, given.gaussian.sigma, bounds)
+        numbers = {"gaussian.mean": law.mean}
+    else:
+        lower, upper = given.uniform
+        if lower >= upper:
+            raise InputError(f"uniform[1]: {upper} is not greater than {lower}; give a greater value")
+        law, numbers = Uniform(lower, upper, bounds), {"uniform[0]": lower, "uniform[1]": upper}
+    least, most = math.nextafter(bounds[0], -math.inf), math.nextafter(bounds[1], math.inf)  # one may be an open bound
+    for where, number in numbers.items():
+        if number is not None and not least <= number <= most:
+            raise InputError(f"{where}: {number} is not physical; see `warpchain parameters {name}`")
+    return law
 
 
 _Word = Literal["table", "fixed"]
@@ -206,16 +207,11 @@ class BlockKeys(WalkKeys):
         dict[str, Any], _mapping_of("distributions", {"all": _Word, **dict.fromkeys(DRAWABLE, _Drawn)})
     ] = Field({}, description="what samples draw, see below")
     grid: Annotated[
-        dict[str, list[Value]],
-        _mapping_of("grid", {"preset": axis(_Preset), **{name: axis(kind) for name, kind in _AXES.items()}}),
+        dict[str, list[Value] | dict[str, Value]], _mapping_of("grid", {"preset": axis(_Preset), **_AXES})
     ] = Field({}, description="axes of the grid, see below; not in a file with blocks")
-
     points: Annotated[
         dict[str, list[Value]],
-        _mapping_of(
-            "points",
-            {name: Annotated[list[kind], Field(min_length=1, max_length=AXIS_LIMIT)] for name, kind in _AXES.items()},
-        ),
+        _mapping_of("points", {name: list_of(kind) for name, kind in _TYPES.items() if name not in COMPOUND}),
     ] = Field(
         {},
         description="parameter sets: quantity → its value in each; one more axis, `point`; not in a file with blocks",
@@ -242,11 +238,7 @@ class BlockKeys(WalkKeys):
 class BlockOfFile(BlockKeys):
     """An item of `blocks`."""
 
-    name: str = Field(
-        pattern="^[A-Za-z0-9][A-Za-z0-9_-]*$",
-        max_length=LONGEST_NAME,
-        description="name of the block, unique in its sweep",
-    )
+    name: Name = Field(description="name of the block, unique in its sweep")
 
 
 class SweepFile(BlockKeys):
@@ -263,7 +255,7 @@ class SweepFile(BlockKeys):
     same_samples_along: list[str] = Field(
         [], description="axes along which the samples of all cells draw the same numbers"
     )
-    record: Recording = Field(Recording.of({}), description="what is kept of the motion of walks, see below")
+    record: Recording = Field(Recording(), description="what is kept of the motion of walks, see below")
 
     @model_validator(mode="after")
     def _one_grid_or_blocks(self) -> Self:
@@ -277,16 +269,7 @@ class SweepFile(BlockKeys):
         return self
 
 
-_KEYS: Final = (
-    *SweepFile.model_fields,
-    *Recording.model_fields,
-    *Frames.model_fields,
-    *_Law.model_fields,
-    "from",
-    "to",
-    "step",
-    "count",
-)
+_KEYS: Final = [name for model in (SweepFile, Recording, Frames, _Law) for name in model.model_fields]
 
 
 def sweep_schema() -> dict[str, Any]:
@@ -320,19 +303,7 @@ def read_walk_file(path: str | os.PathLike[str]) -> tuple[str | None, dict[str, 
 def read_sweep(
     source: str | os.PathLike[str] | Mapping[str, object], **replaced: object
 ) -> tuple[str, int, tuple[str, ...], tuple[Block, ...], Recording]:
-    """Read a sweep file, or one that comes with the package by its bare name, or take its content as a mapping.
-
-    Args:
-        source: the file or its content.
-        replaced: `seed` and `samples` instead of those at the top of the file; blocks with samples of their own keep
-            these.
-
-    Returns:
-        Name, seed, axes of equal samples, blocks and recording: the fields of `warpchain.sweeps.plan.Sweep`.
-
-    Raises:
-        InputError: the file cannot be read, or something in it is refused.
-    """
+    """The fields of a `Sweep`: name, seed, axes of equal samples, blocks, recording; see `load_sweep`."""
     content = plain(source, "sweep") if isinstance(source, Mapping) else read_yaml(sweep_path(source))
     replaced = {key: value for key, value in replaced.items() if value is not None}
     if isinstance(content, dict):
@@ -358,7 +329,8 @@ def _block(name: str, path: str, outer: BlockKeys | None, inner: BlockKeys) -> B
         return {**(getattr(outer, key) if outer else {}), **getattr(inner, key)}
 
     points = {name: tuple(values) for name, values in inner.points.items()}
-    axes = {axis: tuple(values) for axis, values in inner.grid.items()}
+    axes: dict[str, tuple[Value, ...]] = {axis: tuple(values) for axis, values in inner.grid.items()}
+    named = {axis: values for axis, values in inner.grid.items() if isinstance(values, dict)}
     if points:
         axes = {POINT: tuple(range(len(next(iter(points.values()))))), **axes}
     varied = {*axes, *points}
@@ -371,7 +343,7 @@ def _block(name: str, path: str, outer: BlockKeys | None, inner: BlockKeys) -> B
     drawn = _drawn(merged("distributions"), sections, varied, f"{path}.distributions")
     check_design(sampler or "random", samples, len(drawn), path)
     fixed = None if "preset" in axes else preset
-    return Block(path, name, fixed, sections, axes, points, drawn, sampler or "random", samples)
+    return Block(path, name, fixed, sections, axes, named, points, drawn, sampler or "random", samples)
 
 
 def _drawn(

@@ -1,5 +1,6 @@
 """What makes a walk inaccurate, although it may have come to rest."""
 
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -14,7 +15,8 @@ FAULTS: Final = {
     "energy": ENERGY_REMEDY,
     "opening": "joints opened by more than a link length, so that the chain came apart; lower the masses or "
     "options.tolerance, or raise parameters.joint_stiffness",
-    "penetration": "circles sank in by more than their radius, through what they touched; lower options.contact_step",
+    "penetration": "circles sank in by more than the least radius, through what they touched; "
+    "lower options.contact_step",
 }
 """Faults of a walk, each with what it means and what to try."""
 
@@ -25,10 +27,28 @@ def energy_error(at_release: ArrayLike, residual: ArrayLike) -> NDArray[np.float
     return np.abs(residual) / np.where(energy > 0, energy, np.nan)
 
 
-def faults(energy_error: Any, opening: Any, penetration: Any, link_length: Any, circle_radius: Any) -> dict[str, Any]:
-    """Whether walks have each of `FAULTS`: of numbers or arrays, lengths in m. NaN is no fault."""
+LENGTHS: Final = ("link_length", "circle_radius", "link_radii", "charm_radius")
+"""Quantities against which openings and penetrations are held."""
+
+
+def least(value: Any) -> float:
+    """The least of a number or of several; ∞ for None."""
+    return float(np.min(np.inf if value is None else value))
+
+
+def faults(energy_error: Any, opening: Any, penetration: Any, lengths: Mapping[str, Any]) -> dict[str, Any]:
+    """Whether walks have each of `FAULTS`: of numbers or arrays; NaN is no fault.
+
+    Args:
+        energy_error: see `energy_error`.
+        opening: greatest of a joint [m].
+        penetration: greatest of a circle [m].
+        lengths: the `least` of each of `LENGTHS` [m].
+    """
+    link_length, circle_radius, link_radii, charm_radius = (lengths[name] for name in LENGTHS)
+    radius = np.minimum(charm_radius, np.where(np.isinf(link_radii), circle_radius, link_radii))
     return {
         "energy": energy_error > MOST_ENERGY_ERROR,
         "opening": opening > link_length,
-        "penetration": penetration > circle_radius,
+        "penetration": penetration > radius,
     }

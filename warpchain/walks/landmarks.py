@@ -18,7 +18,7 @@ RELEASE: Final = {
     "center_y": "y of the centre of mass",
     "width": "width of the joints' outline",
     "height": "height of the joints' outline, in their plane",
-    "lowest": "y of the lowest joint, in their plane",
+    "lowest": "y of the lowest point of all circles",
 }
 """Keys of `WalkResult.release`, see `at_release`."""
 PAUSE: Final = 0.01
@@ -31,12 +31,11 @@ BOUNCE: Final = ("start", "end", "impulse_x", "impulse_y", "sticks_at")
 """Columns of a table of bounces."""
 
 
-def at_release(sample: Array, radius: float) -> dict[str, Any]:
-    """Fields of a `WalkResult` out of the first sample of a walk and the radius of the circles [m]."""
+def at_release(sample: Array) -> dict[str, Any]:
+    """Fields of a `WalkResult` out of the first sample of a walk."""
     columns = [layout.CENTER_X, layout.CENTER_Y, layout.WIDTH, layout.HEIGHT, layout.LOWEST]
-    values = dict(zip(RELEASE, sample[columns].tolist(), strict=True))
-    speed = float(sample[layout.LOOP_SPEED])
-    return {"release": values | {"lowest": values["lowest"] + radius}, "release_speed": speed}
+    release = dict(zip(RELEASE, sample[columns].tolist(), strict=True))
+    return {"release": release, "release_speed": float(sample[layout.LOOP_SPEED])}
 
 
 def bounces(time: Array, velocity: Array, setup: Setup) -> dict[str, Array]:

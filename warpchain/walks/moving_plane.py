@@ -10,7 +10,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import link_values
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.state import State
@@ -30,9 +29,10 @@ def released_plane(setup: Setup, position: Array) -> Array:
         position: x, y [m], θ [rad] of the links in the upright plane, shape (n, 3).
     """
     scene, parameters = setup.scene, setup.parameters
-    masses = link_values(scene, parameters).mass
+    links = link_values(scene, parameters)
+    masses = links.mass
     center_x, center_y, _ = masses @ position / masses.sum()
-    lowest = lowest_point(position, parameters)
+    lowest = lowest_point(position, parameters.link_length, links.radius)
     sine, cosine = math.sin(scene.tilt), math.cos(scene.tilt)
     turn_x, turn_y = -scene.tilt_rate, scene.yaw_rate
     plane = np.zeros(layout.PLANE_VALUES)
@@ -45,10 +45,10 @@ def released_plane(setup: Setup, position: Array) -> Array:
     return plane
 
 
-def lowest_point(position: Array, parameters: Parameters) -> float:
-    """Height [m] of the lowest point of a chain's circles; position (n, 3)."""
-    ends = position[:, 1] - parameters.link_length / 2 * np.abs(np.sin(position[:, 2]))
-    return float(np.min(ends)) - parameters.circle_radius
+def lowest_point(position: Array, link_length: float, radius: Array) -> float:
+    """Height [m] of the lowest point of a chain's circles; position (n, 3), radius (n,)."""
+    ends = position[:, 1] - link_length / 2 * np.abs(np.sin(position[:, 2]))
+    return float(np.min(ends - radius))
 
 
 def angles(planes: Array) -> tuple[Array, Array]:

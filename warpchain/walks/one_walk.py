@@ -3,18 +3,22 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import Field
 
 from warpchain.engine.devices import gpu_turn, versions
-from warpchain.inputs.options import Options
 from warpchain.inputs.setup import Setup, check_has_joint_forces
-from warpchain.inputs.validation import InputError, checked_positive, plain, shown
+from warpchain.inputs.validation import InputError, checked, plain
 from warpchain.walks.motion import LONGEST_INTERVAL, Keep
-from warpchain.walks.scheduler import run_setups
+from warpchain.walks.scheduler import compile_kernels, run_setups
 from warpchain.walks.walk_phases import WalkRun
 from warpchain.walks.walk_result import WalkResult
 
 SHORTEST_INTERVAL = 1e-6
 """Least time [s] between two frames, as between two samples."""
+_INTERVAL = Annotated[float, Field(ge=SHORTEST_INTERVAL, lt=LONGEST_INTERVAL)]
+_BEFORE = Annotated[float, Field(ge=0, le=LONGEST_INTERVAL)]
 RECORD_BEFORE = 0.5
 """Time [s] before the release that is kept if frames are, unless told otherwise."""
 
@@ -49,22 +53,32 @@ def run_walk(
     on_progress: OnProgress | None = None,
 ) -> WalkResult:
     """Run a walk whose setup is complete, samples drawn; the seed is only noted. The rest is as of `warpchain.walk`."""
-    started = time.perf_counter()
-    frame_every, between = _frame_marks(plain(frame_interval, "frame_interval"), setup.options)
-    before = _time_before(plain(record_before, "record_before"), frame_every) if setup.has_drive else 0.0
-
+    interval: float | None = checked(frame_interval, "frame_interval", _INTERVAL | None, "s")
+    before: float | None = checked(record_before, "record_before", _BEFORE | None, "s")
+    if interval is None and before:
+        raise InputError("record_before: a time is given, but frame_interval is None; give a frame_interval as well")
     if record_loads:
         check_has_joint_forces(setup.options)
-        if frame_every is None:
+        if interval is None:
             raise InputError("record_loads: loads are kept with frames, but frame_interval is None; give one")
+    samples = 0.0 if interval is None else interval / setup.options.record_interval
+    keep = Keep(
+        series_every=1,
+        frame_every=None if interval is None else max(1, round(samples)),
+        frame_interval=interval if interval is not None and samples <= 0.999 else 0.0,
+        loads=record_loads,
+        before=(RECORD_BEFORE if before is None and interval is not None else before or 0.0) * setup.has_drive,
+    )
 
-    def watch(run: WalkRun, compiling: bool) -> None:
+    def watch(run: WalkRun) -> None:
         if on_progress is not None:
-            phase = "compile" if compiling else run.phase.value
-            on_progress(Progress(phase, run.walk_time or run.simulated_time, run.speed, run.attempts))
+            on_progress(Progress(run.phase, run.walk_time or run.simulated_time, run.speed, run.attempts))
 
-    keep = Keep(series_every=1, frame_every=frame_every, frame_interval=between, loads=record_loads, before=before)
     with gpu_turn([setup.options.device]):
+        if on_progress is not None:
+            on_progress(Progress("compile", 0.0, 0.0, 0))
+        compile_kernels([setup])
+        started = time.perf_counter()
         ((_, run),) = run_setups([setup], keeps=[keep], watch=watch)
         return WalkResult(
             **run.outcome(),
@@ -72,37 +86,5 @@ def run_walk(
             setup=setup,
             seed=plain(seed),
             versions=versions(),
-            wall_time=time.perf_counter() - started - run.compile_time,
+            wall_time=time.perf_counter() - started,
         )
-
-
-def _frame_marks(frame_interval: object, options: Options) -> tuple[int | None, float]:
-    """Whole samples between two kept frames, None for no frames, and their time if it is less than a sample, else 0.
-
-    Raises:
-        InputError: it is no such time.
-    """
-    if frame_interval is None:
-        return None, 0.0
-    interval = checked_positive(frame_interval, "frame_interval", "time in s")
-    if not SHORTEST_INTERVAL <= interval < LONGEST_INTERVAL:
-        raise InputError(
-            f"frame_interval: {shown(interval)} is not between {SHORTEST_INTERVAL} s and {LONGEST_INTERVAL} s; "
-            "give a time between, or None"
-        )
-    samples = interval / options.record_interval
-    return (round(samples), 0.0) if samples > 0.999 else (1, float(interval))
-
-
-def _time_before(record_before: float | None, frame_every: int | None) -> float:
-    """Time [s] before the release that is kept, or an `InputError`."""
-    if record_before is None:
-        return RECORD_BEFORE if frame_every is not None else 0.0
-    is_number = isinstance(record_before, int | float) and not isinstance(record_before, bool)
-    if not (is_number and 0 <= record_before <= LONGEST_INTERVAL):
-        raise InputError(
-            f"record_before: {shown(record_before)} is not a time in s from 0 to {LONGEST_INTERVAL}; give one, or None"
-        )
-    if record_before > 0 and frame_every is None:
-        raise InputError("record_before: a time is given, but frame_interval is None; give a frame_interval as well")
-    return float(record_before)

@@ -1,11 +1,11 @@
 """Takes the time series and frames of a walk out of its world, between launches."""
 
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.engine.batch import Batch
+from warpchain.engine.batch import Batch, Recorded
 from warpchain.kernels import layout
 from warpchain.loop.stationary_loop import BEFORE, BeforeRelease
 from warpchain.walks.even_clock import even_rows
@@ -27,24 +27,6 @@ SERIES: Final[dict[str, int | list[int]]] = {
 """Arrays of a `WalkResult` that are columns of the samples."""
 
 
-class _Piece(NamedTuple):
-    """What one launch has recorded: t samples and f frames of a chain of n links.
-
-    Attributes:
-        samples: shape (t, columns of a sample).
-        times: of the frames [s], shape (f,).
-        frames: joints [m], shape (f, n, 2).
-        loads: forces [N] and moment [N m] of each joint, shape (f, n, 3); f is 0 if they are not kept.
-        planes: of the frames, shape (f, PLANE_VALUES).
-    """
-
-    samples: Array
-    times: Array
-    frames: Array
-    loads: Array
-    planes: Array
-
-
 class Recorder:
     """Samples and frames of one walk since its release, and of the last moments before if they are to be kept.
 
@@ -64,43 +46,26 @@ class Recorder:
         """
         self.before: BeforeRelease | None = None
         self._batch, self._world, self.keep, self._tilts = batch, world, keep, tilts
-        self._drive: list[tuple[float, _Piece]] = []  # with the time at which the launch ended [s]
-        self._pieces: list[_Piece] = []
+        self._drive: list[tuple[float, Recorded]] = []  # with the time at which the launch ended [s]
+        self._pieces: list[Recorded] = []
         self._after: float | None = None
-
-    def _nothing(self) -> _Piece:
-        """What a launch has recorded that recorded nothing."""
-        links, width = self._batch.links[self._world], self._batch.record.samples.shape[2]
-        return _Piece(
-            samples=np.empty((0, width)),
-            times=np.empty(0),
-            frames=np.empty((0, links, 2)),
-            loads=np.empty((0, links, 3)),
-            planes=np.empty((0, layout.PLANE_VALUES)),
-        )
 
     def drain(self, released: bool) -> None:
         """Take what the last launch wrote; before the release only what `release` may want is kept."""
-        piece, keep, batch, world = self._nothing(), self.keep, self._batch, self._world
-        if batch.record.samples.size > 0:
-            samples = batch.drain_samples(world)
-            if keep.series_every is not None or not released:
-                piece = piece._replace(samples=samples)
-        if batch.record.frames.size > 0:
-            planes = batch.frame_planes(world) if self._tilts and released else piece.planes
-            loads = batch.frame_loads(world) if keep.loads or not released else piece.loads
-            times, frames = batch.drain_frames(world)
-            if keep.frame_every is not None:
-                piece = piece._replace(times=times, frames=frames, loads=loads, planes=planes)
+        if not self._batch.records:
+            return
+        piece, keep = self._batch.drain(self._world), self.keep
         if released:
-            self._pieces.append(piece)
+            series, frames = keep.series_every is not None, keep.frame_every is not None
+            wanted = zip(piece, (series, frames, frames, keep.loads, frames), strict=True)
+            self._pieces.append(Recorded(*(rows if is_kept else rows[:0].copy() for rows, is_kept in wanted)))
         elif keep.before > 0:
-            until = batch.time(world)
+            until = self._batch.time(self._world)
             self._drive = [*(each for each in self._drive if each[0] >= until - keep.before), (until, piece)]
 
-    def _joined(self, pieces: list[_Piece]) -> _Piece:
-        """All pieces, one behind the other."""
-        return _Piece(*map(np.concatenate, zip(self._nothing(), *pieces, strict=True)))
+    def _joined(self, pieces: list[Recorded]) -> Recorded:
+        """All pieces, one behind the other; nothing has been recorded since."""
+        return Recorded(*map(np.concatenate, zip(*pieces, self._batch.drain(self._world), strict=True)))
 
     def release(self, moment: float, raised: float, earliest: float) -> None:
         """Keep what was recorded in the last moments of the drive, all of which has been drained.
@@ -130,7 +95,7 @@ class Recorder:
     def go_on(self, last: Array, time: float) -> None:
         """Begin within a walk at a time [s], with the sample before, (columns,)."""
         if last[layout.TIME] >= 0 and self.keep.series_every is not None:
-            nothing = self._nothing()
+            nothing = self._batch.drain(self._world)
             self._pieces.append(nothing._replace(samples=last[None, : nothing.samples.shape[1]].copy()))
             self._after = time
 

@@ -7,14 +7,11 @@ import numpy as np
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import gpu_turn
 from warpchain.engine.snapshot import restore, take_snapshot
-from warpchain.inputs.options import on_gpu
-from warpchain.inputs.scene import face_count
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.state import State
-from warpchain.inputs.validation import InputError, plain, shown
+from warpchain.inputs.validation import InputError, checked
 from warpchain.status import Status
 from warpchain.walks.moving_plane import state_of_plane
-from warpchain.walks.scheduler import ATTEMPTS
 from warpchain.walks.walk_phases import WalkRun
 
 FINER = 8
@@ -35,9 +32,7 @@ def state_at(setup: Setup, t: object, end: float) -> State:
     Raises:
         InputError: there is no such time, or the walk, run again, ends before.
     """
-    time = plain(t, "t")
-    if isinstance(time, bool) or not isinstance(time, int | float):
-        raise InputError(f"t: {shown(time)} is not a time; give a number of seconds")
+    time: float = checked(t, "t", float, "s")
     first = setup.scene.release[-1][0] if setup.scene.release is not None else 0.0  # then the sprocket vanishes
     if setup.start is not None:
         first = setup.start.time
@@ -48,30 +43,23 @@ def state_at(setup: Setup, t: object, end: float) -> State:
     if not first <= time <= end:
         raise InputError(f"t: {time:g} s is not in the walk; give a time from {first:g} to {end:.6g}")
     with gpu_turn([setup.options.device]):
-        batch = Batch(1, setup.scene.links, setup.options, faces=face_count(setup.scene))
+        batch = Batch(1, setup.scene.links, setup.options, faces=len(setup.floor.laws))
         run = WalkRun(batch, 0, setup)
-        attempts = ATTEMPTS["cuda" if on_gpu(setup.options.device) else "cpu"]
-        while not _has_come(run, batch, time):
-            before = take_snapshot(batch, 0) if run.is_released else None
-            batch.compile(run.features, batch.links)
-            batch.launch([0], run.features, attempts)
-            if before is not None and batch.time(0) >= time and attempts > 1:
-                restore(batch, 0, before)
-                attempts = max(1, attempts // FINER)
-            elif batch.status(0) != Status.RUNNING and not run.next_phase() and not _has_come(run, batch, time):
-                raise InputError(
-                    f"t: run again, the walk ends as {run.status.label} at {batch.time(0):.6g} s; give less"
+        attempts = batch.attempts_of_launch
+        for features in run.phases():
+            while not (has_come := run.is_free and batch.time(0) >= time) and batch.status(0) == Status.RUNNING:
+                before = take_snapshot(batch, 0) if run.is_free else None
+                batch.launch([0], features, attempts)
+                if before is not None and batch.time(0) >= time and attempts > 1:
+                    restore(batch, 0, before)
+                    attempts = max(1, attempts // FINER)
+            if has_come:
+                return State(
+                    position=batch.position(0),
+                    velocity=batch.velocity(0),
+                    setup=replace(setup, start=None),
+                    time=batch.time(0),
+                    memory=run.memory(),
+                    **(state_of_plane(batch.plane(0)) if setup.scene.plane == "tilting" else {}),
                 )
-        return State(
-            position=batch.position(0),
-            velocity=batch.velocity(0),
-            setup=replace(setup, start=None),
-            time=batch.time(0),
-            memory=run.memory(),
-            **(state_of_plane(batch.plane(0)) if setup.scene.plane == "tilting" else {}),
-        )
-
-
-def _has_come(run: WalkRun, batch: Batch, time: float) -> bool:
-    """Whether the walk has come to a time since its release."""
-    return run.is_released and batch.time(0) >= time
+        raise InputError(f"t: run again, the walk ends as {run.status.label} at {batch.time(0):.6g} s; give less")

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields
+from functools import reduce
+from operator import getitem
 from typing import Any, Final, get_args
 
 import numpy as np
@@ -10,7 +12,7 @@ from numpy.typing import NDArray
 from warpchain.engine.tallies import CONTACTS, LOST
 from warpchain.inputs.distributions import DRAWABLE
 from warpchain.inputs.validation import FIELDS, field_unit
-from warpchain.walks.faults import FAULTS, MOST_ENERGY_ERROR, energy_error, faults
+from warpchain.walks.faults import MOST_ENERGY_ERROR, energy_error, faults
 from warpchain.walks.walk_result import NUMBERS, WalkResult
 
 Rows = NDArray[np.void]
@@ -18,20 +20,12 @@ Rows = NDArray[np.void]
 KEYS: Final = np.dtype([("block", "<i4"), ("cell", "<i4"), ("sample", "<i4")])
 """What a row is found by: number of its block, of its cell in C order over the axes, of its sample in the cell."""
 
-LENGTHS: Final = ("link_length", "circle_radius")
-"""Against which openings and penetrations are held."""
-
 MISSING: Final = -1
 """Status of a walk that has not been computed yet; no code of `Status` is negative."""
 
 _DRAWN: Final = "_drawn"
-_PREFIXES: Final = {
-    "impulses": "impulses",
-    "greatest_penetration": "penetration",
-    "energy": "energy",
-    "release": "release",
-}
-"""Field that is a dictionary → how the names of its columns begin."""
+_PREFIXES: Final = {"greatest_penetration": "penetration"}
+"""Field that is a dictionary → how the names of its columns begin, if not with its own."""
 _ONLY_OF_A_WALK: Final = ("wall_time",)
 """Fields that are no columns: a number of a sweep is the same however its walk was computed."""
 
@@ -44,15 +38,13 @@ class Column:
         kind: its type in NumPy's notation.
         unit: SI unit, "1" for pure numbers.
         meaning: one line saying what the numbers are.
-        field: field of `WalkResult` that it is of; "" for none.
-        key: key in that field, if it is a dictionary, else "".
+        path: field of `WalkResult` that it is of, and key in that field, if it is a dictionary; none for others.
     """
 
     kind: str
     unit: str
     meaning: str
-    field: str = ""
-    key: str = ""
+    path: tuple[str, ...] = ()
 
 
 def _stored_columns() -> Iterator[tuple[str, Column]]:
@@ -64,7 +56,8 @@ def _stored_columns() -> Iterator[tuple[str, Column]]:
         kind = "<i8" if types[name][0] in (int, dict[str, int]) else "<f8"
         for key, meaning in (stored.keys or {"": stored.meaning}).items():
             prefix = "loss" if name == "energy" and key in LOST else _PREFIXES.get(name, name)
-            yield f"{prefix}_{key}" if key else name, Column(kind, stored.unit, meaning, name, key)
+            path = (name, key) if key else (name,)
+            yield "_".join((prefix, *path[1:])), Column(kind, stored.unit, meaning, path)
 
 
 STORED_COLUMNS: Final = dict(_stored_columns())
@@ -117,21 +110,17 @@ def fill_row(row: Any, outcome: Mapping[str, Any], drawn: Mapping[str, float]) -
     """
     row["status"] = outcome["status"]
     for name, column in STORED_COLUMNS.items():
-        value = outcome[column.field]
-        row[name] = value[column.key] if column.key else value
+        row[name] = reduce(getitem, column.path, outcome)
     for name, value in drawn.items():
         row[drawn_column(name)] = value
 
 
 def numbers_of(values: Mapping[str, Any]) -> dict[str, Any]:
     """The fields of a `WalkResult` in the columns of one walk, those apart that are no columns."""
-    found: dict[str, Any] = {name: {} for name in _PREFIXES}
+    found: dict[str, Any] = {}
     for name, column in STORED_COLUMNS.items():
-        value = values[name].item()
-        if column.key:
-            found[column.field][column.key] = value
-        else:
-            found[column.field] = value
+        owner = found.setdefault(column.path[0], {}) if column.path[1:] else found
+        owner[column.path[-1]] = values[name].item()
     return found
 
 
@@ -171,22 +160,11 @@ def faults_of_columns(
 
     Args:
         columns: of a sweep, by name.
-        lengths: `LENGTHS` [m] before anything was drawn, along the axes of the columns.
+        lengths: the least of each of `LENGTHS` [m] before anything was drawn, along the axes of the columns.
     """
     own = dict(lengths)
     for name in own:
         if (column := drawn_column(name)) in columns:  # NaN in rows of blocks that do not draw it
             own[name] = np.where(np.isnan(columns[column]), own[name], columns[column])
     deepest = np.max([columns[f"penetration_{kind}"] for kind in CONTACTS], axis=0)
-    return faults(columns["energy_error"], columns["greatest_opening"], deepest, **own)
-
-
-def fault_remedies(blocks: Iterable[Mapping[str, NDArray[np.bool_]]]) -> dict[str, int]:
-    """What inaccurate walks mean and what to try → number of walks of all blocks; only what there is.
-
-    Args:
-        blocks: as of `faults_of_columns`, for each block.
-    """
-    found = list(blocks)
-    counts = {remedy: sum(int(block[name].sum()) for block in found) for name, remedy in FAULTS.items()}
-    return {remedy: count for remedy, count in counts.items() if count}
+    return faults(columns["energy_error"], columns["greatest_opening"], deepest, own)

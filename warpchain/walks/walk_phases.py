@@ -6,78 +6,59 @@ the release.
 """
 
 import math
-from enum import Enum
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.engine.batch import Batch
-from warpchain.engine.control import (
-    HOLD_STRAIN,
-    LOADED_STRAIN,
-    hold_softness,
-    mean_weight,
-    push_rate,
-    suitable_load,
-)
-from warpchain.engine.snapshot import set_first_area, take_snapshot
+from warpchain.engine.snapshot import CACHES, change, restore, take_snapshot
 from warpchain.engine.sprocket_motion import motion_rows
 from warpchain.engine.tallies import CONTACTS, COUNTS, EXTREMES, LOST
-from warpchain.inputs.floor import circles_of, raised_by
-from warpchain.inputs.link_values import mean_value
-from warpchain.inputs.scene import (
-    contact_radius,
-    floor_body,
-    floor_points,
-    joint_radius,
-    link_values,
-    loop_speed,
-    settling_time,
-)
+from warpchain.inputs.floor import circles_of
+from warpchain.inputs.scene import joint_radius, link_values, settling_time
 from warpchain.inputs.setup import Setup
-from warpchain.inputs.start_shapes import ellipse, lay_chain, stadium
+from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.status import Status
-from warpchain.walks.going_on import go_on
+from warpchain.walks.drive import drive_of
 from warpchain.walks.landmarks import at_release
 from warpchain.walks.motion import NOTHING, Keep
-from warpchain.walks.moving_plane import angles, lowest_point, released_plane
+from warpchain.walks.moving_plane import angles, plane_of_state, released_plane, state_of_plane
 from warpchain.walks.recorder import Recorder
 
 Array = NDArray[np.float64]
 
-STILL_PERIOD = 0.25
-"""Loop period [s] that is assumed when the sprocket stands still."""
-SHORTEST_WINDOW, LONGEST_WINDOW = 0.05, 0.25
-"""Bounds of the time [s] over which a loop under its own loads is averaged; between them half a loop period.
-
-Loops whose links do not alternate are averaged over whole periods, no more than the lower bound needs."""
-BY_ITSELF = -1.0
-"""As `steady_time` means: the kernel chooses how long to watch, see :mod:`warpchain.kernels.events.release`."""
-
-
 _OF_THE_RUN = ("raised", "drive_time", "drift", "_at_full_speed", "_has_sprocket")
 """What a run knows of the time before its release."""
 
-PLANE_OUTCOME = ("lateral_drift", "final_tilt", "final_yaw", "greatest_tilt", "fell_at")
-"""Numbers of a walk's outcome that only a plane that tilts has."""
 
+def phase_features(setup: Setup) -> dict[str, Features]:
+    """What kernels are compiled for in the phases of a walk: `driven`, `moving` (beside a sprocket that moves), `free`.
 
-class Phase(Enum):
-    """Phases of a walk; the values are their names for people."""
+    Only the phases that it has; `free` always.
+    """
+    scene, options = setup.scene, setup.options
 
-    SETTLE = "settle"
-    SPIN_UP = "spin up"
-    HOLD = "hold"
-    WALK = "walk"
+    def features(body: str, **more: Any) -> Features:
+        columns = layout.padded_width(scene.links)
+        return Features(options.method, columns, body, self_contact=options.self_contact, **more)
+
+    body, tilts = setup.floor.body, scene.plane == "tilting"
+    found = {"free": features(body, tilts=tilts)}
+    if setup.has_drive:
+        found["driven"] = features("sprocket")
+        if scene.release is not None:
+            found["moving"] = features(body, tilts=tilts, moving_sprocket=True)
+    return found
 
 
 class WalkRun:
-    """One walk: loads a world; each time the world stops, it starts the next phase.
+    """One walk on a world, which :meth:`phases` takes from one phase to the next.
 
     Attributes:
         setup: What the walk is.
@@ -87,110 +68,113 @@ class WalkRun:
         drive_time: Simulated time [s] before the release.
         drift: How far the loop moved while it was last watched on its sprocket, relative to its height or width; NaN if
             it was not watched.
-        drive_counts: Counters (:data:`warpchain.engine.tallies.COUNTS`) of the time before the release.
-        drive_extremes: Greatest opening and depths [m] of the time before the release.
+        is_free: Whether the chain walks without a sprocket, and all that its start brings has been done.
         recorder: What is kept of the motion since the release.
-        compile_time: Wall time [s] for which the walk waited for kernels; counted only if somebody watches.
     """
 
     def __init__(self, batch: Batch, world: int, setup: Setup, keep: Keep = NOTHING) -> None:
-        """Place the chain of a walk in a world; the batch has the walk's options, and records what is to be kept."""
-        self.setup = setup
-        self.recorder = Recorder(batch, world, keep, setup.scene.plane == "tilting")
-        self.status = Status.RUNNING
-        self.raised = math.nan
-        self.drive_time = self.compile_time = 0.0
-        self.drift = math.nan
-        self.drive_counts = dict.fromkeys(COUNTS, 0)
-        self.drive_extremes = dict.fromkeys(EXTREMES, 0.0)
-        self._batch, self._world = batch, world
-        self._hanging_raise = math.nan
-        self._released = False
-        self._hold_softness = 0.0
-        self._at_full_speed = math.nan
-        self._first_area: float | None = None
-        self._moves_sprocket = False
-
+        """Prepare a walk; the batch has its options, and records what is to be kept."""
         scene, parameters = setup.scene, setup.parameters
+        self.setup = setup
+        self.recorder = Recorder(batch, world, keep, scene.plane == "tilting")
+        self.status = Status.RUNNING
+        self.raised = self.drift = self._at_full_speed = math.nan
+        self.drive_time = 0.0
+        self._before = {"counts": np.zeros(len(COUNTS), int), "extremes": np.zeros(len(EXTREMES))}  # the release
+        self.is_free = self._released = False
+        self._batch, self._world = batch, world
+        self._hold_softness = 0.0
         self._links = link_values(scene, parameters)
         self._has_sprocket = setup.has_drive
-        self._tilts = scene.plane == "tilting"
-        self._floor = floor_points(scene)
-        self._level = math.cos(math.radians(scene.slope))  # of a distance along the floor
-        if setup.start is not None:
-            self._go_on(setup.start)
-            return
-        from_rest = scene.start == "rest"
-        radius = joint_radius(scene, parameters)
-        speed = 2 * math.pi * scene.frequency * radius
-        if not self._has_sprocket:
-            self._set_chain()
-            try:
-                position, velocity = lay_chain(
-                    ellipse(scene.ellipse_aspect), scene.links, parameters.link_length, speed, scene.phase
-                )
-            except ValueError:
-                raise InputError(
-                    f"scene.ellipse_aspect: {scene.links} links cannot follow an ellipse of aspect "
-                    f"{scene.ellipse_aspect}; give one closer to 1, or more links"
-                ) from None
-            self._release(position, velocity)
-            return
-        density = mean_value(self._links.mass) / parameters.link_length
-        tension = density * speed**2
-        weight = mean_weight(parameters, density, scene.links, radius)
-        load_factor = scene.load_factor or suitable_load(parameters, self._links, setup.options, weight)
-        loaded_softness = 0.0
-        if setup.options.soften_drive:
-            self._hold_softness = hold_softness(parameters, tension, HOLD_STRAIN)
-            loaded_softness = hold_softness(parameters, tension + load_factor * weight, LOADED_STRAIN)
-        period = scene.links * parameters.link_length / speed if speed > 0 else STILL_PERIOD
-        window = min(max(period / 2, SHORTEST_WINDOW), LONGEST_WINDOW)
-        if not self._links.alternates:  # the loop swings as it turns: only over whole turns does its mean stay
-            window = period * math.ceil(SHORTEST_WINDOW / period)
-        self._set_chain(contact_radius(scene, parameters))
         self._settled = settling_time(scene)
-        spin_up = scene.spin_up_time if from_rest and speed > 0 else 0.0
-        self._at_full_speed = self._settled + spin_up
-        start_speed = 0.0 if from_rest else speed
-        position, velocity = lay_chain(stadium(radius), scene.links, parameters.link_length, start_speed)
-        softness = self._hold_softness
-        batch.load(world, position, velocity, stop_time=self._settled, stop_status=Status.FINISHED, softness=softness)
-        batch.set_drive(
-            world,
-            sprocket_speed=-2 * math.pi * scene.frequency,  # clockwise, so that the walk goes towards +x
-            spin_up_start=self._settled,
-            spin_up_time=spin_up,
-            hold_start=self._at_full_speed,
-            loop_speed=loop_speed(scene, parameters),
-            loop_period=period,
-            load_factor=load_factor,
-            steady_window=window,
-            steady_time=BY_ITSELF if scene.steady_time is None else scene.steady_time,
-            steady_tolerance=scene.steady_tolerance,
-            further_hold=scene.further_hold,
-            release_phase=scene.phase,
-            hold_softness=self._hold_softness,
-            loaded_softness=loaded_softness,
-            push_rate=push_rate(setup.options),
-        )
-        if not from_rest:
+        self._tilts = scene.plane == "tilting"
+        self._level = math.cos(math.radians(scene.slope))  # of a distance along the floor
+
+    def phases(self) -> Iterator[Features]:
+        """Set the world up for one phase after the other, and yield what its kernel must be compiled for.
+
+        The world is then to be carried on until it stops. At the end the walk has its `status`.
+        """
+        yield from self._phases()
+        status, scene = self._batch.status(self._world), self.setup.scene
+        is_planned = scene.walk_until is not None and scene.walk_until <= scene.walk_limit
+        self.status = Status.FINISHED if status == Status.TIME_LIMIT and is_planned else status
+
+    def _phases(self) -> Iterator[Features]:
+        batch, world, setup, features = self._batch, self._world, self.setup, phase_features(self.setup)
+        batch.set_up(world, setup)
+        if setup.start is not None:
+            area = self._go_on(setup.start)
+            if area is not None:
+                yield features["free"]
+                if batch.status(world) != Status.FINISHED:
+                    return
+                batch.set_state(world, first_area=area)
+                batch.resume(world, self._walk_end, Status.TIME_LIMIT)
+        elif not setup.has_drive:
+            self._release(*self._ellipse())
+        else:
+            hanging = math.nan
             self._start_drive()
+            if setup.scene.start == "rest":
+                yield features["driven"]
+                if batch.status(world) != Status.FINISHED:
+                    return
+                hanging = self._raise(batch.position(world))
+            batch.resume(world, self._at_full_speed + setup.scene.hold_limit, Status.NOT_STEADY)
+            yield features["driven"]
+            self.drift = batch.watched(world, layout.DRIFT)
+            if batch.status(world) != Status.FINISHED:
+                return
+            self.drive_time = batch.time(world)
+            self._before = {name: batch.host[f"state/{name}"][world].copy() for name in self._before}
+            free_since = float(np.fmax(self._at_full_speed, batch.unloaded_at(world)))
+            self._release(batch.position(world), batch.velocity(world), hanging)
+            self.recorder.release(self.drive_time, self.raised, free_since)
+            if setup.scene.release is not None:
+                moving = motion_rows(setup.scene.release, setup.scene.frequency, self.raised)
+                batch.set_drive(world, motion=moving)
+                batch.resume(world, min(setup.scene.release[-1][0], self._walk_end), Status.FINISHED)
+                yield features["moving"]
+                if batch.status(world) != Status.FINISHED:
+                    return
+                batch.resume(world, self._walk_end, Status.TIME_LIMIT)
+        self.is_free = True
+        yield features["free"]
+
+    def _ellipse(self) -> tuple[Array, Array]:
+        """Position and velocity (n, 3) of a chain that starts as an ellipse."""
+        scene, length = self.setup.scene, self.setup.parameters.link_length
+        speed = 2 * math.pi * scene.frequency * joint_radius(scene, self.setup.parameters)
+        try:
+            return lay_chain(ellipse(scene.ellipse_aspect), scene.links, length, speed, scene.phase)
+        except ValueError:
+            raise InputError(
+                f"scene.ellipse_aspect: {scene.links} links cannot follow an ellipse of aspect "
+                f"{scene.ellipse_aspect}; give one closer to 1, or more links"
+            ) from None
+
+    def _start_drive(self) -> None:
+        """Lay the chain on its sprocket; it is to settle there, if it starts at rest."""
+        (position, velocity), drive = drive_of(self.setup, self._links)
+        self._at_full_speed, self._hold_softness = drive["hold_start"], drive["hold_softness"]
+        self._batch.set_drive(self._world, **drive)
+        self._batch.load(
+            self._world,
+            position,
+            velocity,
+            stop_time=self._settled,
+            stop_status=Status.FINISHED,
+            softness=self._hold_softness,
+        )
 
     @property
-    def phase(self) -> Phase:
-        """The phase that the world is in."""
+    def phase(self) -> str:
+        """`settle`, `spin up`, `hold` or `walk`."""
         if self._released:
-            return Phase.WALK
+            return "walk"
         now = self._batch.time(self._world)
-        if now < self._settled:
-            return Phase.SETTLE
-        return Phase.SPIN_UP if now < self._at_full_speed else Phase.HOLD
-
-    @property
-    def is_released(self) -> bool:
-        """Whether the chain walks without a sprocket, and all that its start brings has been done."""
-        return self._released and self._first_area is None and not self._moves_sprocket
+        return "settle" if now < self._settled else "spin up" if now < self._at_full_speed else "hold"
 
     @property
     def _walk_end(self) -> float:
@@ -199,24 +183,17 @@ class WalkRun:
         return min(scene.walk_limit, scene.walk_until or math.inf)
 
     @property
-    def features(self) -> Features:
-        """What the kernel that carries the world on must be compiled for."""
-        if self._released:
-            body = floor_body(self.setup.scene)
-            return self._batch.features(fixed_body=body, tilts=self._tilts, moving_sprocket=self._moves_sprocket)
-        return self._batch.features(fixed_body="sprocket")
-
-    @property
     def counts(self) -> dict[str, int]:
         """Counters of all phases so far."""
-        now = self._batch.counts(self._world)
-        return {name: self.drive_counts[name] + now[name] for name in COUNTS} if self._released else now
+        before = self._before["counts"] if self._released else 0
+        return dict(zip(COUNTS, (before + self._batch.host["state/counts"][self._world]).tolist(), strict=True))
 
     @property
     def extremes(self) -> dict[str, float]:
         """Greatest opening and depths [m] of all phases so far."""
-        now = self._batch.extremes(self._world)
-        return {name: max(self.drive_extremes[name], now[name]) for name in EXTREMES} if self._released else now
+        now = self._batch.host["state/extremes"][self._world]
+        now = np.fmax(self._before["extremes"], now) if self._released else now
+        return dict(zip(EXTREMES, now.tolist(), strict=True))
 
     @property
     def attempts(self) -> int:
@@ -269,20 +246,22 @@ class WalkRun:
 
     def _fall(self, is_at_rest: bool) -> dict[str, Any]:
         """What became of the plane; NaN and −1 if it is fixed or was never released."""
-        if not (self._tilts and self._released):
-            return {**dict.fromkeys(PLANE_OUTCOME, math.nan), "fell_over": -1, "fell_before_collapse": -1}
         last = self._batch.last_sample(self._world)
         tilt, yaw = angles(last[layout.PLANE_COLUMN :])
-        collapsed_at, fell_at = (self._batch.watched(self._world, row) for row in (layout.COLLAPSED_AT, layout.FELL_AT))
-        return {
+        rows = (layout.COLLAPSED_AT, layout.FELL_AT, layout.GREATEST_LEAN)
+        collapsed_at, fell_at, lean = (self._batch.watched(self._world, row) for row in rows)
+        found: dict[str, float] = {
             "lateral_drift": float(last[layout.CENTER_Z]) if is_at_rest else math.nan,
             "final_tilt": float(tilt),
             "final_yaw": float(yaw),
-            "greatest_tilt": self._batch.greatest_tilt(self._world),
+            "greatest_tilt": math.asin(min(1.0, lean)),
             "fell_at": fell_at,
             "fell_over": int(not math.isnan(fell_at)),
             "fell_before_collapse": int(fell_at < (math.inf if math.isnan(collapsed_at) else collapsed_at)),
         }
+        if self._tilts and self._released:
+            return found
+        return {name: -1 if isinstance(value, int) else math.nan for name, value in found.items()}
 
     def _ending(self, moment: str, event: str, first: int) -> dict[str, Any]:
         """When an event came, after how many bounces begun, and how long after the last impulse on the floor.
@@ -329,40 +308,12 @@ class WalkRun:
             **self._ending("strands_met_at", "strands_met", layout.STRANDS_MET_AT),
             **self._ending("collapsed_at", "collapse", layout.COLLAPSED_AT),
             "sprocket_height": self.raised if self._has_sprocket else math.nan,
-            **at_release(first if self._released else np.full_like(first, np.nan), self.setup.parameters.circle_radius),
+            **at_release(first if self._released else np.full_like(first, np.nan)),
         }
 
     def drain(self) -> None:
         """Take what a launch has recorded; to be called after each launch, before the next phase."""
         self.recorder.drain(self._released)
-
-    def next_phase(self) -> bool:
-        """Start the next phase of a world that has stopped; False if the run is over."""
-        status = self._batch.status(self._world)
-        if not self._released:
-            self.drift = self._batch.watched(self._world, layout.DRIFT)
-        if self._released and not self.is_released and status == Status.FINISHED:
-            if self._first_area is not None:
-                set_first_area(self._batch, self._world, self._first_area)
-            self._first_area, self._moves_sprocket = None, False
-            self._batch.resume(self._world, self._walk_end, Status.TIME_LIMIT)
-            return True
-        if self._released or status != Status.FINISHED:
-            until, limit = self.setup.scene.walk_until, self.setup.scene.walk_limit
-            is_planned = status == Status.TIME_LIMIT and until is not None and until <= limit
-            self.status = Status.FINISHED if is_planned else status
-            return False
-        if self._batch.time(self._world) <= self._settled and math.isnan(self._hanging_raise):
-            self._hanging_raise = self._raise(self._batch.position(self._world))
-            self._start_drive()
-        else:
-            self.drive_time = self._batch.time(self._world)
-            self.drive_counts = self._batch.counts(self._world)
-            self.drive_extremes = self._batch.extremes(self._world)
-            free_since = max(self._at_full_speed, self._batch.unloaded_at(self._world))
-            self._release(self._batch.position(self._world), self._batch.velocity(self._world))
-            self.recorder.release(self.drive_time, self.raised, free_since)
-        return True
 
     def memory(self) -> dict[str, NDArray[Any]]:
         """All that the rest of a walk, or of its outcome, depends on: a `State.memory`."""
@@ -370,75 +321,74 @@ class WalkRun:
             **take_snapshot(self._batch, self._world),
             "setup": self.setup.fingerprint,
             **{f"run/{name}": np.array(getattr(self, name)) for name in _OF_THE_RUN},
-            "run/counts": np.array([self.drive_counts[name] for name in COUNTS]),
-            "run/extremes": np.array([self.drive_extremes[name] for name in EXTREMES]),
+            **{f"run/{name}": values for name, values in self._before.items()},
         }
 
-    def _go_on(self, start: State) -> None:
-        """Place a chain as a state has it; if that was taken from a walk, go on with the walk."""
+    def _go_on(self, start: State) -> float | None:
+        """Place a chain as a state has it; if that was taken from a walk, go on with the walk.
+
+        Returns:
+            None, unless the state was changed. Then the world is to stop at once, and so make the sample with which
+            its new ledger begins; after that `State.first_area` is to be set to this.
+        """
         batch, world, memory = self._batch, self._world, start.memory
-        self._set_chain()
         self._released = True
         if not memory:
             self._load(start.position, start.velocity)
-            return
+            return None
         for name in _OF_THE_RUN:
             setattr(self, name, memory[f"run/{name}"].item())
-        self.drive_counts = dict(zip(COUNTS, memory["run/counts"].tolist(), strict=True))
-        self.drive_extremes = dict(zip(EXTREMES, memory["run/extremes"].tolist(), strict=True))
-        if go_on(batch, world, start, self.setup, self._walk_end, self.recorder.keep.frame_interval):
+        self._before = {name: memory[f"run/{name}"] for name in self._before}
+        is_kept, interval = start.is_placed_as_in(self.setup), self.recorder.keep.frame_interval
+        restore(batch, world, {name: part for name, part in memory.items() if is_kept or name not in CACHES})
+        batch.set_state(world, next_frame=np.floor(start.time / interval) if interval > 0 else -1)
+        self._set_farthest()
+        if is_kept and self._is_at(start):
+            batch.resume(world, self._walk_end, Status.TIME_LIMIT)
             self.recorder.go_on(memory["state/last_sample"], start.time)
-        else:
-            self._first_area = float(memory["state/first_area"])
-        self._set_floor()
+            return None
+        if self._tilts:
+            batch.set_plane(world, plane_of_state(start))
+        change(batch, world, start.position, start.velocity)
+        batch.resume(world, batch.time(world), Status.FINISHED)
+        return float(memory["state/first_area"])
 
-    def _start_drive(self) -> None:
-        limit = self._at_full_speed + self.setup.scene.hold_limit
-        self._batch.resume(self._world, limit, Status.NOT_STEADY)
+    def _is_at(self, start: State) -> bool:
+        """Whether the world has the places and velocities of a state, to the bit."""
+        batch, world = self._batch, self._world
+        here = {"position": batch.position(world), "velocity": batch.velocity(world)}
+        if self._tilts:
+            here |= state_of_plane(batch.plane(world))
+        return all(values.tobytes() == getattr(start, name).tobytes() for name, values in here.items())
 
     def _raise(self, position: Array) -> float:
         """How far a chain at this position must be raised to its clearance [m]."""
-        clearance, parameters = self.setup.scene.clearance, self.setup.parameters
-        if self._floor is None:
-            return clearance - lowest_point(position, parameters)
-        circles = circles_of(position, parameters.link_length)
-        return raised_by(self._floor, circles, parameters.circle_radius, clearance)
+        clearance, length, radius = self.setup.scene.clearance, self.setup.parameters.link_length, self._links.radius
+        return self.setup.floor.raised_by(circles_of(position, length), np.tile(radius, 2), clearance)
 
-    def _set_floor(self) -> None:
-        """Set the floor, and how far the chain may walk on it."""
-        scene = self.setup.scene
-        self._batch.set_drive(self._world, farthest=(scene.distance_limit or 0.0) * self._level)
-        if self._floor is not None:
-            self._batch.set_floor(self._world, self._floor, self.setup.parameters)
+    def _set_farthest(self) -> None:
+        """Set how far the chain may walk."""
+        self._batch.set_drive(self._world, farthest=(self.setup.scene.distance_limit or 0.0) * self._level)
 
-    def _release(self, position: Array, velocity: Array) -> None:
-        scene = self.setup.scene
-        self.raised = self._hanging_raise if scene.clearance_of == "hanging" else self._raise(position)
+    def _release(self, position: Array, velocity: Array, hanging: float = math.nan) -> None:
+        """Begin the walk of a chain; ``hanging``: how far it must be raised as it hung on its sprocket at rest [m]."""
+        self.raised = hanging if self.setup.scene.clearance_of == "hanging" else self._raise(position)
         position[:, 1] += self.raised
-        self._set_chain(None if scene.release is None else contact_radius(scene, self.setup.parameters))
         self._load(position, velocity)
         if self._tilts:
             self._batch.set_plane(self._world, released_plane(self.setup, position))
-        if scene.release is not None:
-            self._batch.set_drive(self._world, motion=motion_rows(scene.release, scene.frequency, self.raised))
-            self._batch.resume(self._world, min(scene.release[-1][0], self._walk_end), Status.FINISHED)
-            self._moves_sprocket = True
         self._released = True
 
-    def _set_chain(self, radius: float | None = None) -> None:
-        """Set the chain's constants, and the radius [m] at which circles touch the sprocket, if there is one."""
-        self._batch.set_chain(self._world, self.setup.parameters, self.setup.scene.links, radius, self._links)
-
     def _load(self, position: Array, velocity: Array) -> None:
-        """Begin the walk of a chain whose parameters are set."""
-        self._set_floor()
+        """Begin the walk of a chain on its floor."""
+        self._set_farthest()
         self._batch.load(
             self._world,
             position,
             velocity,
             stop_time=self._walk_end,
             stop_status=Status.TIME_LIMIT,
-            attempts_before=self.drive_counts["accepted"] + self.drive_counts["rejected"],
+            attempts_before=int(self._before["counts"][[layout.ACCEPTED, layout.REJECTED]].sum()),
             softness=self._hold_softness,
             has_frame_marks=self.recorder.keep.frame_interval > 0,
         )

@@ -23,7 +23,6 @@ from warpchain.engine.tallies import COUNTS, DEPTHS, EXTREMES, IMPULSES, LOST
 from warpchain.files import write_whole
 from warpchain.hdf5_files import (
     Stored,
-    check_fields,
     hdf5_image,
     put,
     read_fields,
@@ -41,7 +40,7 @@ from warpchain.kernels import layout
 from warpchain.loop.stationary_loop import BEFORE, FIELDS, BeforeRelease
 from warpchain.pictures.walk_shape import Kind
 from warpchain.status import Status
-from warpchain.walks.faults import FAULTS, MOST_ENERGY_ERROR, energy_error, faults
+from warpchain.walks.faults import FAULTS, LENGTHS, MOST_ENERGY_ERROR, energy_error, faults, least
 from warpchain.walks.landmarks import RELEASE, bounces
 from warpchain.walks.moving_plane import in_room
 from warpchain.walks.stored_state import read_state, write_state
@@ -81,10 +80,6 @@ class WalkResult:
     impact a row of a velocity or an energy lies between the values before and after. Frames are at the ends of steps.
     `setup` is complete; `seed` is that of the random draw, None if nothing was drawn; `versions` names the software.
     `before_release` is the motion on the sprocket just before the release, None if it was not kept.
-
-    Raises:
-        ValueError: an array has another shape, or a dictionary other keys, than stands beside its field; or times do
-            not ascend.
     """
 
     status: Status
@@ -202,22 +197,13 @@ class WalkResult:
             return None
         return in_room(self.frame_joints, self.frame_origin, self.frame_axes)
 
-    def __post_init__(self) -> None:
-        """Check that arrays and dictionaries fit together."""
-        check_fields(self, self.setup.scene.links)
-        moving = self.setup.scene.plane == "tilting"
-        if moving != bool(len(self.tilt)) and len(self.time):
-            raise ValueError(f"tilt: it has {len(self.tilt)} instants; give those of a plane that tilts, and no others")
-        if (loads := np.shape(self.frame_forces)[:2]) != (moments := np.shape(self.frame_moments)):
-            raise ValueError(f"frame_moments: its shape is {moments}; give an array of shape {loads}, as of the forces")
-
     def __repr__(self) -> str:
         """One line with the most important numbers."""
         error = self.energy_error
         warning = f", energy error {error:.1e}" if error > MOST_ENERGY_ERROR else ", inaccurate" * bool(self.warnings())
         return (
             f"<WalkResult {self.status.label}: dx {self.dx:.4g} m in {self.walk_time:.4g} s, "
-            f"{self.bounces} bounces, {self.setup.described}, {self.setup.preset}{warning}>"
+            f"{self.bounces} bounce{'s' * (self.bounces != 1)}, {self.setup.described}, {self.setup.preset}{warning}>"
         )
 
     @property
@@ -228,9 +214,11 @@ class WalkResult:
 
     def warnings(self) -> list[str]:
         """Why the walk is inaccurate, each with what to try: energy, joints or contacts; empty if it is not."""
-        deepest, parameters = max(self.greatest_penetration.values()), self.setup.parameters
-        lengths = (self.greatest_opening, deepest, parameters.link_length, parameters.circle_radius)
-        return [FAULTS[name] for name, found in faults(self.energy_error, *lengths).items() if found]
+        values = vars(self.setup.scene) | vars(self.setup.parameters)
+        lengths = {name: least(values[name]) for name in LENGTHS}
+        deepest = max(self.greatest_penetration.values())
+        found = faults(self.energy_error, self.greatest_opening, deepest, lengths)
+        return [FAULTS[name] for name, is_there in found.items() if is_there]
 
     def state(self, t: float) -> State:
         """The chain at the end of its first step at or after a time, as samples and frames are taken.
@@ -401,7 +389,7 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
     """
     if os.path.isdir(path):
         record = os.path.join(path, "walk.h5")
-        if not os.path.exists(record) and os.path.exists(os.path.join(path, "sweep.json")):
+        if not os.path.exists(record) and os.path.exists(os.path.join(path, "sweep.h5")):
             raise InputError(f"{path}: the folder of a sweep, not of a saved walk; {WANTED}")
         path = record
     remedy = "run the walk again, or fetch another copy of the file"

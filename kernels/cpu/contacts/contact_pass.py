@@ -19,8 +19,6 @@ from warpchain.kernels.features import Features
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.types import Chain, Control, Drive, Ground, Integers, Row, Rows, State
 
-wp.set_module_options({"enable_backward": False})
-
 
 @functools.cache
 def body_pass(features: Features, plane: Plane):
@@ -29,9 +27,8 @@ def body_pass(features: Features, plane: Plane):
     ``meet_bodies(K, P, chain, felt, ground, still, drive, state, world)`` → number of impulses. ``felt``: the chain on
     the plane that it felt in the step; ``still``: the face but for its motion.
     """
-    gap_of, meet = plane.gap, plane.meet
     face_at = BODIES[features.fixed_body].motion
-    _, depth, count = of_fixed_body(features.fixed_body)
+    _, depth, count = of_fixed_body(features.is_driven)
     has_floor = features.has_floor
     moves = features.moving_sprocket
     if moves:
@@ -44,10 +41,10 @@ def body_pass(features: Features, plane: Plane):
     ):
         time = state.time[world]
         impulses = wp.int64(0)
-        gap = gap_of(K, felt, ground, still)
+        gap = plane.gap(K, felt, ground, still)
         if gap < ZERO:
             raise_extreme(state, world, depth, -gap)
-            impulses = meet(K, P, chain, ground, face_at(still, drive, world, time))
+            impulses = plane.meet(K, P, chain, ground, face_at(still, drive, world, time))
             add_count(state, world, count, impulses)
             if wp.static(has_floor):
                 if impulses > wp.int64(0):
@@ -58,7 +55,7 @@ def body_pass(features: Features, plane: Plane):
             overlap = -sprocket_gap(K, chain, ground, moved)
             if overlap > ZERO:
                 raise_extreme(state, world, layout.SPROCKET_DEPTH, overlap)
-                on_sprocket = resolve_sprocket(K, chain, ground, moved)
+                on_sprocket = resolve_sprocket(K, P, chain, ground, moved)
                 add_count(state, world, layout.SPROCKET_IMPULSES, on_sprocket)
                 impulses += on_sprocket
             gap = wp.min(gap, ZERO)  # the sprocket may come nearer by itself: steps stay short
@@ -79,7 +76,6 @@ def link_pass(features: Features, joints: Joints):
     build_list = neighbour_list(features.columns)
     resolve = self_contacts(features.columns)
     count = list_layout(features.columns).count
-    margins = joints.margins
 
     @wp.func
     def make_list(K: Rows, L: Integers, chain: Chain, state: State, world: int, skin: wp.float64, opening: wp.float64):
@@ -92,7 +88,7 @@ def link_pass(features: Features, joints: Joints):
     def meet_links(K: Rows, L: Integers, chain: Chain, state: State, control: Control, world: int, opening: wp.float64):
         impulses = wp.int64(0)
         if wp.static(has_self):
-            skin, least_slack = margins(state, control, world)
+            skin, least_slack = joints.margins(state, control, world)
             if state.slack[world] > ZERO:
                 state.slack[world] = list_slack(K, chain, skin, opening)
             if not state.slack[world] > least_slack:

@@ -17,8 +17,6 @@ from warpchain.kernels.physics.elementary import HALF, order_bits
 from warpchain.kernels.physics.geometry import whole_lanes
 from warpchain.kernels.types import Chain, Integers, Rows
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.func
 def greatest_displacement(K: Rows, chain: Chain):
@@ -37,14 +35,6 @@ def greatest_displacement(K: Rows, chain: Chain):
 def neighbour_list(columns: int):
     """Warp function that builds the list, for scratch of this width; False: more pairs are near than fit."""
     lists = list_layout(columns)
-
-    @wp.func
-    def remember_positions(K: Rows, chain: Chain):
-        i = int(0)
-        while i < chain.link_count:
-            K[LISTED_X, i] = K[RIGHT_X, i]
-            K[LISTED_Y, i] = K[RIGHT_Y, i]
-            i += 1
 
     @wp.func
     def arrange(L: Integers, total: int):
@@ -69,7 +59,6 @@ def neighbour_list(columns: int):
         n = chain.link_count
         reach = listing_reach(chain, skin, opening)
         square = reach * reach
-        remember_positions(K, chain)
         i = int(0)
         while i < wp.static(lists.table):
             L[wp.static(lists.bucket) + i] = -1
@@ -83,6 +72,8 @@ def neighbour_list(columns: int):
             L[wp.static(lists.cell_y) + i] = cell_y
             L[wp.static(lists.next_joint) + i] = L[wp.static(lists.bucket) + bucket]
             L[wp.static(lists.bucket) + bucket] = i
+            K[LISTED_X, i] = K[RIGHT_X, i]
+            K[LISTED_Y, i] = K[RIGHT_Y, i]
             i += 1
         total = int(0)
         fits = bool(True)

@@ -9,33 +9,18 @@ import functools
 
 import warp as wp
 
-from warpchain.kernels.contacts.fixed_body import BODIES, Touching, link_and_body
+from warpchain.kernels import layout
+from warpchain.kernels.contacts.fixed_body import BODIES, link_and_body
+from warpchain.kernels.contacts.impulse import Touching
 from warpchain.kernels.contacts.terrain import Face
-from warpchain.kernels.layout import (
-    COSINE,
-    ERROR,
-    INVERSE_INERTIA,
-    INVERSE_MASS,
-    LEFT_X,
-    LEFT_Y,
-    LOST_FIXED,
-    OMEGA,
-    RIGHT_X,
-    RIGHT_Y,
-    SINE,
-    U,
-    V,
-    X,
-    Y,
-)
+from warpchain.kernels.contacts.tilting_floor import greatest_across_speed
+from warpchain.kernels.layout import LEFT_X, LEFT_Y, LOST_FIXED, OMEGA, RADIUS, RIGHT_X, RIGHT_Y, SINE, U, V, X, Y
 from warpchain.kernels.physics.elementary import ONE, TWO, ZERO, from_order_key, order_bits, order_key
 from warpchain.kernels.physics.geometry import LANES, whole_lanes
-from warpchain.kernels.types import Chain, Ground, Rows
-
-wp.set_module_options({"enable_backward": False})
+from warpchain.kernels.types import Chain, Ground, Row, Rows, with_circles
 
 FURTHEST = wp.constant(wp.int64(2**63 - 1))
-GAP = ERROR
+GAP = layout.ERROR
 """Row of the links' gaps to the fixed body [m]. Between attempts nothing else uses it."""
 
 
@@ -54,23 +39,27 @@ def greatest_opening(K: Rows, chain: Chain):
 
 @wp.func
 def greatest_speed(K: Rows, chain: Chain):
-    """A bound on the speed [m/s] of every circle's centre: the greatest √2 √(v² + (a ω)²) ≥ |v| + a |ω|."""
+    """A bound on the speed [m/s] of every point of a roller, across the plane, too, if that tilts.
+
+    Within it √2 √(v² + (a ω)²) ≥ |v| + a |ω| bounds that of every circle's centre.
+    """
     greatest = wp.int64(0)
     i = int(0)
     while i < whole_lanes(chain.link_count):
         turn = chain.half_length * K[OMEGA, i]
-        square = TWO * (K[U, i] * K[U, i] + K[V, i] * K[V, i] + turn * turn)
+        across = greatest_across_speed(chain, K[X, i], K[Y, i])
+        square = TWO * (K[U, i] * K[U, i] + K[V, i] * K[V, i] + turn * turn) + across * across
         greatest = wp.max(greatest, wp.where(i < chain.link_count, order_bits(square), wp.int64(0)))
         i += 1
     return wp.sqrt(wp.cast(greatest, wp.float64))
 
 
 @wp.func
-def overlaps(K: Rows, first: int):
-    """Whether a link of the vector that begins at this column overlaps the body."""
+def any_negative(K: Rows, row: int, first: int):
+    """Whether a number of a row is negative in the vector that begins at this column."""
     least = ONE
     for lane in range(wp.static(LANES)):
-        least = wp.min(least, K[GAP, first + lane])
+        least = wp.min(least, K[row, first + lane])
     return least < ZERO
 
 
@@ -84,10 +73,12 @@ def placed_link(K: Rows, i: int) -> Touching:
     link.right_y = K[RIGHT_Y, i]
     link.x = K[X, i]
     link.y = K[Y, i]
-    link.cosine = K[COSINE, i]
+    link.cosine = K[layout.COSINE, i]
     link.sine = K[SINE, i]
-    link.inverse_mass = K[INVERSE_MASS, i]
-    link.inverse_inertia = K[INVERSE_INERTIA, i]
+    link.mass = K[layout.MASS, i]
+    link.inertia = K[layout.INERTIA, i]
+    link.inverse_mass = K[layout.INVERSE_MASS, i]
+    link.inverse_inertia = K[layout.INVERSE_INERTIA, i]
     link.u = K[U, i]
     link.v = K[V, i]
     link.omega = K[OMEGA, i]
@@ -102,7 +93,7 @@ def endless_gap(_K: Rows, _chain: Chain, _ground: Ground, _face: Face):
 
 
 @wp.func
-def no_impulses(_K: Rows, _chain: Chain, _ground: Ground, _face: Face):
+def no_impulses(_K: Rows, _P: Row, _chain: Chain, _ground: Ground, _face: Face):
     """The number of impulses of no body."""
     return wp.int64(0)
 
@@ -112,8 +103,8 @@ def fixed_contacts(fixed_body: str):
     """Warp functions of all links and a body: (least gap, resolve).
 
     ``least_gap(K, chain, ground, face)``: the least gap [m] of the placed links, each of which goes to its row.
-    ``resolve(K, chain, ground, face)``: applies the impulses, after the gaps, and returns their number. Few links touch
-    at a time: only vectors with a link that overlaps the body go through the impulse law.
+    ``resolve(K, P, chain, ground, face)``: applies the impulses, after the gaps, and returns their number. Few links
+    touch at a time: only vectors with a link that overlaps the body go through the impulse law.
     """
     if fixed_body == "none":
         return endless_gap, no_impulses
@@ -125,18 +116,18 @@ def fixed_contacts(fixed_body: str):
         least = FURTHEST
         i = int(0)
         while i < whole_lanes(chain.link_count):
-            gap = gap_of(chain, ground, face, placed_link(K, i))
+            gap = gap_of(with_circles(chain, K[RADIUS, i]), ground, face, placed_link(K, i))
             K[GAP, i] = wp.where(i < chain.link_count, gap, ONE)
             least = wp.min(least, wp.where(i < chain.link_count, order_key(gap), FURTHEST))
             i += 1
         return from_order_key(least)
 
     @wp.func
-    def resolve(K: Rows, chain: Chain, ground: Ground, face: Face):
+    def resolve(K: Rows, _P: Row, chain: Chain, ground: Ground, face: Face):
         impulses = wp.int64(0)
         first = int(0)
         while first < whole_lanes(chain.link_count):
-            if overlaps(K, first):
+            if any_negative(K, GAP, first):
                 lane = int(0)
                 while lane < LANES:
                     i = first + lane
@@ -144,7 +135,7 @@ def fixed_contacts(fixed_body: str):
                     if wp.static(in_cells):
                         if K[GAP, i] >= ZERO:
                             continue
-                    link = meet(chain, ground, face, placed_link(K, i))
+                    link = meet(with_circles(chain, K[RADIUS, i]), ground, face, placed_link(K, i))
                     K[U, i] = link.u
                     K[V, i] = link.v
                     K[OMEGA, i] = link.omega

@@ -26,28 +26,27 @@ from warpchain.kernels.contacts.link_pair import (
     natural,
 )
 from warpchain.kernels.contacts.list_layout import GEOMETRY_COLUMNS, GEOMETRY_ROWS, list_layout
-from warpchain.kernels.layout import LEFT_X, LEFT_Y, RIGHT_X, RIGHT_Y, X, Y
+from warpchain.kernels.layout import LEFT_X, LEFT_Y, RADIUS, RIGHT_X, RIGHT_Y, X, Y
 from warpchain.kernels.physics.elementary import TWO, ZERO, order_bits
 from warpchain.kernels.types import Chain, Integers, Rows
 
-wp.set_module_options({"enable_backward": False})
-
 # Rows of the CPU's scratch of contacts, one column per pair of joints. First four circles, the left-hand and the
-# right-hand one of joint p, likewise of joint q: its own centre [m] and the centre of mass of its link [m].
-P_LEFT_HAND, P_RIGHT_HAND, Q_LEFT_HAND, Q_RIGHT_HAND = 0, 4, 8, 12
-END_X, END_Y, CENTER_X, CENTER_Y = range(4)
+# right-hand one of joint p, likewise of joint q: its own centre [m], the centre of mass of its link [m] and its radius.
+P_LEFT_HAND, P_RIGHT_HAND, Q_LEFT_HAND, Q_RIGHT_HAND = 0, 5, 10, 15
+END_X, END_Y, CENTER_X, CENTER_Y, END_RADIUS = range(5)
 # Then the two contacts of a half, each with the numbers that circles_of_links returns.
-FIRST_CONTACT, SECOND_CONTACT = 16, 23
+FIRST_CONTACT, SECOND_CONTACT = 20, 27
 DEPTH, NORMAL_X, NORMAL_Y, A_N, A_T, B_N, B_T = range(7)
 
 
 @wp.func
 def copy_circle(K: Rows, G: Rows, row: int, k: int, end_x: wp.float64, end_y: wp.float64, link: int):
-    """Copies a circle and its link's centre of mass into column k of the scratch."""
+    """Copies a circle, its link's centre of mass and its radius into column k of the scratch."""
     G[row + END_X, k] = end_x
     G[row + END_Y, k] = end_y
     G[row + CENTER_X, k] = K[X, link]
     G[row + CENTER_Y, k] = K[Y, link]
+    G[row + END_RADIUS, k] = K[RADIUS, link]
 
 
 @functools.cache
@@ -99,8 +98,9 @@ def self_contacts(columns: int):
             p = L[wp.static(lists.found_first) + first + k]
             q = L[wp.static(lists.found_second) + first + k]
             link_a, link_b = links_of(p, q, half, second, chain.link_count)
-            depth, nx, ny, a_n, a_t, b_n, b_t = circles_of_links(
-                chain.circle_radius,
+            contact = circles_of_links(
+                G[a + END_RADIUS, k],
+                G[b + END_RADIUS, k],
                 G[a + END_X, k],
                 G[a + END_Y, k],
                 G[b + END_X, k],
@@ -110,13 +110,9 @@ def self_contacts(columns: int):
                 G[b + CENTER_X, k],
                 G[b + CENTER_Y, k],
             )
-            G[row + DEPTH, k] = wp.where(are_neighbours(link_a, link_b, chain.link_count), ZERO, depth)
-            G[row + NORMAL_X, k] = nx
-            G[row + NORMAL_Y, k] = ny
-            G[row + A_N, k] = a_n
-            G[row + A_T, k] = a_t
-            G[row + B_N, k] = b_n
-            G[row + B_T, k] = b_t
+            G[row + DEPTH, k] = wp.where(are_neighbours(link_a, link_b, chain.link_count), ZERO, contact[DEPTH])
+            for number in range(1, wp.static(B_T + 1)):
+                G[row + number, k] = contact[number]
             k += 1
 
     @wp.func

@@ -13,13 +13,10 @@ from warpchain.kernels.contacts.fixed_body import BODIES
 from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.cpu.contacts.proximity import greatest_speed
-from warpchain.kernels.cpu.tilting import greatest_tilting_speed
 from warpchain.kernels.features import Features
-from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, OMEGA, RIGHT_X, RIGHT_Y, SINE, U, V
+from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, OMEGA, RADIUS, RIGHT_X, RIGHT_Y, SINE, U, V
 from warpchain.kernels.physics.elementary import HALF, ONE, TWO, ZERO, order_bits
-from warpchain.kernels.types import Chain, Control, Integers, Rows, State
-
-wp.set_module_options({"enable_backward": False})
+from warpchain.kernels.types import Chain, Control, Integers, Rows, State, with_circles
 
 FLIGHT_SKIN = wp.constant(wp.float64(4.0))
 """The skin of the neighbour list is so many times as wide in a flight, whose steps may move joints by half of it."""
@@ -63,8 +60,9 @@ def fastest_approach(fixed_body: str):
             turn = chain.half_length * K[OMEGA, i]
             u = turn * K[SINE, i]
             v = turn * K[COSINE, i]
-            left = approach(chain, face, K[LEFT_X, i], K[LEFT_Y, i], K[U, i] + u, K[V, i] - v)
-            right = approach(chain, face, K[RIGHT_X, i], K[RIGHT_Y, i], K[U, i] - u, K[V, i] + v)
+            own = with_circles(chain, K[RADIUS, i])
+            left = approach(own, face, K[LEFT_X, i], K[LEFT_Y, i], K[U, i] + u, K[V, i] - v)
+            right = approach(own, face, K[RIGHT_X, i], K[RIGHT_Y, i], K[U, i] - u, K[V, i] + v)
             greatest = wp.max(greatest, wp.max(order_bits(left), order_bits(right)))
             i += 1
         return wp.cast(greatest, wp.float64)
@@ -104,7 +102,6 @@ def step_bound(features: Features, has_flight: bool):
     has_fixed_approach = has_fixed and not BODIES[features.fixed_body].in_cells
     if has_fixed_approach:
         approaching = fastest_approach(features.fixed_body)
-    speed_bound = greatest_tilting_speed if features.tilts else greatest_speed
 
     @wp.func
     def bound(
@@ -136,6 +133,6 @@ def step_bound(features: Features, has_flight: bool):
             distance = wp.min(distance, slack)
         if is_near:
             return longest
-        return wp.max(longest, distance / speed_bound(K, chain))
+        return wp.max(longest, distance / greatest_speed(K, chain))
 
     return bound

@@ -13,11 +13,10 @@ from warpchain.kernels.cpu.joints import Joints, springs
 from warpchain.kernels.events.tallies import book_loss
 from warpchain.kernels.methods.controller import classical_controller
 from warpchain.kernels.methods.method import find_method
-from warpchain.kernels.methods.w_tableaus import ROS34PW2
+from warpchain.kernels.methods.w_tableaus import ERROR_ORDER
 from warpchain.kernels.physics.elementary import ONE, ZERO
+from warpchain.kernels.physics.load import weight
 from warpchain.kernels.types import Chain, Control, Rows, State
-
-wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
@@ -35,13 +34,11 @@ def swap_models(K: Rows, chain: Chain, state: State, world: int, is_rigid: int, 
 @functools.cache
 def rigid_in_flight(name: str, columns: int) -> Joints:
     """A method's steps on springs and, from one impulse to the next, on rigid joints."""
-    first_row = layout.scratch_rows(find_method(name).stages)
+    first_row = layout.scratch_rows(find_method(name).tableau.stages)
     attempt_flight, commit_flight = flight_method(columns, first_row)
     close_joints, open_joints = joint_switch(columns, first_row)
-    growth, shrink = classical_controller(ROS34PW2.error_order)
-    on_springs = springs(name, tilts=False)
-    spring_stage, spring_attempt = on_springs.first_stage, on_springs.attempt
-    spring_shrinkage, spring_accept = on_springs.shrinkage, on_springs.accept
+    growth, shrink = classical_controller(ERROR_ORDER)
+    on_springs = springs(name, weight)
 
     @wp.func
     def settle(K: Rows, chain: Chain, state: State, world: int):
@@ -57,7 +54,7 @@ def rigid_in_flight(name: str, columns: int) -> Joints:
     @wp.func
     def first_stage(K: Rows, chain: Chain, state: State, world: int):
         if state.is_rigid[world] == 0:
-            spring_stage(K, chain, state, world)
+            on_springs.first_stage(K, chain, state, world)
 
     @wp.func
     def attempt(
@@ -65,7 +62,7 @@ def rigid_in_flight(name: str, columns: int) -> Joints:
     ):
         bits = wp.int64(0)
         if state.is_rigid[world] == 0:
-            bits = spring_attempt(K, chain, state, control, world, h, tolerance)
+            bits = on_springs.attempt(K, chain, state, control, world, h, tolerance)
         else:
             bits = attempt_flight(K, chain, h, control.flight_tolerance)
         return bits
@@ -73,7 +70,7 @@ def rigid_in_flight(name: str, columns: int) -> Joints:
     @wp.func
     def shrinkage(state: State, world: int, error: wp.float64):
         if state.is_rigid[world] == 0:
-            return spring_shrinkage(state, world, error)
+            return on_springs.shrinkage(state, world, error)
         return shrink(error)
 
     @wp.func
@@ -81,7 +78,7 @@ def rigid_in_flight(name: str, columns: int) -> Joints:
         may_stay = bool(True)
         factor = ONE
         if state.is_rigid[world] == 0:
-            factor, may_stay = spring_accept(K, chain, state, control, world, h, error)
+            factor, may_stay = on_springs.accept(K, chain, state, control, world, h, error)
         else:
             may_stay = commit_flight(K, chain, h)
             factor = growth(error, state.last_error[world], control.proportional)

@@ -15,50 +15,24 @@ Memory is in the order of :mod:`cpu.implicit.solver`, see :mod:`cpu.implicit.rig
 """
 
 import functools
-from dataclasses import dataclass
-from typing import Any
 
 import warp as wp
 
 from warpchain.kernels import layout
-from warpchain.kernels.cpu.implicit.rigid_layout import (
-    BASE,
-    BASE_RATE,
-    COSINE,
-    COULOMB,
-    COUNTED,
-    FORCE,
-    FREE,
-    INERTIA,
-    INVERSE_INERTIA,
-    INVERSE_MASS,
-    INVERSE_SMOOTHING,
-    MASS,
-    RATE,
-    ROWS_OF_RIGID,
-    SINE,
-    SPIN,
-    TORQUE,
-    VISCOUS,
-    force_layout,
-    pad_behind,
-    pad_joints,
-)
-from warpchain.kernels.cpu.implicit.solver import LANES, cyclic_solver, link_at, place_column, row_at, segment_places
+from warpchain.kernels.cpu.implicit import rigid_layout as at
+from warpchain.kernels.cpu.implicit.rigid_layout import BASE, COSINE, FREE, INVERSE_INERTIA, INVERSE_MASS, SINE, SPIN
+from warpchain.kernels.cpu.implicit.solver import cyclic_solver, end_column, link_at, segment_places
 from warpchain.kernels.layout import STAGES, X
 from warpchain.kernels.physics.elementary import HALF, ONE, ZERO, cos_sin, order_bits
+from warpchain.kernels.physics.geometry import Link, put, three
 from warpchain.kernels.physics.joint import friction_torque
-from warpchain.kernels.physics.rigid_joint import inward_pull, opening_rate_of, pushed, turning_share
+from warpchain.kernels.physics.load import weight
+from warpchain.kernels.physics.rigid_joint import inward_pull, turning_share
 from warpchain.kernels.types import Chain, Rows
-
-wp.set_module_options({"enable_backward": False})
 
 CLOSED = wp.constant(wp.float64(1e-11))
 """Opening [m] below which a joint counts as closed; a spring of 1e9 N/m has 1e-2 N there."""
 MOST_CORRECTIONS = 5
-LINK_CONSTANTS = (MASS, INERTIA, INVERSE_MASS, INVERSE_INERTIA, VISCOUS, COULOMB)
-CONSTANTS_OF_LINK = tuple(range(layout.MASS, layout.MASS + len(LINK_CONSTANTS)))
-"""Rows of :mod:`layout` that hold the same."""
 GREATEST_RINGING = wp.constant(wp.float64(1e-5))
 """Part of the kinetic energy that the projection may take; more means that springs still oscillate.
 
@@ -75,332 +49,239 @@ links of a loop lie on one line, S is singular, and unbounded forces would be ha
 """
 
 
-@dataclass(frozen=True)
-class RigidJoints:
-    """Warp functions on the rows S of :mod:`cpu.implicit.rigid_layout` and the separators' rows R.
+LOWER, DIAGONAL, UPPER = (at.FORCES.submatrix(k) for k in range(3))
+RIGHT = at.FORCES.right
+factor, solve = cyclic_solver(at.FORCES)
 
-    Attributes:
-        load: Copies the state and the links' constants from the scratch.
-        store: Copies the state to the scratch, and accelerations to where the step loop checks them.
-        factorise: Assembles and factorises the matrix S for the present directions.
-        solve_joints: Solves with the last factors; the solution replaces the right-hand side.
-        solve_forces: Joint forces and accelerations for the directions, spins and smoothing of a stage.
-        displace: Moves the links by the last solution.
-        openings: Sets directions and spins of the state and the right-hand side C; returns the greatest |C| [m].
-        stretching: Energy [J] of springs that are open by the right-hand side.
-        close: Projects the state on C = 0 (to rounding) and Ċ = 0; returns False if the joints could not be closed.
-        begin: Joint forces and accelerations of a state that ``close`` has left, with the chain's own smoothing.
-        kinetic_energy: Of the state [J].
-        are_stiff: Whether springs would hold so little energy with these forces that they count as rigid.
-    """
 
-    load: Any
-    store: Any
-    factorise: Any
-    solve_joints: Any
-    solve_forces: Any
-    displace: Any
-    openings: Any
-    stretching: Any
-    close: Any
-    begin: Any
-    kinetic_energy: Any
-    are_stiff: Any
+@wp.func
+def load(S: Rows, K: Rows, chain: Chain):
+    """Copies the state and the constants of links and joints from the scratch K."""
+    c = int(8)
+    while c < end_column(chain):
+        i, is_copy = link_at(c, chain.link_count)
+        for k in range(6):
+            S[BASE + k, c] = K[X + k, i]
+            S[at.MASS + k, c] = K[layout.MASS + k, i]
+        S[at.COUNTED, c] = wp.where(is_copy, ZERO, ONE)
+        c += 1
+    at.pad_behind(S, INVERSE_MASS, 2, chain)
+
+
+@wp.func
+def store(S: Rows, K: Rows, chain: Chain):
+    """Copies the state to the scratch K, and accelerations to where the step loop checks them."""
+    c = int(8)
+    while c < end_column(chain):
+        i, _is_copy = link_at(c, chain.link_count)
+        for k in range(6):
+            K[X + k, i] = S[BASE + k, c]
+        for k in range(3):
+            K[STAGES + k, i] = S[at.BASE_RATE + k, c]
+        c += 1
+
+
+@wp.func
+def factorise(S: Rows, chain: Chain):
+    """Assembles and factorises the matrix S for the present directions."""
+    a = chain.half_length
+    at.pad_behind(S, SPIN, 3, chain)
+    c = int(8)
+    while c < end_column(chain):
+        m_left = S[INVERSE_MASS, c]
+        m_right = S[INVERSE_MASS, c + 8]
+        xx, xy, yy = turning_share(a, S[INVERSE_INERTIA, c], S[COSINE, c], S[SINE, c])
+        after_xx, after_xy, after_yy = turning_share(a, S[INVERSE_INERTIA, c + 8], S[COSINE, c + 8], S[SINE, c + 8])
+        cross = xy + after_xy
+        put(S, DIAGONAL, c, wp.vec4d(m_left + m_right + xx + after_xx, cross, cross, m_left + m_right + yy + after_yy))
+        put(S, LOWER, c, wp.vec4d(xx - m_left, xy, xy, yy - m_left))
+        put(S, UPPER, c, wp.vec4d(after_xx - m_right, after_xy, after_xy, after_yy - m_right))
+        c += 1
+    places, full = segment_places(chain.link_count)
+    factor(S, places, full)
+
+
+@wp.func
+def solve_joints(S: Rows, chain: Chain):
+    """Solves with the last factors; the solution replaces the right-hand side."""
+    places, full = segment_places(chain.link_count)
+    solve(S, places, full)
+    at.pad_joints(S, RIGHT, 2, chain)
+
+
+@wp.func
+def pushed_at(S: Rows, a: wp.float64, c: int):
+    """M⁻¹ Gᵀ P of a link: how the last solution P (forces, impulses or displacements) changes x, y and θ."""
+    left_x = S[RIGHT, c - 8]
+    left_y = S[RIGHT + 1, c - 8]
+    right_x = S[RIGHT, c]
+    right_y = S[RIGHT + 1, c]
+    lever = a * (S[COSINE, c] * (right_y + left_y) - S[SINE, c] * (right_x + left_x))
+    inverse_mass = S[INVERSE_MASS, c]
+    return wp.vec3d((right_x - left_x) * inverse_mass, (right_y - left_y) * inverse_mass, lever * S[INVERSE_INERTIA, c])
+
+
+@wp.func
+def push(S: Rows, row: int, chain: Chain):
+    """Adds the changes by the last solution to places or velocities, three rows from this one on."""
+    c = int(8)
+    while c < end_column(chain):
+        put(S, row, c, three(S, row, c) + pushed_at(S, chain.half_length, c))
+        c += 1
+
+
+@wp.func
+def solve_forces(S: Rows, chain: Chain):
+    """Joint forces and accelerations for the directions, spins and smoothing of a stage."""
+    a = chain.half_length
+    c = int(8)
+    while c < end_column(chain):
+        spin = S[SPIN, c] - S[SPIN, c + 8]
+        S[at.TORQUE, c] = friction_torque(S[at.VISCOUS, c], S[at.COULOMB, c], spin, S[at.INVERSE_SMOOTHING, c])
+        c += 1
+    at.pad_joints(S, at.TORQUE, 1, chain)
+    c = int(8)
+    while c < end_column(chain):
+        S[FREE, c] = (S[at.TORQUE, c - 8] - S[at.TORQUE, c]) * S[INVERSE_INERTIA, c]
+        c += 1
+    at.pad_behind(S, FREE, 1, chain)
+    c = int(8)
+    while c < end_column(chain):
+        rx, ry = inward_pull(S[COSINE, c], S[SINE, c], S[SPIN, c], S[FREE, c])
+        after_x, after_y = inward_pull(S[COSINE, c + 8], S[SINE, c + 8], S[SPIN, c + 8], S[FREE, c + 8])
+        put(S, RIGHT, c, wp.vec2d(a * (rx + after_x), a * (ry + after_y)))
+        c += 1
+    solve_joints(S, chain)
+    c = int(8)
+    while c < end_column(chain):
+        pushed = pushed_at(S, a, c)
+        load_x, load_y, load_turn = weight(chain, c, Link(), S[INVERSE_MASS, c], S[INVERSE_INERTIA, c])
+        put(S, at.RATE, c, wp.vec3d(pushed[0] + load_x, pushed[1] + load_y, S[FREE, c] + (pushed[2] + load_turn)))
+        c += 1
+
+
+@wp.func
+def openings(S: Rows, chain: Chain):
+    """Sets directions and spins of the state and the right-hand side C; returns the greatest |C| [m]."""
+    a = chain.half_length
+    c = int(8)
+    while c < end_column(chain):
+        cosine, sine = cos_sin(S[BASE + 2, c])
+        put(S, SPIN, c, wp.vec3d(S[BASE + 5, c], cosine, sine))
+        c += 1
+    at.pad_behind(S, SPIN, 3, chain)
+    at.pad_behind(S, BASE, 2, chain)
+    greatest = wp.int64(0)
+    c = int(8)
+    while c < end_column(chain):
+        cx = (S[BASE, c + 8] - S[BASE, c]) - a * (S[COSINE, c + 8] + S[COSINE, c])
+        cy = (S[BASE + 1, c + 8] - S[BASE + 1, c]) - a * (S[SINE, c + 8] + S[SINE, c])
+        put(S, RIGHT, c, wp.vec2d(cx, cy))
+        greatest = wp.max(greatest, order_bits(cx * cx + cy * cy))
+        c += 1
+    return wp.sqrt(wp.cast(greatest, wp.float64))
+
+
+@wp.func
+def opening_rates(S: Rows, chain: Chain):
+    """Sets the right-hand side to Ċ."""
+    a = chain.half_length
+    at.pad_behind(S, BASE + 3, 3, chain)
+    c = int(8)
+    while c < end_column(chain):
+        turn_x = S[SPIN, c] * S[SINE, c] + S[SPIN, c + 8] * S[SINE, c + 8]
+        turn_y = S[SPIN, c] * S[COSINE, c] + S[SPIN, c + 8] * S[COSINE, c + 8]
+        cu = S[BASE + 3, c + 8] - S[BASE + 3, c] + a * turn_x
+        cv = S[BASE + 4, c + 8] - S[BASE + 4, c] - a * turn_y
+        put(S, RIGHT, c, wp.vec2d(cu, cv))
+        c += 1
+
+
+@wp.func
+def stretching(S: Rows, chain: Chain):
+    """Energy [J] of springs that are open by the right-hand side."""
+    total = ZERO
+    c = int(8)
+    while c < end_column(chain):
+        cx = S[RIGHT, c]
+        cy = S[RIGHT + 1, c]
+        total += S[at.COUNTED, c] * (cx * cx + cy * cy)
+        c += 1
+    return HALF * chain.joint_stiffness * total
+
+
+@wp.func
+def begin(S: Rows, chain: Chain):
+    """Joint forces and accelerations of a state that has been closed, with the chain's own smoothing."""
+    c = int(8)
+    while c < end_column(chain):
+        S[at.INVERSE_SMOOTHING, c] = chain.inverse_smoothing
+        c += 1
+    solve_forces(S, chain)
+    c = int(8)
+    while c < end_column(chain):
+        put(S, at.FORCE, c, wp.vec2d(S[RIGHT, c], S[RIGHT + 1, c]))
+        put(S, at.BASE_RATE, c, three(S, at.RATE, c))
+        c += 1
+
+
+@wp.func
+def kinetic_energy(S: Rows, chain: Chain):
+    """Kinetic energy of the state [J]."""
+    total = ZERO
+    c = int(8)
+    while c < end_column(chain):
+        u = S[BASE + 3, c]
+        v = S[BASE + 4, c]
+        w = S[BASE + 5, c]
+        total += S[at.COUNTED, c] * (S[at.MASS, c] * (u * u + v * v) + S[at.INERTIA, c] * w * w)
+        c += 1
+    return HALF * total
+
+
+@wp.func
+def are_stiff(S: Rows, chain: Chain):
+    """Whether springs would hold so little energy with the state's joint forces that they count as rigid."""
+    square = ZERO
+    c = int(8)
+    while c < end_column(chain):
+        fx = S[at.FORCE, c]
+        fy = S[at.FORCE + 1, c]
+        square += S[at.COUNTED, c] * (fx * fx + fy * fy)
+        c += 1
+    held = HALF * square / chain.joint_stiffness
+    return held <= GREATEST_STRETCHING * kinetic_energy(S, chain)
 
 
 @functools.cache
-def rigid_joints(columns: int) -> RigidJoints:
-    """The functions of rigid joints for scratch of this width."""
-    system = force_layout(columns)
-    factor, solve = cyclic_solver(system)
-    lower, diagonal, upper = (system.submatrix(k) for k in range(3))
-    right, width, separator_rows = system.right, system.columns, system.separator_rows
-    pad_constants = pad_behind((INVERSE_MASS, INVERSE_INERTIA))
-    pad_directions = pad_behind((COSINE, SINE, SPIN))
-    pad_free = pad_behind((FREE,))
-    pad_places = pad_behind((BASE, BASE + 1))
-    pad_rates = pad_behind((BASE + 3, BASE + 4, BASE + 5))
-    pad_torques = pad_joints((TORQUE,))
-    pad_solution = pad_joints((right, right + 1))
+def closing(columns: int, first_row: int):
+    """Warp function ``close(K, chain)`` for rows from ``first_row`` on, in scratch of this width.
+
+    It projects the state on C = 0 (to rounding) and Ċ = 0, and returns False if the joints could not be closed. clang
+    does not inline it: its loops vectorise only because the static shape of the rows is given in it again.
+    """
+    rows = at.segment_rows(columns, first_row)
 
     @wp.func
-    def load(S: Rows, K: Rows, chain: Chain):
-        n = chain.link_count
-        places, full, _ = segment_places(n)
-        p = int(0)
-        while p < places:
-            s = int(0)
-            while s < 8:
-                i = link_at(p, s, places, full, n)
-                c = 8 * p + 8 + s
-                for k in range(6):
-                    S[wp.static(BASE + k), c] = K[wp.static(X + k), i]
-                for k in range(wp.static(len(LINK_CONSTANTS))):
-                    S[wp.static(LINK_CONSTANTS[k]), c] = K[wp.static(CONSTANTS_OF_LINK[k]), i]
-                repeats = (p == 0 and s >= full) or row_at(p, s, places, full) >= n
-                S[COUNTED, c] = wp.where(repeats, ZERO, ONE)
-                s += 1
-            p += 1
-        pad_constants(S, places, full)
-
-    @wp.func
-    def store(S: Rows, K: Rows, chain: Chain):
-        n = chain.link_count
-        places, full, _ = segment_places(n)
-        p = int(0)
-        while p < places:
-            s = int(0)
-            while s < 8:
-                i = link_at(p, s, places, full, n)
-                c = 8 * p + 8 + s
-                for k in range(6):
-                    K[wp.static(X + k), i] = S[wp.static(BASE + k), c]
-                for k in range(3):
-                    K[wp.static(STAGES + k), i] = S[wp.static(BASE_RATE + k), c]
-                s += 1
-            p += 1
-
-    @wp.func
-    def assemble(S: Rows, chain: Chain, places: int, full: int):
-        a = chain.half_length
-        pad_directions(S, places, full)
-        end = place_column(places + 1)
-        c = int(8)
-        while c < end:
-            repeats = c < 16 and c >= 8 + full
-            m_left = S[INVERSE_MASS, c]
-            m_right = S[INVERSE_MASS, c + 8]
-            xx, xy, yy = turning_share(a, S[INVERSE_INERTIA, c], S[COSINE, c], S[SINE, c])
-            after_xx, after_xy, after_yy = turning_share(a, S[INVERSE_INERTIA, c + 8], S[COSINE, c + 8], S[SINE, c + 8])
-            S[wp.static(diagonal), c] = wp.where(repeats, ONE, m_left + m_right + xx + after_xx)
-            S[wp.static(diagonal + 1), c] = wp.where(repeats, ZERO, xy + after_xy)
-            S[wp.static(diagonal + 2), c] = wp.where(repeats, ZERO, xy + after_xy)
-            S[wp.static(diagonal + 3), c] = wp.where(repeats, ONE, m_left + m_right + yy + after_yy)
-            S[wp.static(lower), c] = wp.where(repeats, -ONE, xx - m_left)
-            S[wp.static(lower + 1), c] = wp.where(repeats, ZERO, xy)
-            S[wp.static(lower + 2), c] = wp.where(repeats, ZERO, xy)
-            S[wp.static(lower + 3), c] = wp.where(repeats, -ONE, yy - m_left)
-            S[wp.static(upper), c] = wp.where(repeats, ZERO, after_xx - m_right)
-            S[wp.static(upper + 1), c] = wp.where(repeats, ZERO, after_xy)
-            S[wp.static(upper + 2), c] = wp.where(repeats, ZERO, after_xy)
-            S[wp.static(upper + 3), c] = wp.where(repeats, ZERO, after_yy - m_right)
-            c += 1
-
-    @wp.func
-    def factorise(S: Rows, R: Rows, chain: Chain, places: int, full: int):
-        assemble(S, chain, places, full)
-        factor(S, R, places, full)
-
-    @wp.func
-    def solve_joints(S: Rows, R: Rows, places: int, full: int):
-        solve(S, R, places)
-        pad_solution(S, places, full)
-
-    @wp.func
-    def pushed_at(S: Rows, a: wp.float64, c: int):
-        """Change of the link of a column by the last solution, forces or impulses of the joints."""
-        ax, ay, turn = pushed(
-            a,
-            S[INVERSE_MASS, c],
-            S[INVERSE_INERTIA, c],
-            S[COSINE, c],
-            S[SINE, c],
-            S[wp.static(right), c - 8],
-            S[wp.static(right + 1), c - 8],
-            S[wp.static(right), c],
-            S[wp.static(right + 1), c],
-        )
-        return ax, ay, turn
-
-    @wp.func
-    def solve_forces(S: Rows, R: Rows, chain: Chain, places: int, full: int):
-        a = chain.half_length
-        end = place_column(places + 1)
-        c = int(8)
-        while c < end:
-            spin = S[SPIN, c] - S[SPIN, c + 8]
-            S[TORQUE, c] = friction_torque(S[VISCOUS, c], S[COULOMB, c], spin, S[INVERSE_SMOOTHING, c])
-            c += 1
-        pad_torques(S, places, full)
-        c = int(8)
-        while c < end:
-            S[FREE, c] = (S[TORQUE, c - 8] - S[TORQUE, c]) * S[INVERSE_INERTIA, c]
-            c += 1
-        pad_free(S, places, full)
-        c = int(8)
-        while c < end:
-            repeats = c < 16 and c >= 8 + full
-            rx, ry = inward_pull(S[COSINE, c], S[SINE, c], S[SPIN, c], S[FREE, c])
-            after_x, after_y = inward_pull(S[COSINE, c + 8], S[SINE, c + 8], S[SPIN, c + 8], S[FREE, c + 8])
-            S[wp.static(right), c] = wp.where(repeats, ZERO, a * (rx + after_x))
-            S[wp.static(right + 1), c] = wp.where(repeats, ZERO, a * (ry + after_y))
-            c += 1
-        solve_joints(S, R, places, full)
-        c = int(8)
-        while c < end:
-            ax, ay, turn = pushed_at(S, a, c)
-            S[RATE, c] = ax
-            S[wp.static(RATE + 1), c] = ay - chain.gravity
-            S[wp.static(RATE + 2), c] = S[FREE, c] + turn
-            c += 1
-
-    def pusher(row: int):
-        """Warp function that adds the changes by the last solution to three rows from this one on."""
-
-        @wp.func
-        def push(S: Rows, chain: Chain, places: int):
-            a = chain.half_length
-            end = place_column(places + 1)
-            c = int(8)
-            while c < end:
-                dx, dy, turn = pushed_at(S, a, c)
-                S[wp.static(row), c] = S[wp.static(row), c] + dx
-                S[wp.static(row + 1), c] = S[wp.static(row + 1), c] + dy
-                S[wp.static(row + 2), c] = S[wp.static(row + 2), c] + turn
-                c += 1
-
-        return push
-
-    displace, push = pusher(BASE), pusher(BASE + 3)
-
-    @wp.func
-    def openings(S: Rows, chain: Chain, places: int, full: int):
-        a = chain.half_length
-        end = place_column(places + 1)
-        c = int(8)
-        while c < end:
-            cosine, sine = cos_sin(S[wp.static(BASE + 2), c])
-            S[COSINE, c] = cosine
-            S[SINE, c] = sine
-            S[SPIN, c] = S[wp.static(BASE + 5), c]
-            c += 1
-        pad_directions(S, places, full)
-        pad_places(S, places, full)
-        greatest = wp.int64(0)
-        c = int(8)
-        while c < end:
-            repeats = c < 16 and c >= 8 + full
-            cx = (S[BASE, c + 8] - S[BASE, c]) - a * (S[COSINE, c + 8] + S[COSINE, c])
-            cy = (S[wp.static(BASE + 1), c + 8] - S[wp.static(BASE + 1), c]) - a * (S[SINE, c + 8] + S[SINE, c])
-            S[wp.static(right), c] = wp.where(repeats, ZERO, cx)
-            S[wp.static(right + 1), c] = wp.where(repeats, ZERO, cy)
-            greatest = wp.max(greatest, order_bits(cx * cx + cy * cy))
-            c += 1
-        return wp.sqrt(wp.cast(greatest, wp.float64))
-
-    @wp.func
-    def opening_rates(S: Rows, chain: Chain, places: int, full: int):
-        """Sets the right-hand side to Ċ."""
-        a = chain.half_length
-        end = place_column(places + 1)
-        pad_rates(S, places, full)
-        c = int(8)
-        while c < end:
-            repeats = c < 16 and c >= 8 + full
-            cu, cv = opening_rate_of(
-                a,
-                S[wp.static(BASE + 3), c],
-                S[wp.static(BASE + 4), c],
-                S[SPIN, c],
-                S[COSINE, c],
-                S[SINE, c],
-                S[wp.static(BASE + 3), c + 8],
-                S[wp.static(BASE + 4), c + 8],
-                S[SPIN, c + 8],
-                S[COSINE, c + 8],
-                S[SINE, c + 8],
-            )
-            S[wp.static(right), c] = wp.where(repeats, ZERO, cu)
-            S[wp.static(right + 1), c] = wp.where(repeats, ZERO, cv)
-            c += 1
-
-    @wp.func
-    def stretching(S: Rows, chain: Chain, places: int):
-        total = ZERO
-        c = int(8)
-        while c < place_column(places + 1):
-            cx = S[wp.static(right), c]
-            cy = S[wp.static(right + 1), c]
-            total += S[COUNTED, c] * (cx * cx + cy * cy)
-            c += 1
-        return HALF * chain.joint_stiffness * total
-
-    @wp.func
-    def close(rows: Rows, separators: Rows, chain: Chain, places: int, full: int):
-        # clang does not inline this function: its loops vectorise only if static shapes are given here again
-        S = wp.array(ptr=rows.ptr, shape=(wp.static(ROWS_OF_RIGID), wp.static(width)), dtype=wp.float64)
-        R = wp.array(ptr=separators.ptr, shape=(wp.static(separator_rows), LANES), dtype=wp.float64)
+    def close(K: Rows, chain: Chain):
+        S = rows(K)
         corrections = int(0)
-        widest = openings(S, chain, places, full)
-        factorise(S, R, chain, places, full)
+        widest = openings(S, chain)
+        factorise(S, chain)
         while widest > CLOSED and corrections < MOST_CORRECTIONS:
-            solve_joints(S, R, places, full)
-            displace(S, chain, places)
-            widest = openings(S, chain, places, full)
-            factorise(S, R, chain, places, full)
+            solve_joints(S, chain)
+            push(S, BASE, chain)
+            widest = openings(S, chain)
+            factorise(S, chain)
             corrections += 1
-        opening_rates(S, chain, places, full)
-        solve_joints(S, R, places, full)
-        push(S, chain, places)
-        end = place_column(places + 1)
+        opening_rates(S, chain)
+        solve_joints(S, chain)
+        push(S, BASE + 3, chain)
         c = int(8)
-        while c < end:
-            S[SPIN, c] = S[wp.static(BASE + 5), c]
+        while c < end_column(chain):
+            S[SPIN, c] = S[BASE + 5, c]
             c += 1
-        pad_directions(S, places, full)
+        at.pad_behind(S, SPIN, 3, chain)
         return widest <= CLOSED
 
-    @wp.func
-    def begin(S: Rows, R: Rows, chain: Chain, places: int, full: int):
-        end = place_column(places + 1)
-        c = int(8)
-        while c < end:
-            S[INVERSE_SMOOTHING, c] = chain.inverse_smoothing
-            c += 1
-        solve_forces(S, R, chain, places, full)
-        c = int(8)
-        while c < end:
-            S[FORCE, c] = S[wp.static(right), c]
-            S[wp.static(FORCE + 1), c] = S[wp.static(right + 1), c]
-            for k in range(3):
-                S[wp.static(BASE_RATE + k), c] = S[wp.static(RATE + k), c]
-            c += 1
-
-    @wp.func
-    def kinetic_energy(S: Rows, end: int):
-        total = ZERO
-        c = int(8)
-        while c < end:
-            u = S[wp.static(BASE + 3), c]
-            v = S[wp.static(BASE + 4), c]
-            w = S[wp.static(BASE + 5), c]
-            total += S[COUNTED, c] * (S[MASS, c] * (u * u + v * v) + S[INERTIA, c] * w * w)
-            c += 1
-        return HALF * total
-
-    @wp.func
-    def are_stiff(S: Rows, chain: Chain, end: int):
-        square = ZERO
-        c = int(8)
-        while c < end:
-            fx = S[FORCE, c]
-            fy = S[wp.static(FORCE + 1), c]
-            square += S[COUNTED, c] * (fx * fx + fy * fy)
-            c += 1
-        held = HALF * square / chain.joint_stiffness
-        return held <= GREATEST_STRETCHING * kinetic_energy(S, end)
-
-    return RigidJoints(
-        load,
-        store,
-        factorise,
-        solve_joints,
-        solve_forces,
-        displace,
-        openings,
-        stretching,
-        close,
-        begin,
-        kinetic_energy,
-        are_stiff,
-    )
+    return close

@@ -22,74 +22,132 @@ import functools
 
 import warp as wp
 
-from warpchain.kernels.cpu.implicit.rigid import rigid_joints
-from warpchain.kernels.cpu.implicit.rigid_layout import (
-    BASE,
-    BASE_RATE,
-    COSINE,
-    COULOMB,
-    COUNTED,
-    COUPLED,
-    DRAG,
-    FIRST_STAGE_ROW,
-    FLIGHT_SYSTEM,
-    INERTIA,
-    INVERSE_MASS,
-    INVERSE_SMOOTHING,
-    NEW,
-    POWER,
-    RATE,
-    SINE,
-    SLOPE,
-    SPIN,
-    STAGE_U,
-    STAGE_V,
-    TARGET,
-    TORQUE,
-    VISCOUS,
-    force_layout,
-    friction_layout,
-    pad_behind,
-    pad_joints,
-)
-from warpchain.kernels.cpu.implicit.solver import (
-    LANES,
-    cyclic_solver,
-    link_at,
-    place_column,
-    segment_places,
-    view,
-)
+from warpchain.kernels.cpu.implicit import rigid_layout as at
+from warpchain.kernels.cpu.implicit.rigid import are_stiff, begin, closing, factorise, solve_forces, store
+from warpchain.kernels.cpu.implicit.rigid_layout import BASE, COUPLED, POWER, RATE, SINE, SLOPE, SPIN, STAGE, TARGET
+from warpchain.kernels.cpu.implicit.solver import cyclic_solver, end_column, link_at, segment_places
 from warpchain.kernels.layout import LOST_FRICTION
 from warpchain.kernels.methods.controller import error_bits
-from warpchain.kernels.methods.w_tableaus import ROS34PW2
-from warpchain.kernels.physics.elementary import ONE, TWO, ZERO, cos_sin, order_bits
+from warpchain.kernels.methods.w_tableaus import COUPLINGS, ERRORS, GAMMA, NODES, STAGES, WEIGHTS
+from warpchain.kernels.physics.elementary import TWO, ZERO, cos_sin, order_bits
+from warpchain.kernels.physics.geometry import put, three
 from warpchain.kernels.physics.rigid_joint import steepness, switch_smoothing
 from warpchain.kernels.types import Chain, Rows
 
-wp.set_module_options({"enable_backward": False})
-
 GREATEST_TURN = wp.constant(wp.float64(1.0))
 """Greatest turn of a link [rad] in one step: beyond it the error estimate, made from four places, is no estimate."""
+G = wp.constant(wp.float64(GAMMA))
+LOWER, DIAGONAL, UPPER = (at.FRICTION.submatrix(k) for k in range(3))
+RIGHT = at.FRICTION.right
+factor, solve = cyclic_solver(at.FRICTION)
+nine = wp.types.vector(length=9, dtype=wp.float64)
 
 
-@functools.cache
-def flight_memory(columns: int, first_row: int):
-    """Views of flights' memory from ``first_row`` on, in scratch of this width.
+@wp.func
+def prepare(S: Rows, chain: Chain, h: wp.float64):
+    """Smoothing and slopes of friction for a step h, and the factors of the matrix of its stages."""
+    a = chain.half_length
+    g = G * h
+    c = int(8)
+    while c < end_column(chain):
+        cosine, sine = cos_sin(S[BASE + 2, c])
+        put(S, SPIN, c, wp.vec3d(S[BASE + 5, c], cosine, sine))
+        S[TARGET, c] = S[at.BASE_RATE + 2, c]
+        c += 1
+    at.pad_behind(S, SPIN, 3, chain)
+    at.pad_behind(S, TARGET, 1, chain)
+    c = int(8)
+    while c < end_column(chain):
+        inverse = switch_smoothing(chain, h, S[TARGET, c] - S[TARGET, c + 8])
+        S[at.INVERSE_SMOOTHING, c] = inverse
+        S[SLOPE, c] = g * steepness(S[at.VISCOUS, c], S[at.COULOMB, c], S[SPIN, c] - S[SPIN, c + 8], inverse)
+        S[POWER, c] = ZERO
+        c += 1
+    at.pad_joints(S, SLOPE, 1, chain)
+    c = int(8)
+    while c < end_column(chain):
+        tx = -a * S[SINE, c]
+        ty = a * S[at.COSINE, c]
+        after_tx = -a * S[SINE, c + 8]
+        after_ty = a * S[at.COSINE, c + 8]
+        left = S[at.INVERSE_MASS, c]
+        right = S[at.INVERSE_MASS, c + 8]
+        both = left + right
+        before = S[SLOPE, c - 8]
+        here = S[SLOPE, c]
+        turning = S[at.INERTIA, c] + here + before
+        put(S, LOWER, c, nine(-left, ZERO, ZERO, ZERO, -left, ZERO, -tx, -ty, -before))
+        put(S, DIAGONAL, c, nine(both, ZERO, tx, ZERO, both, ty, -tx, -ty, turning))
+        put(S, UPPER, c, nine(-right, ZERO, after_tx, ZERO, -right, after_ty, ZERO, ZERO, -here))
+        c += 1
+    places, full = segment_places(chain.link_count)
+    factor(S, places, full)
 
-    Returns:
-        (the rows in segment order, the separators' rows of S, the separators' rows of the stages' system).
-    """
-    forces, friction = force_layout(columns), friction_layout(columns)
-    count, width = FLIGHT_SYSTEM + 48, forces.columns
-    offset = 8 * first_row * columns
-    force_offset = offset + 8 * count * width
-    friction_offset = force_offset + 8 * LANES * forces.separator_rows
-    return (
-        view(offset, count, width),
-        view(force_offset, forces.separator_rows, LANES),
-        view(friction_offset, friction.separator_rows, LANES),
-    )
+
+@wp.func
+def place_stage(S: Rows, stage: int, chain: Chain):
+    """Directions and rates of a stage, and Σ γ_ij k_j of the rates."""
+    for i in range(STAGES):
+        if stage == i:
+            c = int(8)
+            while c < end_column(chain):
+                turn = ZERO
+                rate = three(S, BASE + 3, c)
+                coupled = wp.vec3d(ZERO, ZERO, ZERO)
+                for j in range(wp.static(i)):
+                    k = three(S, STAGE + 6 * j + 3, c)
+                    turn += wp.static(wp.float64(NODES[i][j])) * S[STAGE + 6 * j + 2, c]
+                    rate += wp.static(wp.float64(NODES[i][j])) * k
+                    coupled += wp.static(wp.float64(COUPLINGS[i][j])) * k
+                S[TARGET, c] = S[BASE + 2, c] + turn
+                put(S, at.STAGE_RATE, c, rate)
+                put(S, COUPLED, c, coupled)
+                c += 1
+    c = int(8)
+    while c < end_column(chain):
+        cosine, sine = cos_sin(S[TARGET, c])
+        put(S, at.COSINE, c, wp.vec2d(cosine, sine))
+        c += 1
+
+
+@wp.func
+def damp(S: Rows, h: wp.float64, weight: wp.float64, chain: Chain):
+    """Solves for (λ, y) of a stage from its accelerations; adds its part of the power lost to friction."""
+    c = int(8)
+    while c < end_column(chain):
+        coupled = S[COUPLED + 2, c]
+        S[TARGET, c] = h * S[RATE + 2, c] + wp.static(wp.float64(1.0 / GAMMA)) * coupled
+        c += 1
+    at.pad_behind(S, TARGET, 1, chain)
+    c = int(8)
+    while c < end_column(chain):
+        S[at.DRAG, c] = S[SLOPE, c] * (S[TARGET, c] - S[TARGET, c + 8])
+        S[POWER, c] = S[POWER, c] + weight * S[at.TORQUE, c] * (S[SPIN, c] - S[SPIN, c + 8])
+        c += 1
+    at.pad_joints(S, at.DRAG, 1, chain)
+    c = int(8)
+    while c < end_column(chain):
+        put(S, RIGHT, c, wp.vec3d(ZERO, ZERO, S[at.DRAG, c - 8] - S[at.DRAG, c]))
+        c += 1
+    places, full = segment_places(chain.link_count)
+    solve(S, places, full)
+    at.pad_joints(S, RIGHT, 2, chain)
+
+
+@wp.func
+def keep_stage(S: Rows, stage: int, h: wp.float64, chain: Chain):
+    """Stores k of a stage."""
+    for i in range(STAGES):
+        if stage == i:
+            c = int(8)
+            while c < end_column(chain):
+                share = S[at.INVERSE_MASS, c]
+                ku = h * S[RATE, c] + share * (S[RIGHT, c] - S[RIGHT, c - 8])
+                kv = h * S[RATE + 1, c] + share * (S[RIGHT + 1, c] - S[RIGHT + 1, c - 8])
+                k = wp.vec3d(ku, kv, h * S[RATE + 2, c] + S[RIGHT + 2, c])
+                put(S, STAGE + 6 * i + 3, c, k)
+                put(S, STAGE + 6 * i, c, h * (three(S, at.STAGE_RATE, c) + three(S, COUPLED, c) + G * k))
+                c += 1
 
 
 @functools.cache
@@ -100,214 +158,38 @@ def flight_method(columns: int, first_row: int):
         ``attempt(K, chain, h, tolerance)`` → bits of the greatest error ratio (see :func:`order_bits`), and
         ``commit(K, chain, h)``, which projects the new state → whether joints may stay rigid.
     """
-    table = ROS34PW2
-    stages, gamma = table.stages, table.gamma
-    nodes, couplings, weights, errors = table.nodes, table.couplings, table.weights, table.errors
-    friction = friction_layout(columns)
-    rigid = rigid_joints(columns)
-    factorise, solve_forces = rigid.factorise, rigid.solve_forces
-    close, begin, store, are_stiff = rigid.close, rigid.begin, rigid.store, rigid.are_stiff
-    flight_rows_of, force_rows_of, friction_rows_of = flight_memory(columns, first_row)
-    factor, solve = cyclic_solver(friction)
-    lower, diagonal, upper = (friction.submatrix(k) for k in range(3))
-    right = friction.right
-    pad_stage = pad_behind((COSINE, SINE, SPIN))
-    pad_target = pad_behind((TARGET,))
-    pad_slopes = pad_joints((SLOPE,))
-    pad_drag = pad_joints((DRAG,))
-    pad_solution = pad_joints((right, right + 1))
-    first = FIRST_STAGE_ROW
-
-    @wp.func
-    def prepare(S: Rows, chain: Chain, h: wp.float64, places: int, full: int):
-        """Smoothing and slopes of friction for a step h, and the matrix of its stages."""
-        a = chain.half_length
-        g = wp.static(wp.float64(gamma)) * h
-        end = place_column(places + 1)
-        c = int(8)
-        while c < end:
-            cosine, sine = cos_sin(S[wp.static(BASE + 2), c])
-            S[COSINE, c] = cosine
-            S[SINE, c] = sine
-            S[SPIN, c] = S[wp.static(BASE + 5), c]
-            S[TARGET, c] = S[wp.static(BASE_RATE + 2), c]
-            c += 1
-        pad_stage(S, places, full)
-        pad_target(S, places, full)
-        c = int(8)
-        while c < end:
-            inverse = switch_smoothing(chain, h, S[TARGET, c] - S[TARGET, c + 8])
-            S[INVERSE_SMOOTHING, c] = inverse
-            S[SLOPE, c] = g * steepness(S[VISCOUS, c], S[COULOMB, c], S[SPIN, c] - S[SPIN, c + 8], inverse)
-            S[POWER, c] = ZERO
-            c += 1
-        pad_slopes(S, places, full)
-        c = int(8)
-        while c < end:
-            repeats = c < 16 and c >= 8 + full
-            tx = -a * S[SINE, c]
-            ty = a * S[COSINE, c]
-            m_left = S[INVERSE_MASS, c]
-            m_right = S[INVERSE_MASS, c + 8]
-            before = S[SLOPE, c - 8]
-            here = S[SLOPE, c]
-            S[wp.static(diagonal), c] = wp.where(repeats, ONE, m_left + m_right)
-            S[wp.static(diagonal + 1), c] = ZERO
-            S[wp.static(diagonal + 2), c] = wp.where(repeats, ZERO, tx)
-            S[wp.static(diagonal + 3), c] = ZERO
-            S[wp.static(diagonal + 4), c] = wp.where(repeats, ONE, m_left + m_right)
-            S[wp.static(diagonal + 5), c] = wp.where(repeats, ZERO, ty)
-            S[wp.static(diagonal + 6), c] = wp.where(repeats, ZERO, -tx)
-            S[wp.static(diagonal + 7), c] = wp.where(repeats, ZERO, -ty)
-            S[wp.static(diagonal + 8), c] = wp.where(repeats, ONE, S[INERTIA, c] + here + before)
-            S[wp.static(lower), c] = wp.where(repeats, -ONE, -m_left)
-            S[wp.static(lower + 1), c] = ZERO
-            S[wp.static(lower + 2), c] = ZERO
-            S[wp.static(lower + 3), c] = ZERO
-            S[wp.static(lower + 4), c] = wp.where(repeats, -ONE, -m_left)
-            S[wp.static(lower + 5), c] = ZERO
-            S[wp.static(lower + 6), c] = wp.where(repeats, ZERO, -tx)
-            S[wp.static(lower + 7), c] = wp.where(repeats, ZERO, -ty)
-            S[wp.static(lower + 8), c] = wp.where(repeats, -ONE, -before)
-            S[wp.static(upper), c] = wp.where(repeats, ZERO, -m_right)
-            S[wp.static(upper + 1), c] = ZERO
-            S[wp.static(upper + 2), c] = wp.where(repeats, ZERO, -a * S[SINE, c + 8])
-            S[wp.static(upper + 3), c] = ZERO
-            S[wp.static(upper + 4), c] = wp.where(repeats, ZERO, -m_right)
-            S[wp.static(upper + 5), c] = wp.where(repeats, ZERO, a * S[COSINE, c + 8])
-            S[wp.static(upper + 6), c] = ZERO
-            S[wp.static(upper + 7), c] = ZERO
-            S[wp.static(upper + 8), c] = wp.where(repeats, ZERO, -here)
-            c += 1
-
-    @wp.func
-    def place_stage(S: Rows, stage: int, end: int):
-        """Directions and rates of a stage, and Σ γ_ij k_j of the rates."""
-        for i in range(wp.static(stages)):
-            if stage == i:
-                c = int(8)
-                while c < end:
-                    turn = ZERO
-                    u = S[wp.static(BASE + 3), c]
-                    v = S[wp.static(BASE + 4), c]
-                    w = S[wp.static(BASE + 5), c]
-                    cu = ZERO
-                    cv = ZERO
-                    cw = ZERO
-                    for j in range(wp.static(i)):
-                        ku = S[wp.static(first + 6 * j + 3), c]
-                        kv = S[wp.static(first + 6 * j + 4), c]
-                        kw = S[wp.static(first + 6 * j + 5), c]
-                        turn += wp.static(wp.float64(nodes[i][j])) * S[wp.static(first + 6 * j + 2), c]
-                        u += wp.static(wp.float64(nodes[i][j])) * ku
-                        v += wp.static(wp.float64(nodes[i][j])) * kv
-                        w += wp.static(wp.float64(nodes[i][j])) * kw
-                        cu += wp.static(wp.float64(couplings[i][j])) * ku
-                        cv += wp.static(wp.float64(couplings[i][j])) * kv
-                        cw += wp.static(wp.float64(couplings[i][j])) * kw
-                    S[TARGET, c] = S[wp.static(BASE + 2), c] + turn
-                    S[STAGE_U, c] = u
-                    S[STAGE_V, c] = v
-                    S[SPIN, c] = w
-                    S[COUPLED, c] = cu
-                    S[wp.static(COUPLED + 1), c] = cv
-                    S[wp.static(COUPLED + 2), c] = cw
-                    c += 1
-        c = int(8)
-        while c < end:
-            cosine, sine = cos_sin(S[TARGET, c])
-            S[COSINE, c] = cosine
-            S[SINE, c] = sine
-            c += 1
-
-    @wp.func
-    def damp(S: Rows, R: Rows, h: wp.float64, weight: wp.float64, places: int, full: int):
-        """Solves for (λ, y) of a stage from its accelerations; adds its part of the power lost to friction."""
-        end = place_column(places + 1)
-        c = int(8)
-        while c < end:
-            coupled = S[wp.static(COUPLED + 2), c]
-            S[TARGET, c] = h * S[wp.static(RATE + 2), c] + wp.static(wp.float64(1.0 / gamma)) * coupled
-            c += 1
-        pad_target(S, places, full)
-        c = int(8)
-        while c < end:
-            S[DRAG, c] = S[SLOPE, c] * (S[TARGET, c] - S[TARGET, c + 8])
-            S[POWER, c] = S[POWER, c] + weight * S[TORQUE, c] * (S[SPIN, c] - S[SPIN, c + 8])
-            c += 1
-        pad_drag(S, places, full)
-        c = int(8)
-        while c < end:
-            repeats = c < 16 and c >= 8 + full
-            S[wp.static(right), c] = ZERO
-            S[wp.static(right + 1), c] = ZERO
-            S[wp.static(right + 2), c] = wp.where(repeats, ZERO, S[DRAG, c - 8] - S[DRAG, c])
-            c += 1
-        solve(S, R, places)
-        pad_solution(S, places, full)
-
-    @wp.func
-    def keep_stage(S: Rows, stage: int, h: wp.float64, end: int):
-        """Stores k of a stage."""
-        for i in range(wp.static(stages)):
-            if stage == i:
-                c = int(8)
-                while c < end:
-                    share = S[INVERSE_MASS, c]
-                    ku = h * S[RATE, c] + share * (S[wp.static(right), c] - S[wp.static(right), c - 8])
-                    kv = h * S[wp.static(RATE + 1), c] + share * (
-                        S[wp.static(right + 1), c] - S[wp.static(right + 1), c - 8]
-                    )
-                    kw = h * S[wp.static(RATE + 2), c] + S[wp.static(right + 2), c]
-                    S[wp.static(first + 6 * i + 3), c] = ku
-                    S[wp.static(first + 6 * i + 4), c] = kv
-                    S[wp.static(first + 6 * i + 5), c] = kw
-                    ku = S[STAGE_U, c] + S[COUPLED, c] + wp.static(wp.float64(gamma)) * ku
-                    kv = S[STAGE_V, c] + S[wp.static(COUPLED + 1), c] + wp.static(wp.float64(gamma)) * kv
-                    kw = S[SPIN, c] + S[wp.static(COUPLED + 2), c] + wp.static(wp.float64(gamma)) * kw
-                    S[wp.static(first + 6 * i), c] = h * ku
-                    S[wp.static(first + 6 * i + 1), c] = h * kv
-                    S[wp.static(first + 6 * i + 2), c] = h * kw
-                    c += 1
+    rows = at.segment_rows(columns, first_row)
+    close = closing(columns, first_row)
 
     @wp.func
     def attempt(K: Rows, chain: Chain, h: wp.float64, tolerance: wp.float64):
-        S = flight_rows_of(K)
-        R = force_rows_of(K)
-        Q = friction_rows_of(K)
-        places, full, _ = segment_places(chain.link_count)
-        end = place_column(places + 1)
-        prepare(S, chain, h, places, full)
-        factor(S, Q, places, full)
+        S = rows(K)
+        prepare(S, chain, h)
         stage = int(0)
-        while stage < wp.static(stages):
-            place_stage(S, stage, end)
-            factorise(S, R, chain, places, full)
-            solve_forces(S, R, chain, places, full)
+        while stage < STAGES:
+            place_stage(S, stage, chain)
+            factorise(S, chain)
+            solve_forces(S, chain)
             weight = ZERO
-            for i in range(wp.static(stages)):
+            for i in range(STAGES):
                 if stage == i:
-                    weight = wp.static(wp.float64(weights[i]))
-            damp(S, Q, h, weight, places, full)
-            keep_stage(S, stage, h, end)
+                    weight = wp.static(wp.float64(WEIGHTS[i]))
+            damp(S, h, weight, chain)
+            keep_stage(S, stage, h, chain)
             stage += 1
         worst = wp.int64(0)
         turned = wp.int64(0)
         c = int(8)
-        while c < end:
+        while c < end_column(chain):
             for k in range(6):
-                value = S[wp.static(BASE + k), c]
+                value = S[BASE + k, c]
                 change = ZERO
                 error = ZERO
-                for j in range(wp.static(stages)):
-                    change += wp.static(wp.float64(weights[j])) * S[wp.static(first + 6 * j + k), c]
-                    error += wp.static(wp.float64(errors[j])) * S[wp.static(first + 6 * j + k), c]
-                S[wp.static(NEW + k), c] = value + change
-                rate = ZERO
-                if wp.static(k < 3):
-                    rate = S[wp.static(BASE + 3 + k), c]
-                else:
-                    rate = S[wp.static(BASE_RATE + k - 3), c]
+                for j in range(STAGES):
+                    change += wp.static(wp.float64(WEIGHTS[j])) * S[STAGE + 6 * j + k, c]
+                    error += wp.static(wp.float64(ERRORS[j])) * S[STAGE + 6 * j + k, c]
+                S[at.NEW + k, c] = value + change
+                rate = S[wp.static(BASE + 3 + k if k < 3 else at.BASE_RATE + k - 3), c]
                 worst = wp.max(worst, error_bits(error, value, rate, h))
                 if wp.static(k == 2):
                     turned = wp.max(turned, order_bits(change))
@@ -320,28 +202,21 @@ def flight_method(columns: int, first_row: int):
 
     @wp.func
     def commit(K: Rows, chain: Chain, h: wp.float64):
-        S = flight_rows_of(K)
-        R = force_rows_of(K)
-        n = chain.link_count
-        places, full, _ = segment_places(n)
-        end = place_column(places + 1)
+        S = rows(K)
         c = int(8)
-        while c < end:
+        while c < end_column(chain):
             for k in range(6):
-                S[wp.static(BASE + k), c] = S[wp.static(NEW + k), c]
-            S[POWER, c] = h * S[COUNTED, c] * S[POWER, c]
+                S[BASE + k, c] = S[at.NEW + k, c]
+            S[POWER, c] = h * S[at.COUNTED, c] * S[POWER, c]
             c += 1
-        p = int(0)
-        while p < places:
-            s = int(0)
-            while s < 8:
-                i = link_at(p, s, places, full, n)
-                K[LOST_FRICTION, i] = K[LOST_FRICTION, i] + S[POWER, 8 * p + 8 + s]
-                s += 1
-            p += 1
-        closed = close(S, R, chain, places, full)
-        begin(S, R, chain, places, full)
+        c = int(8)
+        while c < end_column(chain):
+            i, _is_copy = link_at(c, chain.link_count)
+            K[LOST_FRICTION, i] = K[LOST_FRICTION, i] + S[POWER, c]
+            c += 1
+        closed = close(K, chain)
+        begin(S, chain)
         store(S, K, chain)
-        return closed and are_stiff(S, chain, end)
+        return closed and are_stiff(S, chain)
 
     return attempt, commit

@@ -8,83 +8,76 @@ import functools
 
 import warp as wp
 
-from warpchain.kernels.cpu.implicit.solver import LANES, SegmentLayout, segment_columns
-from warpchain.kernels.methods.w_tableaus import ROS34PW2
-from warpchain.kernels.types import Rows
+from warpchain.kernels.cpu.implicit.solver import SegmentLayout, segment_columns, segment_places
+from warpchain.kernels.methods import w_tableaus
+from warpchain.kernels.types import Chain, Rows
 
-wp.set_module_options({"enable_backward": False})
-
-# Rows in segment order. The state; constants of the links and joints.
+# Rows in segment order. The state; constants of the links and joints, in the order of the scratch.
 BASE = 0
-INVERSE_MASS, INVERSE_INERTIA, MASS, INERTIA, VISCOUS, COULOMB, COUNTED = range(6, 13)
-# A stage: rates, directions; joints' inverse smoothing and torques, α; accelerations.
-STAGE_U, STAGE_V, SPIN = 13, 14, 15
+MASS, INERTIA, INVERSE_MASS, INVERSE_INERTIA, VISCOUS, COULOMB, COUNTED = range(6, 13)
+# A stage: velocity and spin, directions; joints' inverse smoothing and torques, α; accelerations.
+STAGE_RATE, SPIN = 13, 15
 COSINE, SINE = 16, 17
 INVERSE_SMOOTHING, TORQUE, FREE = 18, 19, 20
 RATE = 21
 # Joint forces of the state and the accelerations that belong to it.
 FORCE = 24
 BASE_RATE = 26
-# The system S F = r.
-SYSTEM = 29
-ROWS_OF_RIGID = SYSTEM + 22
-# A flight: slopes; the θ of r, Σ γ_ij k_j of the rates; power; the new state.
-SLOPE, TARGET, COUPLED = ROWS_OF_RIGID, ROWS_OF_RIGID + 1, ROWS_OF_RIGID + 2
-POWER, DRAG = ROWS_OF_RIGID + 5, ROWS_OF_RIGID + 6
-NEW = ROWS_OF_RIGID + 7
-FIRST_STAGE_ROW = ROWS_OF_RIGID + 13
-FLIGHT_SYSTEM = FIRST_STAGE_ROW + 6 * ROS34PW2.stages
-
-
-@functools.cache
-def force_layout(columns: int) -> SegmentLayout:
-    """Layout of the system S F = r, for scratch of this width."""
-    return SegmentLayout(size=2, columns=segment_columns(columns), matrix=SYSTEM, right=SYSTEM + 20)
-
-
-@functools.cache
-def friction_layout(columns: int) -> SegmentLayout:
-    """Layout of the stages' system, for scratch of this width."""
-    width = force_layout(columns).columns
-    return SegmentLayout(size=3, columns=width, matrix=FLIGHT_SYSTEM, right=FLIGHT_SYSTEM + 45)
+# A flight: slopes; the θ of r, Σ γ_ij k_j of the rates; power; the new state; k of the stages.
+SLOPE, TARGET, COUPLED = 29, 30, 31
+POWER, DRAG = 34, 35
+NEW = 36
+STAGE = 42
+# The system S F = r, and that of the stages.
+FORCES = SegmentLayout(size=2, matrix=STAGE + 6 * w_tableaus.STAGES)
+FRICTION = SegmentLayout(size=3, matrix=FORCES.end)
 
 
 def flight_rows(columns: int) -> int:
     """Rows of a chain's scratch of this width that a flight takes."""
-    forces, friction = force_layout(columns), friction_layout(columns)
-    doubles = (FLIGHT_SYSTEM + 48) * forces.columns + LANES * (forces.separator_rows + friction.separator_rows)
-    return -(-doubles // columns)
+    return -(-FRICTION.end * segment_columns(columns) // columns)
 
 
 @functools.cache
-def pad_behind(rows: tuple[int, ...]):
-    """Warp function that copies, in these rows, the next segment's first link behind each segment's last."""
+def segment_rows(columns: int, first_row: int):
+    """Warp function ``rows(K)`` → the rows in segment order, which lie in scratch of this width from a row on."""
 
     @wp.func
-    def pad(S: Rows, places: int, full: int):
-        s = int(0)
-        while s < 8:
-            after = (s + 1) % 8
-            source = 8 + after + wp.where(after >= full, 8, 0)
-            for k in range(wp.static(len(rows))):
-                S[wp.static(rows[k]), 8 * places + 8 + s] = S[wp.static(rows[k]), source]
-            s += 1
+    def rows(K: Rows):
+        return wp.array(
+            ptr=K.ptr + wp.uint64(wp.static(8 * first_row * columns)),
+            shape=(wp.static(FRICTION.end), wp.static(segment_columns(columns))),
+            dtype=wp.float64,
+        )
 
-    return pad
+    return rows
 
 
-@functools.cache
-def pad_joints(rows: tuple[int, ...]):
-    """Warp function that copies, in these rows, the previous joint before each segment's first place."""
+@wp.func
+def pad_behind(S: Rows, row: int, count: int, chain: Chain):
+    """Copies, in ``count`` rows, the next segment's first link behind each segment's last."""
+    places, full = segment_places(chain.link_count)
+    s = int(0)
+    while s < 8:
+        after = (s + 1) % 8
+        source = 8 + after + wp.where(after >= full, 8, 0)
+        k = int(0)
+        while k < count:
+            S[row + k, 8 * places + 8 + s] = S[row + k, source]
+            k += 1
+        s += 1
 
-    @wp.func
-    def pad(S: Rows, places: int, full: int):
-        s = int(0)
-        while s < 8:
-            # a short segment repeats the last joint of the segment before; that one's predecessor is copied
-            source = 8 * places + (s + 7) % 8 - wp.where(s >= full, 8, 0)
-            for k in range(wp.static(len(rows))):
-                S[wp.static(rows[k]), s] = S[wp.static(rows[k]), source]
-            s += 1
 
-    return pad
+@wp.func
+def pad_joints(S: Rows, row: int, count: int, chain: Chain):
+    """Copies, in ``count`` rows, the previous joint before each segment's first place."""
+    places, full = segment_places(chain.link_count)
+    s = int(0)
+    while s < 8:
+        # a short segment repeats the last joint of the segment before; that one's predecessor is copied
+        source = 8 * places + (s + 7) % 8 - wp.where(s >= full, 8, 0)
+        k = int(0)
+        while k < count:
+            S[row + k, s] = S[row + k, source]
+            k += 1
+        s += 1

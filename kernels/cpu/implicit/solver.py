@@ -17,93 +17,79 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from warpchain.kernels.types import Rows
+from warpchain.kernels.layout import LANES, padded_width
+from warpchain.kernels.types import Chain, Rows
 
-wp.set_module_options({"enable_backward": False})
-
-LANES = 8
-"""Segments of a loop: doubles in the widest vectors of a CPU."""
 ROUNDS = 3
 """Rounds of cyclic reduction until each equation has one unknown: log₂ of the lanes."""
 
 
+def segment_columns(links: int) -> int:
+    """Static width of a memory row for this many links; odd multiples of 8 spread rows over the cache's sets."""
+    places = -(-links // LANES) + 2
+    return LANES * (places + 1 - places % 2)
+
+
 @dataclass(frozen=True)
 class SegmentLayout:
-    """Where the rows of a loop's system lie in memory.
+    """Where a loop's system lies in memory, from one row on; its lanes are the segments of the loop.
 
     Row i of the loop is place p of segment s, column ``LANES * (p + 1) + s``; one place before the first and one
     after the last hold copies of neighbours. A loop of n rows has P = ⌈n / 8⌉ places a segment. If n is no multiple of
     eight, the last segments are *short*: their place 0 repeats the separator of the segment before, and their own rows
     begin at place 1. A B × B submatrix takes B² memory rows, one after the other.
-
-    Attributes:
-        size: Order B of the submatrices.
-        columns: Static width of a memory row, see :func:`segment_columns`.
-        matrix: First memory row of the matrix: submatrices L, D, U, then two that elimination adds.
-        right: First of B memory rows of the right-hand side, which the solution replaces.
     """
 
-    size: int
-    columns: int
-    matrix: int
-    right: int
+    size: int  # order B of the submatrices
+    matrix: int  # first memory row of the matrix: submatrices L, D, U, then two that elimination adds
 
     def submatrix(self, index: int) -> int:
         """First memory row of one of the five submatrices, see ``matrix``."""
         return self.matrix + self.size**2 * index
 
     @property
-    def separator_rows(self) -> int:
-        """Rows of eight columns for the system of the separators."""
-        return (2 * ROUNDS + 2) * self.size**2
+    def right(self) -> int:
+        """First of B memory rows of the right-hand side, which the solution replaces."""
+        return self.submatrix(5)
 
+    @property
+    def separators(self) -> int:
+        """First of the memory rows in which the system of the separators lies, eight numbers after eight others."""
+        return self.right + self.size
 
-def segment_columns(links: int) -> int:
-    """Static width of a memory row for this many links; odd multiples of 8 spread rows over the cache's sets."""
-    places = -(-links // LANES) + 2
-    return LANES * max(places + 1 - places % 2, 5)
-
-
-def view(offset: int, rows: int, columns: int):
-    """Warp function ``at(K)`` → (rows, columns) numbers that lie at an offset [B] in a chain's scratch."""
-
-    @wp.func
-    def at(K: Rows):
-        return wp.array(
-            ptr=K.ptr + wp.uint64(wp.static(offset)), shape=(wp.static(rows), wp.static(columns)), dtype=wp.float64
-        )
-
-    return at
+    @property
+    def end(self) -> int:
+        """The row behind the last."""
+        doubles = LANES * (2 * ROUNDS + 2) * self.size**2
+        return self.separators + -(-doubles // segment_columns(padded_width(1)))
 
 
 @wp.func
 def segment_places(link_count: int):
-    """(places P of a segment, number of segments that are not short, number of rows solved for).
+    """(places P of a segment, number of segments that are not short).
 
     Fewer than eight rows would leave segments empty; such loops are solved for twice their rows, which repeats them.
     """
     total = wp.where(link_count < 8, 2 * link_count, link_count)
     places = (total + 7) // 8
-    return places, 8 - (8 * places - total), total
+    return places, 8 - (8 * places - total)
 
 
 @wp.func
-def row_at(place: int, segment: int, places: int, full: int):
-    """Row of the loop at this place; ``full``: number of segments that are not short."""
-    return segment * places + place - wp.max(segment + 1 - full, 0)
+def end_column(chain: Chain):
+    """The column behind the last place; the bounds tell the compiler that no sum overflows."""
+    places, _full = segment_places(chain.link_count)
+    return wp.clamp(8 * (places + 1), 0, 16777216)
 
 
 @wp.func
-def link_at(place: int, segment: int, places: int, full: int, link_count: int):
-    """Link that lies at this place."""
-    row = row_at(place, segment, places, full)
-    return wp.where(row >= link_count, row - link_count, row)
-
-
-@wp.func
-def place_column(place_after: int):
-    """Eight times an index of places as a column; the bounds tell the compiler that no sum overflows."""
-    return wp.clamp(8 * place_after, 0, 16777216)
+def link_at(column: int, link_count: int):
+    """Link that lies in this column, and whether another column has it, too, and counts."""
+    places, full = segment_places(link_count)
+    segment = column & 7
+    row = segment * places + (column >> 3) - 1 - wp.max(segment + 1 - full, 0)
+    is_copy = (column < 16 and segment >= full) or row >= link_count
+    return wp.where(row >= link_count, row - link_count, row), is_copy
 
 
 _INVERSES = {
@@ -132,23 +118,9 @@ _INVERSES = {
 }
 
 
-def _rotated(name: str, by: int) -> str:
-    """C++ for the vector whose lane s is lane s + by of this one."""
-    return f"__builtin_shufflevector({name}, {name}, {', '.join(str((s + by) % LANES) for s in range(LANES))})"
-
-
 def _vectors(layout: SegmentLayout) -> str:
     """C++ types and functions for all segments at once: a vector has a lane per segment."""
     size = layout.size
-    turns = "".join(
-        f"""
-        const auto turned_{by} = [](const auto& from) {{
-            auto to = from;
-            for (auto& number : to.m) number = {_rotated("number", by)};
-            return to;
-        }};"""
-        for by in sorted({1, LANES - 1} | {2**r for r in range(ROUNDS)} | {LANES - 2**r for r in range(ROUNDS)})
-    )
     return f"""
         typedef double lanes __attribute__((vector_size({8 * LANES}), aligned(8), may_alias));
         struct column {{
@@ -161,12 +133,11 @@ def _vectors(layout: SegmentLayout) -> str:
             lanes& operator()(int i, int j) {{ return m[{size} * i + j]; }}
             const lanes& operator()(int i, int j) const {{ return m[{size} * i + j]; }}
         }};
-        const long next_row = {layout.columns // LANES};
-        const auto at_place = [=](int row, int p) {{
-            return reinterpret_cast<lanes*>(segments) + next_row * row + p;
-        }};
-        const auto at_separators = [=](int row) {{
-            return reinterpret_cast<lanes*>(separators) + row;
+        lanes* const first = reinterpret_cast<lanes*>(S.data);
+        const long next_row = S.shape[1] / {LANES};
+        const auto at_place = [=](int row, int p) {{ return first + next_row * row + p; }};
+        const auto at_separators = [=](int number) {{
+            return at_place({layout.separators}, number);
         }};
         const auto load = [](auto& to, const lanes* from, long stride) {{
             for (auto& number : to.m) {{
@@ -198,7 +169,18 @@ def _vectors(layout: SegmentLayout) -> str:
             for (int i = 0; i < {size}; i++) to(i, i) = value;
             return to;
         }};
-        {turns}"""
+        // lane s is lane s + by of the other one; that, too, is known when this is compiled
+        const auto turned = [](const auto& from, int by) {{
+            auto to = from;
+            for (int k = 0; k < {size} * from.width; k++)
+                for (int s = 0; s < {LANES}; s++) to.m[k][s] = from.m[k][(s + by) % {LANES}];
+            return to;
+        }};
+        // places that repeat a separator
+        lanes begins = {{}};
+        for (int s = full; s < {LANES}; s++) begins[s] = 1.0;
+        const auto where_repeated = [=](lanes value, lanes other) {{ return begins != 0.0 ? value : other; }};
+        """
 
 
 @functools.cache
@@ -209,59 +191,31 @@ def cyclic_solver(layout: SegmentLayout):
     loops over lanes passed them through memory, and the processor waited for its stores.
 
     Returns:
-        ``factor(S, R, places, full)`` and ``solve(S, R, places)``. S holds the system, R ``separator_rows`` × 8
-        numbers. At a repeated separator the matrix must be L = −1, D = 1, U = 0, the right-hand side 0.
+        ``factor(S, places, full)`` and ``solve(S, places, full)``. Whatever S holds at a repeated separator, its matrix
+        is taken to be L = −1, D = 1, U = 0, its right-hand side 0.
     """
     size = layout.size
     square = size * size
     lower, diagonal, upper, fill, head = (layout.submatrix(k) for k in range(5))
-    # rows of R: coupling of sums to separators, what each round subtracts of other rows, the last pivots
-    coupling, last_pivot = 0, square
-    take_before, take_after = ([square * (2 + 2 * r + k) for r in range(ROUNDS)] for k in range(2))
+    # submatrices of the separators: coupling of sums to them, the last pivots, what each round subtracts of other rows
+    coupling, last_pivot, rounds = 0, square, 2 * square
     vectors = _vectors(layout)
-    reduce = "".join(
-        f"""
-        {{
-            const submatrix pivot = invert(centre);
-            const submatrix pivot_before = turned_{LANES - 2**r}(pivot), pivot_after = turned_{2**r}(pivot);
-            submatrix from_before = {{}}, from_after = {{}}, next_below = {{}}, next_above = {{}};
-            add(from_before, below, pivot_before, 1.0);
-            add(from_after, above, pivot_after, 1.0);
-            store(from_before, at_separators({take_before[r]}), 1);
-            store(from_after, at_separators({take_after[r]}), 1);
-            add(centre, from_before, turned_{LANES - 2**r}(above), -1.0);
-            add(centre, from_after, turned_{2**r}(below), -1.0);
-            add(next_below, from_before, turned_{LANES - 2**r}(below), -1.0);
-            add(next_above, from_after, turned_{2**r}(above), -1.0);
-            below = next_below;
-            above = next_above;
-        }}"""
-        for r in range(ROUNDS)
-    )
-    take = "".join(
-        f"""
-        {{
-            const column from_before = turned_{LANES - 2**r}(value), from_after = turned_{2**r}(value);
-            load(factor, at_separators({take_before[r]}), 1);
-            add(value, factor, from_before, -1.0);
-            load(factor, at_separators({take_after[r]}), 1);
-            add(value, factor, from_after, -1.0);
-        }}"""
-        for r in range(ROUNDS)
-    )
 
     # Row p becomes x_p = y_p − U x_{p+1} + fill e, y_p = D (r_p − L y_{p−1}), with new D, U and fill; e is the
     # separator before the segment. The first unknown that the segment owns is Σ head y + sum e plus the segment's
     # separator times the head that is left over.
     @wp.func_native(f"""
         {vectors}
-        lanes owns = {{}}, begins = {{}};
-        for (int s = 0; s < {LANES}; s++) {{
-            owns[s] = s < full;
-            begins[s] = s >= full;
+        for (int k = 0; k < {square}; k++) {{
+            const double one = k % {size + 1} == 0;
+            lanes &low = *at_place({lower} + k, 1), &centre = *at_place({diagonal} + k, 1);
+            lanes& up = *at_place({upper} + k, 1);
+            low = where_repeated(lanes{{}} - one, low);
+            centre = where_repeated(lanes{{}} + one, centre);
+            up = where_repeated(lanes{{}}, up);
         }}
-        submatrix ahead = {{}}, sum = {{}}, across = multiple_of_one(lanes{{}} + 1.0), head = multiple_of_one(owns);
-        submatrix low, up;
+        submatrix ahead = {{}}, sum = {{}}, across = multiple_of_one(lanes{{}} + 1.0);
+        submatrix head = multiple_of_one(lanes{{}} + 1.0 - begins), low, up;
         for (int p = 1; p < places; p++) {{
             submatrix pivot, product = {{}};
             load(low, at_place({lower}, p), next_row);
@@ -289,28 +243,45 @@ def cyclic_solver(layout: SegmentLayout):
         load(centre, at_place({diagonal}, places), next_row);
         add(below, low, across, 1.0);
         add(centre, low, ahead, -1.0);
-        add(centre, up, turned_1(sum), 1.0);
-        add(above, up, turned_1(head), 1.0);
+        add(centre, up, turned(sum, 1), 1.0);
+        add(above, up, turned(head, 1), 1.0);
         store(up, at_separators({coupling}), 1);
-        {reduce}
+        #pragma unroll
+        for (int r = 0; r < {ROUNDS}; r++) {{
+            const int after = 1 << r, before = {LANES} - after;
+            const submatrix pivot = invert(centre);
+            submatrix from_before = {{}}, from_after = {{}}, next_below = {{}}, next_above = {{}};
+            add(from_before, below, turned(pivot, before), 1.0);
+            add(from_after, above, turned(pivot, after), 1.0);
+            store(from_before, at_separators({rounds} + {2 * square} * r), 1);
+            store(from_after, at_separators({rounds + square} + {2 * square} * r), 1);
+            add(centre, from_before, turned(above, before), -1.0);
+            add(centre, from_after, turned(below, after), -1.0);
+            add(next_below, from_before, turned(below, before), -1.0);
+            add(next_above, from_after, turned(above, after), -1.0);
+            below = next_below;
+            above = next_above;
+        }}
         for (int k = 0; k < {square}; k++) centre.m[k] += below.m[k] + above.m[k];
         store(invert(centre), at_separators({last_pivot}), 1);
     """)
-    def factor_lanes(segments: wp.uint64, separators: wp.uint64, places: int, full: int): ...
+    def factor(S: Rows, places: int, full: int): ...
 
     @wp.func_native(f"""
         {vectors}
         submatrix factor;
-        column value = {{}}, first = {{}}, next;
+        column value = {{}}, own = {{}}, next;
         for (int p = 1; p < places; p++) {{
             load(next, at_place({layout.right}, p), next_row);
+            if (p == 1)
+                for (auto& number : next.m) number = where_repeated(lanes{{}}, number);
             load(factor, at_place({lower}, p), next_row);
             add(next, factor, value, -1.0);
             value = column{{}};
             load(factor, at_place({diagonal}, p), next_row);
             add(value, factor, next, 1.0);
             load(factor, at_place({head}, p), next_row);
-            add(first, factor, value, 1.0);
+            add(own, factor, value, 1.0);
             store(value, at_place({layout.right}, p), next_row);
         }}
         load(next, at_place({layout.right}, places), next_row);
@@ -318,13 +289,20 @@ def cyclic_solver(layout: SegmentLayout):
         add(next, factor, value, -1.0);
         value = next;
         load(factor, at_separators({coupling}), 1);
-        add(value, factor, turned_1(first), -1.0);
-        {take}
+        add(value, factor, turned(own, 1), -1.0);
+        #pragma unroll
+        for (int r = 0; r < {ROUNDS}; r++) {{
+            const column from_before = turned(value, {LANES} - (1 << r)), from_after = turned(value, 1 << r);
+            load(factor, at_separators({rounds} + {2 * square} * r), 1);
+            add(value, factor, from_before, -1.0);
+            load(factor, at_separators({rounds + square} + {2 * square} * r), 1);
+            add(value, factor, from_after, -1.0);
+        }}
         next = column{{}};
         load(factor, at_separators({last_pivot}), 1);
         add(next, factor, value, 1.0);
         store(next, at_place({layout.right}, places), next_row);
-        const column before = turned_{LANES - 1}(next);
+        const column before = turned(next, {LANES - 1});
         for (int p = places - 1; p > 0; p--) {{
             load(value, at_place({layout.right}, p), next_row);
             load(factor, at_place({fill}, p), next_row);
@@ -335,14 +313,6 @@ def cyclic_solver(layout: SegmentLayout):
             next = value;
         }}
     """)
-    def solve_lanes(segments: wp.uint64, separators: wp.uint64, places: int): ...
-
-    @wp.func
-    def factor(S: Rows, R: Rows, places: int, full: int):
-        factor_lanes(S.ptr, R.ptr, places, full)
-
-    @wp.func
-    def solve(S: Rows, R: Rows, places: int):
-        solve_lanes(S.ptr, R.ptr, places)
+    def solve(S: Rows, places: int, full: int): ...
 
     return factor, solve

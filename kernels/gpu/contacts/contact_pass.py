@@ -11,14 +11,12 @@ from warpchain.kernels.events.tallies import add_count, count_bounce
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.board import publish, raise_value
 from warpchain.kernels.gpu.contacts.neighbour_list import block_list
-from warpchain.kernels.gpu.contacts.proximity import block_proximity, moving_sprocket_contact, upper_bound
+from warpchain.kernels.gpu.contacts.proximity import block_contact, block_proximity, upper_bound
 from warpchain.kernels.gpu.contacts.self_contacts import TouchLayout, block_self_contacts
-from warpchain.kernels.gpu.stage import Place, Proximity, constants
-from warpchain.kernels.gpu.threads import barrier_if_any
+from warpchain.kernels.gpu.stage import Proximity, Run, constants
+from warpchain.kernels.gpu.threads import barrier_count
 from warpchain.kernels.gpu.upright import BlockPlane
-from warpchain.kernels.types import Control, Drive, Ground, Integers, Row, Rows, State
-
-wp.set_module_options({"enable_backward": False})
+from warpchain.kernels.types import Control, Drive, State
 
 HALF = wp.constant(wp.float32(0.5))
 
@@ -28,11 +26,10 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
     """Warp functions (begin, meet) of the contacts, for all threads of a block.
 
     Returns:
-        ``begin(K, L, P, M, state, control, place, world, proximity)`` → number of listed pairs, longest step [s] that
-        cannot miss a contact (see :func:`gpu.contacts.proximity.block_proximity`), status. The board is written, and a
-        barrier passed.
-        ``meet(K, L, T, E, F, P, M, drive, state, control, place, ground, world, time, proximity, pairs)`` → whether
-        anything was hit, and the same three after the step.
+        ``begin(run, state, control, proximity)`` → number of listed pairs, longest step [s] that cannot miss a contact
+        (see :func:`gpu.contacts.proximity.block_proximity`), status. The board is written, and a barrier passed.
+        ``meet(run, drive, state, control, time, proximity, pairs)`` → whether anything was hit, and the same three
+        after the step.
     """
     lists = list_layout(features.columns)
     has_floor = features.has_floor
@@ -42,59 +39,45 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
     _, _, time_to_contact = block_proximity(features, block_dim)
     build_list = block_list(features.columns, block_dim)
     clear_contacts, find_contacts, resolve_contacts = block_self_contacts(features.columns, block_dim, touch)
-    meet_sprocket = moving_sprocket_contact()
-    begin_run, meet_fixed = plane.begin_run, plane.meet
+    meet_sprocket = block_contact("moving sprocket")
     values = layout.BOARD_VALUES
 
     @wp.func
-    def begin(
-        K: Rows,
-        L: Integers,
-        P: Row,
-        M: Row,
-        state: State,
-        control: Control,
-        place: Place,
-        world: int,
-        proximity: Proximity,
-    ):
+    def list_pairs(run: Run, control: Control, opening: wp.float32):
+        """Builds the neighbour list; the number of its pairs, and the status."""
+        pairs = build_list(run, control.skin, upper_bound(opening))
+        status = wp.where(pairs > wp.static(lists.capacity), LIST_OVERFLOW, RUNNING)
+        return wp.min(pairs, wp.static(lists.capacity)), status
+
+    @wp.func
+    def begin(run: Run, state: State, control: Control, proximity: Proximity):
         status = int(RUNNING)
         pairs = int(0)
         # kept from the last launch, since recomputing could round differently
-        reach = wp.float32(state.time_to_contact[world])
-        if state.is_fresh[world] == 0:
+        reach = wp.float32(state.time_to_contact[run.world])
+        if state.is_fresh[run.world] == 0:
             if wp.static(has_self):
-                pairs = L[wp.static(lists.count)]
+                pairs = run.L[wp.static(lists.count)]
         else:
             if wp.static(has_self):
-                pairs = build_list(K, L, constants(K), place.lane, control.skin, upper_bound(proximity.opening))
-                if pairs > wp.static(lists.capacity):
-                    status = int(LIST_OVERFLOW)
-            begin_run(K, P, M, place)
+                pairs, status = list_pairs(run, control, proximity.opening)
+            plane.begin_run(run)
             slack = HALF * wp.float32(control.skin) - proximity.opening
             reach = time_to_contact(control, pairs, proximity.gap, slack, proximity.speed)
         return pairs, reach, status
 
     @wp.func
     def meet(
-        K: Rows,
-        L: Integers,
-        T: Integers,
-        E: Rows,
-        F: Rows,
-        P: Row,
-        M: Row,
+        run: Run,
         drive: Drive,
         state: State,
         control: Control,
-        place: Place,
-        ground: Ground,
-        world: int,
         time: wp.float64,
         proximity: Proximity,
         pairs_before: int,
     ):
-        lane = place.lane
+        T = run.T
+        lane = run.lane
         gap = proximity.gap
         opening = proximity.opening
         pairs = pairs_before
@@ -107,46 +90,46 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
         if wp.static(has_fixed):
             if gap < wp.float32(0.0):
                 is_near = bool(True)
-                hits = meet_fixed(K, P, M, place, ground, drive, world, time)
+                hits = plane.meet(run, drive, time)
                 if hits > 0:
                     wp.atomic_add(T, wp.static(touch.fixed_hits), hits)
         if wp.static(moves):
             is_near = bool(True)
-            if lane < place.links:
-                hits += meet_sprocket(K, place, ground, drive, state, world, time)
+            if lane < run.links:
+                struck = meet_sprocket(run, drive, time)
+                hits += struck
+                if struck > 0:
+                    wp.atomic_add(state.counts, run.world, wp.static(layout.SPROCKET_IMPULSES), wp.int64(struck))
         if wp.static(has_self):
             is_stale = not slack > wp.float32(0.0)
             if is_stale or pairs > 0:
                 is_near = bool(True)
-                publish(K, place)
-                clear_contacts(T, lane, place.links)
+                publish(run)
+                clear_contacts(run)
         if is_near:
-            is_hit = barrier_if_any(T, wp.static(touch.votes), hits > 0)
+            is_hit = barrier_count(T, wp.static(touch.votes), hits > 0) > 0
         if wp.static(has_fixed):
             if gap < wp.float32(0.0) and lane == 0:
-                raise_value(K, layout.VALUE_FIXED_DEPTH, -gap)
+                raise_value(run.K, layout.VALUE_FIXED_DEPTH, -gap)
                 if wp.static(has_floor):
                     if is_hit:
-                        count_bounce(state, world, time, K[wp.static(values), layout.VALUE_LAST_IMPULSE])
-                        K[wp.static(values), layout.VALUE_LAST_IMPULSE] = time
+                        count_bounce(state, run.world, time, run.K[wp.static(values), layout.VALUE_LAST_IMPULSE])
+                        run.K[wp.static(values), layout.VALUE_LAST_IMPULSE] = time
         if wp.static(has_self):
             if is_stale:
                 if lane == 0:
-                    add_count(state, world, layout.LIST_BUILDS, wp.int64(1))
-                pairs = build_list(K, L, constants(K), lane, control.skin, upper_bound(opening))
-                if pairs > wp.static(lists.capacity):
-                    status = int(LIST_OVERFLOW)
-                    pairs = int(wp.static(lists.capacity))
+                    add_count(state, run.world, layout.LIST_BUILDS, wp.int64(1))
+                pairs, status = list_pairs(run, control, opening)
                 slack = HALF * wp.float32(control.skin) - opening
             if pairs > 0:
-                touched = constants(K)
-                touching = find_contacts(K, L, T, touched, lane, pairs, upper_bound(opening))
+                touched = constants(run.K)
+                touching = find_contacts(run, touched, pairs, upper_bound(opening))
                 if touching > 0:
-                    hits = resolve_contacts(K, L, T, E, F, touched, lane, touching)
+                    hits = resolve_contacts(run, touched, touching)
                     if hits > 0:
                         wp.atomic_add(T, wp.static(touch.self_hits), hits)
                     if not is_hit:
-                        is_hit = barrier_if_any(T, wp.static(touch.votes), hits > 0)
+                        is_hit = barrier_count(T, wp.static(touch.votes), hits > 0) > 0
         return is_hit, pairs, time_to_contact(control, pairs, gap, slack, proximity.speed), status
 
     return begin, meet

@@ -9,11 +9,10 @@ import warp as wp
 
 from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.contacts.pair_list import bucket_of, listing_reach
+from warpchain.kernels.gpu.stage import Run, constants
 from warpchain.kernels.gpu.threads import barrier
 from warpchain.kernels.layout import BOARD_LISTED_X, BOARD_LISTED_Y, RIGHT_X, RIGHT_Y
-from warpchain.kernels.types import Chain, Integers, Rows
-
-wp.set_module_options({"enable_backward": False})
+from warpchain.kernels.types import Integers, Rows
 
 
 @functools.cache
@@ -47,10 +46,13 @@ def block_list(columns: int, block_dim: int):
             near += 1
 
     @wp.func
-    def build(K: Rows, L: Integers, chain: Chain, lane: int, skin: wp.float64, opening: wp.float64):
+    def build(run: Run, skin: wp.float64, opening: wp.float64):
         """For all threads; the board's rows RIGHT_X and RIGHT_Y are written, and a barrier has passed."""
-        n = chain.link_count
-        reach = listing_reach(chain, skin, opening)
+        K = run.K
+        L = run.L
+        lane = run.lane
+        n = run.links
+        reach = listing_reach(constants(K), skin, opening)
         square = reach * reach
         if lane == 0:
             L[wp.static(lists.count)] = 0

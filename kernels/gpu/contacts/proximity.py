@@ -5,18 +5,18 @@ import functools
 import warp as wp
 
 from warpchain.kernels import layout
-from warpchain.kernels.contacts.fixed_body import BODIES, Touching, link_and_body
+from warpchain.kernels.contacts.fixed_body import BODIES, link_and_body
+from warpchain.kernels.contacts.impulse import Touching
 from warpchain.kernels.contacts.tilting_floor import greatest_across_speed, middle_height, steepness
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.board import ends_of
-from warpchain.kernels.gpu.stage import Link, Place, Proximity, constants, felt_plane, read_link, vec5d
+from warpchain.kernels.gpu.stage import Proximity, Run, constants, felt_plane, read_link, vec5d
 from warpchain.kernels.gpu.threads import block_maxima, vec4i
-from warpchain.kernels.layout import COSINE, INVERSE_INERTIA, INVERSE_MASS, OMEGA, SINE, U, V
+from warpchain.kernels.layout import COSINE, INVERSE_INERTIA, INVERSE_MASS, OMEGA, RADIUS, SINE, U, V
 from warpchain.kernels.methods.controller import quick_quotient, quick_root
 from warpchain.kernels.physics.elementary import TWO, from_order_key_single, order_bits_single, order_key_single
-from warpchain.kernels.types import Chain, Control, Drive, Ground, Rows, State
-
-wp.set_module_options({"enable_backward": False})
+from warpchain.kernels.physics.geometry import Link
+from warpchain.kernels.types import Chain, Control, Drive, with_circles
 
 OPENING_MARGIN = wp.constant(wp.float64(1.0 + 1e-6))
 
@@ -46,6 +46,21 @@ def placed_link(chain: Chain, own: Link) -> Touching:
     return link
 
 
+@wp.func
+def touching_link(run: Run, chain: Chain) -> Touching:
+    """A thread's link, from the board, as a fixed body meets it."""
+    K = run.K
+    link = placed_link(chain, read_link(K, run.lane))
+    link.cosine = K[COSINE, run.lane]
+    link.sine = K[SINE, run.lane]
+    link.mass = K[layout.MASS, run.column]
+    link.inertia = K[layout.INERTIA, run.column]
+    link.inverse_mass = K[INVERSE_MASS, run.column]
+    link.inverse_inertia = K[INVERSE_INERTIA, run.column]
+    link.lost = K[layout.BOARD_LOST_FIXED, run.lane]
+    return link
+
+
 @functools.cache
 def block_proximity(features: Features, block_dim: int):
     """Warp functions (write_proximity, read_proximity, time_to_contact) for these features."""
@@ -60,16 +75,17 @@ def block_proximity(features: Features, block_dim: int):
     _maximum, write_maxima, read_maxima = block_maxima(block_dim)
 
     @wp.func
-    def write_proximity(K: Rows, memory: wp.uint64, place: Place, ground: Ground, link: Link, next_end: vec5d):
+    def write_proximity(run: Run, link: Link, next_end: vec5d):
         """Writes a link's share of the maxima; computed in double, compared in single precision."""
+        K = run.K
         left_x, left_y, right_x, right_y = ends_of(link)
         values = vec4i(0, order_key_single(wp.float32(-wp.inf)), 0, 0)
-        if place.lane < place.links:
+        if run.lane < run.links:
             cx = next_end[0] - right_x
             cy = next_end[1] - right_y
             values[0] = order_bits_single(wp.float32(cx * cx + cy * cy))
             if wp.static(tilts):
-                felt = felt_plane(K, constants(K), wp.static(layout.VALUE_PLANE))
+                felt = with_circles(felt_plane(run), K[RADIUS, run.lane])
             if wp.static(has_floor and tilts):
                 slope = steepness(felt)
                 lowest = wp.min(
@@ -78,12 +94,12 @@ def block_proximity(features: Features, block_dim: int):
                 gap = lowest - felt.half_width * wp.abs(felt.up_z)
                 values[1] = order_key_single(wp.float32(-gap))
             elif wp.static(has_fixed):
-                own = constants(K)
-                gap = gap_of(own, ground, face_of(ground), placed_link(own, link))
+                own = with_circles(constants(K), K[RADIUS, run.lane])
+                gap = gap_of(own, run.ground, face_of(run.ground), placed_link(own, link))
                 values[1] = order_key_single(wp.float32(-gap))
             if wp.static(has_self):
-                dx = right_x - K[layout.BOARD_LISTED_X, place.lane]
-                dy = right_y - K[layout.BOARD_LISTED_Y, place.lane]
+                dx = right_x - K[layout.BOARD_LISTED_X, run.lane]
+                dy = right_y - K[layout.BOARD_LISTED_Y, run.lane]
                 values[2] = order_bits_single(wp.float32(dx * dx + dy * dy))
             if wp.static(has_contacts):
                 turn = constants(K).half_length * link.omega
@@ -92,12 +108,12 @@ def block_proximity(features: Features, block_dim: int):
                     across = greatest_across_speed(felt, link.x, link.y)
                     speed += across * across
                 values[3] = order_bits_single(wp.float32(speed))
-        write_maxima(memory, place.lane, values)
+        write_maxima(run.maxima, run.lane, values)
 
     @wp.func
-    def read_proximity(memory: wp.uint64) -> Proximity:
+    def read_proximity(run: Run) -> Proximity:
         """Maxima over all links, after a barrier."""
-        values = read_maxima(memory)
+        values = read_maxima(run.maxima)
         proximity = Proximity()
         proximity.opening = quick_root(wp.cast(values[0], wp.float32))
         proximity.gap = -from_order_key_single(values[1])
@@ -127,34 +143,15 @@ def block_contact(fixed_body: str):
     face_of, face_at = BODIES[fixed_body].face, BODIES[fixed_body].motion
 
     @wp.func
-    def meet_body(K: Rows, place: Place, ground: Ground, drive: Drive, world: int, time: wp.float64):
-        chain = constants(K)
-        link = placed_link(chain, read_link(K, place.lane))
-        link.cosine = K[COSINE, place.lane]
-        link.sine = K[SINE, place.lane]
-        link.inverse_mass = K[INVERSE_MASS, place.column]
-        link.inverse_inertia = K[INVERSE_INERTIA, place.column]
-        link.lost = K[layout.BOARD_LOST_FIXED, place.lane]
-        link = meet(chain, ground, face_at(face_of(ground), drive, world, time), link)
-        K[U, place.lane] = link.u
-        K[V, place.lane] = link.v
-        K[OMEGA, place.lane] = link.omega
-        K[layout.BOARD_LOST_FIXED, place.lane] = link.lost
+    def meet_body(run: Run, drive: Drive, time: wp.float64):
+        K = run.K
+        chain = with_circles(constants(K), K[RADIUS, run.lane])
+        face = face_at(face_of(run.ground), drive, run.world, time)
+        link = meet(chain, run.ground, face, touching_link(run, chain))
+        K[U, run.lane] = link.u
+        K[V, run.lane] = link.v
+        K[OMEGA, run.lane] = link.omega
+        K[layout.BOARD_LOST_FIXED, run.lane] = link.lost
         return int(link.hits)
 
     return meet_body
-
-
-@functools.cache
-def moving_sprocket_contact():
-    """Warp function: as that of `block_contact` for the moving sprocket; it counts the impulses itself."""
-    meet_sprocket = block_contact("moving sprocket")
-
-    @wp.func
-    def meet_and_count(K: Rows, place: Place, ground: Ground, drive: Drive, state: State, world: int, time: wp.float64):
-        hits = meet_sprocket(K, place, ground, drive, world, time)
-        if hits > 0:
-            wp.atomic_add(state.counts, world, wp.static(layout.SPROCKET_IMPULSES), wp.int64(hits))
-        return hits
-
-    return meet_and_count

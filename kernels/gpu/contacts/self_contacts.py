@@ -18,12 +18,11 @@ import warp as wp
 
 from warpchain.kernels.contacts.link_pair import are_strands, collide, links_of, natural, touching_circles
 from warpchain.kernels.contacts.list_layout import list_layout
-from warpchain.kernels.gpu.threads import barrier, barrier_if_any
+from warpchain.kernels.gpu.stage import Run
+from warpchain.kernels.gpu.threads import barrier, barrier_count
 from warpchain.kernels.layout import BOARD_LOST_SELF, RIGHT_X, RIGHT_Y, consecutive_offsets
 from warpchain.kernels.physics.elementary import TWO, ZERO
 from warpchain.kernels.types import Chain, Integers, Rows
-
-wp.set_module_options({"enable_backward": False})
 
 JOINT_BITS = 11
 """Bits of a joint's number in a key: chains have fewer than 2048 links."""
@@ -34,37 +33,21 @@ DONE = wp.constant(-1)
 
 @dataclass(frozen=True)
 class TouchLayout:
-    """Where the integers of the contact pass lie: offsets into one row of int32.
+    """Where the integers of the contact pass lie: offsets into one row of int32."""
 
-    Attributes:
-        width: Columns of the owners, at least the number of links.
-        shared_pairs: How many touching pairs of joints lie at ``pairs``; further ones lie in the list's row.
-        owners: Three arrays of ``width`` keys, one per link; rounds use them in turn.
-        pairs: See ``shared_pairs``.
-        touching: Number of touching pairs of joints.
-        votes: See :func:`gpu.threads.barrier_if_any`.
-        fixed_hits: Impulses with floor or sprocket in this launch.
-        self_hits: Impulses between links in this launch.
-        strand_hits: Those between strands of the loop.
-        mailbox: A status from one thread to all.
-        deepest: Greatest depth of a contact in this launch [m], bits of a single-precision number.
-        is_late: 1 when the launch has lasted long enough.
-        size: Integers from the row's start to the end of the last.
-    """
-
-    width: int
-    shared_pairs: int
-    owners: int
-    pairs: int
-    touching: int
-    votes: int
-    fixed_hits: int
-    self_hits: int
-    strand_hits: int
-    mailbox: int
-    deepest: int
-    is_late: int
-    size: int
+    width: int  # columns of the owners, at least the number of links
+    shared_pairs: int  # how many touching pairs of joints lie at ``pairs``; further ones lie in the list's row
+    owners: int  # three arrays of ``width`` keys, one per link; rounds use them in turn
+    pairs: int  # see ``shared_pairs``
+    touching: int  # number of touching pairs of joints
+    votes: int  # see :func:`gpu.threads.barrier_count`
+    fixed_hits: int  # impulses with floor or sprocket in this launch
+    self_hits: int  # impulses between links in this launch
+    strand_hits: int  # those between strands of the loop
+    mailbox: int  # A status from one thread to all
+    deepest: int  # greatest depth of a contact in this launch [m], bits of a single-precision number
+    is_late: int  # 1 when the launch has lasted long enough
+    size: int  # integers from the row's start to the end of the last
 
 
 @functools.cache
@@ -81,45 +64,35 @@ def touch_layout(columns: int, block_dim: int, in_lists: bool) -> TouchLayout:
 
 @wp.func
 def pair_key(p: int, q: int):
-    """Orders pairs of joints as (p mod 2, q mod 2, p, q)."""
-    return ((((p & 1) * 2 + (q & 1)) << wp.static(JOINT_BITS) | p) << wp.static(JOINT_BITS)) | q
-
-
-@wp.func
-def first_joint(pair: int):
-    """p of a pair's key."""
-    return (pair >> wp.static(JOINT_BITS)) & wp.static(2**JOINT_BITS - 1)
-
-
-@wp.func
-def second_joint(pair: int):
-    """q of a pair's key."""
-    return pair & wp.static(2**JOINT_BITS - 1)
+    """Orders pairs of joints as (p mod 2, q mod 2, p, q); it leaves the last bit free."""
+    return ((((p & 1) * 2 + (q & 1)) << wp.static(JOINT_BITS) | p) << wp.static(JOINT_BITS) | q) << 1
 
 
 @wp.func
 def contact_key(pair: int, half: int, second: int):
     """Orders contacts as the sequence does: by half, pair of joints, and first or second of the pair's two."""
-    return half << wp.static(2 * JOINT_BITS + 3) | pair << 1 | second
+    return half << wp.static(2 * JOINT_BITS + 3) | pair | second
 
 
 @wp.func
-def pair_of(key: int):
-    """The pair of joints of a contact."""
-    return key >> 1 & wp.static(2 ** (2 * JOINT_BITS + 2) - 1)
-
-
-@wp.func
-def half_of(key: int):
-    """The half of a contact; the key is not DONE."""
-    return key >> wp.static(2 * JOINT_BITS + 3)
+def joints_of(key: int):
+    """The joints p < q and the half of a contact; the key is not DONE."""
+    most = wp.static(2**JOINT_BITS - 1)
+    return key >> wp.static(JOINT_BITS + 1) & most, key >> 1 & most, key >> wp.static(2 * JOINT_BITS + 3)
 
 
 @wp.func
 def links_at(key: int, n: int):
     """The two links of a contact."""
-    pair = pair_of(key)
-    return links_of(first_joint(pair), second_joint(pair), half_of(key) & 1, key & 1, n)
+    p, q, half = joints_of(key)
+    return links_of(p, q, half & 1, key & 1, n)
+
+
+@wp.func
+def circles_at(K: Rows, chain: Chain, key: int):
+    """The geometry of a contact, see :func:`contacts.link_pair.touching_circles`."""
+    p, q, half = joints_of(key)
+    return touching_circles(K, chain, p, q, half, key & 1)
 
 
 @wp.func
@@ -141,9 +114,11 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
     lists = list_layout(columns)
 
     @wp.func
-    def clear(T: Integers, lane: int, n: int):
+    def clear(run: Run):
         """Before a barrier that precedes ``find``."""
-        if lane < n:
+        T = run.T
+        lane = run.lane
+        if lane < run.links:
             T[wp.static(touch.owners) + lane] = FREE
             T[wp.static(touch.owners + touch.width) + lane] = FREE
             T[wp.static(touch.owners + 2 * touch.width) + lane] = FREE
@@ -188,8 +163,12 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         barrier()
 
     @wp.func
-    def find(K: Rows, L: Integers, T: Integers, chain: Chain, lane: int, pairs: int, opening: wp.float64):
+    def find(run: Run, chain: Chain, pairs: int, opening: wp.float64):
         """Number of pairs of joints that may touch now; the board is written. ``opening``: greatest |C| [m]."""
+        K = run.K
+        L = run.L
+        T = run.T
+        lane = run.lane
         reach = TWO * chain.circle_radius + TWO * opening
         square = reach * reach
         k = lane
@@ -221,18 +200,19 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
             wp.atomic_add(T, wp.static(touch.strand_hits), int(hits))
 
     @wp.func
-    def prepare(K: Rows, T: Integers, E: Rows, F: Rows, chain: Chain, pair: int, half: int, second: int, lane: int):
-        """Stores the geometry of a thread's first contact but its depth [m].
+    def prepare(run: Run, chain: Chain, key: int):
+        """Stores the geometry of a thread's first contact.
 
         Returns:
-            Its key, or DONE if the circles do not overlap, and its depth.
+            Its key, or DONE if the circles do not overlap, and its depth [m].
         """
-        depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = touching_circles(
-            K, chain, first_joint(pair), second_joint(pair), half, second
-        )
-        key = int(DONE)
+        E = run.E
+        F = run.F
+        lane = run.lane
+        depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = circles_at(run.K, chain, key)
+        own = int(DONE)
         if depth > ZERO:
-            key = contact_key(pair, half, second)
+            own = key
             E[0, lane] = nx
             E[1, lane] = ny
             E[2, lane] = a_n
@@ -241,14 +221,16 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
             F[0, lane] = b_t
             F[1, lane] = inverse_nn
             F[2, lane] = inverse_determinant
-            raise_depth(T, depth)
-        return key, depth
+            raise_depth(run.T, depth)
+        return own, depth
 
     @wp.func
-    def resolve_prepared(
-        K: Rows, T: Integers, E: Rows, F: Rows, chain: Chain, link_a: int, link_b: int, lane: int, depth: wp.float64
-    ):
+    def resolve_prepared(run: Run, chain: Chain, link_a: int, link_b: int, depth: wp.float64):
         """Resolves a thread's first contact; returns the number of impulses."""
+        K = run.K
+        E = run.E
+        F = run.F
+        lane = run.lane
         lost_before = K[BOARD_LOST_SELF, link_a]
         lost, hits = collide(
             K,
@@ -266,38 +248,38 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
             depth,
         )
         K[BOARD_LOST_SELF, link_a] = lost_before + lost
-        count_strands(T, chain, link_a, link_b, hits)
+        count_strands(run.T, chain, link_a, link_b, hits)
         return int(hits)
 
     @wp.func
-    def overlaps(K: Rows, T: Integers, chain: Chain, pair: int, half: int, second: int):
+    def overlaps(run: Run, chain: Chain, key: int):
         """1 if the circles of a further contact overlap, else 0; raises the greatest depth."""
-        depth, _nx, _ny, _a_n, _a_t, _b_n, _b_t, _inverse_nn, _inverse_determinant = touching_circles(
-            K, chain, first_joint(pair), second_joint(pair), half, second
-        )
-        raise_depth(T, depth)
+        depth, _nx, _ny, _a_n, _a_t, _b_n, _b_t, _inverse_nn, _inverse_determinant = circles_at(run.K, chain, key)
+        raise_depth(run.T, depth)
         return wp.where(depth > ZERO, 1, 0)
 
     @wp.func
-    def resolve_further(K: Rows, T: Integers, chain: Chain, key: int, link_a: int, link_b: int):
+    def resolve_further(run: Run, chain: Chain, key: int, link_a: int, link_b: int):
         """Resolves a further contact; returns the number of impulses."""
-        depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = touching_circles(
-            K, chain, first_joint(pair_of(key)), second_joint(pair_of(key)), half_of(key), key & 1
-        )
+        K = run.K
+        depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = circles_at(K, chain, key)
         lost, hits = collide(
             K, chain, link_a, link_b, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant, depth
         )
         K[BOARD_LOST_SELF, link_a] = K[BOARD_LOST_SELF, link_a] + lost
-        count_strands(T, chain, link_a, link_b, hits)
+        count_strands(run.T, chain, link_a, link_b, hits)
         return int(hits)
 
     @wp.func
-    def resolve(K: Rows, L: Integers, T: Integers, E: Rows, F: Rows, chain: Chain, lane: int, touching: int):
+    def resolve(run: Run, chain: Chain, touching: int):
         """Resolves all contacts; the board is written. Returns this thread's impulses and ends with a barrier.
 
         A thread keeps the geometry of its first contact in its columns of E and F. With more contacts than threads, the
         geometry of the others is evaluated again when they are resolved.
         """
+        L = run.L
+        T = run.T
+        lane = run.lane
         impulses = int(0)
         owners = int(wp.static(touch.owners))
         next_owners = int(wp.static(touch.owners + touch.width))
@@ -315,26 +297,25 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
             if lane < contacts:
                 half = wp.where(lane < 2 * touching, turn, 1)
                 k = lane - wp.where(in_turn, 0, half * 2 * touching)
-                own_key, own_depth = prepare(K, T, E, F, chain, pair_at(L, T, k >> 1), half, k & 1, lane)
+                own_key, own_depth = prepare(run, chain, contact_key(pair_at(L, T, k >> 1), half, k & 1))
             own_a, own_b = links_at(own_key, chain.link_count)
             left = wp.where(own_key == DONE, 0, 1)
             if own_key != DONE:
                 claim(T, owners, own_a, own_b, own_key)
             k = lane + wp.static(block_dim)
             while k < contacts:
-                pair = pair_at(L, T, k >> 1)
-                touches = overlaps(K, T, chain, pair, turn, k & 1)
+                key = contact_key(pair_at(L, T, k >> 1), turn, k & 1)
+                touches = overlaps(run, chain, key)
                 L[wp.static(lists.pending) + k] = touches
                 left += touches
                 if touches != 0:
-                    key = contact_key(pair, turn, k & 1)
                     link_a, link_b = links_at(key, chain.link_count)
                     claim(T, owners, link_a, link_b, key)
                 k += wp.static(block_dim)
-            while barrier_if_any(T, wp.static(touch.votes), left > 0):
+            while barrier_count(T, wp.static(touch.votes), left > 0) > 0:
                 if own_key != DONE:
                     if owns_links(T, owners, own_a, own_b, own_key):
-                        impulses += resolve_prepared(K, T, E, F, chain, own_a, own_b, lane, own_depth)
+                        impulses += resolve_prepared(run, chain, own_a, own_b, own_depth)
                         left -= 1
                         own_key = DONE
                     else:
@@ -345,7 +326,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
                         key = contact_key(pair_at(L, T, k >> 1), turn, k & 1)
                         link_a, link_b = links_at(key, chain.link_count)
                         if owns_links(T, owners, link_a, link_b, key):
-                            impulses += resolve_further(K, T, chain, key, link_a, link_b)
+                            impulses += resolve_further(run, chain, key, link_a, link_b)
                             left -= 1
                             L[wp.static(lists.pending) + k] = 0
                         else:

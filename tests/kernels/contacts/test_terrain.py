@@ -7,9 +7,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 import warpchain
 from tests.hard_cases.starts import dropped
 from tests.oracle_model import motion_equations, terrain
+from tests.support.blocks_under_test import floor_with
 from tests.support.folded_chains import folded_chain
-from tests.support.kernels_under_test import FLOOR, TERRAIN, ContactPass, Placed
-from warpchain.inputs.floor import distances
+from tests.support.kernels_under_test import TERRAIN, ContactPass, Placed
 from warpchain.inputs.parameters import preset
 
 PAPER, SOFT = preset("paper"), preset("soft")
@@ -37,7 +37,9 @@ def brute_gap(position, points):
     """Least distance of 1001 points of every link's axis from the floor, less r."""
     left, right = motion_equations.link_ends(position, PAPER)
     share = np.linspace(0, 1, 1001)[:, None, None]
-    return distances(points, (left + share * (right - left)).reshape(-1, 2)).min() - PAPER.circle_radius
+    return (
+        floor_with(points, PAPER).distances((left + share * (right - left)).reshape(-1, 2)).min() - PAPER.circle_radius
+    )
 
 
 @every_profile
@@ -96,21 +98,6 @@ def test_a_level_slope_is_the_flat_floor_to_the_bit():
     assert_array_equal(level.velocity, flat.velocity)
 
 
-def test_a_level_profile_is_the_flat_floor():
-    """On level faces a pass over chains leaves the velocities and counts of one on the flat floor, but for rounding."""
-    heaps = []
-    for seed in range(10):
-        position, velocity = folded_chain(20, seed, PAPER.link_length)
-        position[:, 1] -= np.concatenate(motion_equations.link_ends(position, PAPER))[:, 1].min() - 1e-4
-        heaps.append(Placed(position, velocity, PAPER))
-    ours, theirs, hits = ContactPass(heaps), ContactPass(heaps), 0
-    for world, (here, there) in enumerate(zip(ours.run(TERRAIN), theirs.run(FLOOR), strict=True)):
-        assert here["terrain"] == there["floor"]
-        assert_allclose(ours.velocity(world), theirs.velocity(world), rtol=1e-11)
-        hits += here["terrain"]
-    assert hits > 10
-
-
 def lying_chain(degrees, speed):
     """Four links upon one another on a slope through the origin, which slide down it."""
     angle = -np.radians(degrees)
@@ -140,6 +127,37 @@ def test_a_block_of_chain_slides_by_the_formula(degrees, friction, corners):
         assert_allclose(way, 0.4 * moved.time + gain * moved.time**2 / 2, rtol=2e-3)
     else:
         assert way[-1] == pytest.approx(0.4**2 / (-2 * gain), rel=1e-2) and abs(speed[-1]) < 1e-3
+
+
+@pytest.mark.parametrize(("first", "second", "until"), [(0.1, 0.3, 0.02), (0.3, 0.1, 0.008)])
+def test_a_block_slides_over_two_segments_by_the_formula(first, second, until):
+    """v²/2g is the sum of μ times way on each; while the block of length 2ℓ crosses, of the mean μ times 2ℓ."""
+    chain = SOFT.with_values({"floor_restitution": 0.0, "floor_friction": 0.9, "circle_radius": 1e-3})
+    position, velocity, _ = lying_chain(0.0, 0.4)
+    position[:, 1] = chain.circle_radius
+    front = position[:, 0].max() + chain.link_length / 2
+    points = [[-1, 0, 0.0, first], [front + until, 0, 0.0, second], [2, 0]]
+    moved = warpchain.simulate(
+        chain, position, velocity, 0.4, times=[0.4], floor=points, self_contact=False, method="os32"
+    )
+    length = 2 * chain.link_length
+    left = 0.4**2 / (2 * chain.gravity) - first * until - (first + second) / 2 * length
+    way = moved.position[0, :, 0].mean() - position[:, 0].mean()
+    assert left > 0 and way == pytest.approx(until + length + left / second, rel=1e-2)
+    assert np.abs(moved.velocity).max() < 1e-2
+
+
+def test_bounces_have_the_restitution_of_their_segment():
+    """Upright links that fall on segments and on a corner rise at e times their speed, so to e² of the height."""
+    points = np.array([[-1.0, 0.0], [0.0, 0.0], [1.0, 0.0], [1.0, -1.0], [2.0, -1.0]])
+    laws = np.array([[0.2, 0.5], [0.9, 0.5], [0.3, 0.5], [0.5, 0.5]])
+    position = np.zeros((4, 3))
+    position[:, 0], position[:, 2] = [-0.5, 0.5, 1.0 + 1e-9, 1.5], np.pi / 2
+    position[:, 1] = PAPER.link_length / 2 + PAPER.circle_radius - 1e-5 - np.array([0, 0, 0, 1])
+    velocity = np.tile([0.0, -1.0, 0.0], (4, 1))
+    contact_pass = ContactPass([Placed(position, velocity, PAPER)], profile=points, laws=laws)
+    contact_pass.run(TERRAIN)
+    assert_allclose(contact_pass.velocity(0)[:, 1], [0.2, 0.9, 0.3, 0.5], rtol=1e-6)
 
 
 @pytest.mark.parametrize("points", [STAIRS, HILLS], ids=["stairs", "hills"])

@@ -50,7 +50,7 @@ def let_go(start, parameters, duration, longest_step=None):
     batch = tilting_batch([start], [parameters], options, duration, longest_step=longest_step, keeps_samples=True)
     rows = []
     features = batch.features(fixed_body="floor", tilts=True)
-    batch.run([0], features, lambda: rows.append(batch.drain_samples(0)))
+    batch.run([0], features, lambda: rows.append(batch.drain(0).samples))
     assert batch.status(0) == Status.FINISHED
     position, _, plane = end_of(batch)
     assert_allclose(position[:, 2], start[0][:, 2], atol=0.02)

@@ -50,7 +50,7 @@ def run(batch, tilts):
     """Runs the only chain to its end; samples (t, columns)."""
     rows = []
     features = batch.features(fixed_body="floor", tilts=tilts)
-    batch.run([0], features, lambda: rows.append(batch.drain_samples(0)))
+    batch.run([0], features, lambda: rows.append(batch.drain(0).samples))
     return np.concatenate(rows)
 
 

@@ -21,11 +21,11 @@ wp.load_module(loop.make_advance(features).module, device="cpu")
 COMMON = {"place_ends", "attempt", "greatest_opening", "greatest_speed", "greatest_displacement", "evaluate"}
 EXPLICIT = COMMON | {"begin_stages", "derivatives", "commit"}
 RIGID = COMMON | {
-    *("fastest", "meeting", "prepare", "place_stage", "assemble", "solve_forces", "damp", "keep_stage"),
+    *("fastest", "meeting", "prepare", "place_stage", "factorise", "solve_forces", "damp", "keep_stage"),
     *("openings", "opening_rates", "push", "close", "begin"),
 }
-TILTING = (EXPLICIT - {"greatest_speed"}) | {
-    *("shift_first_stage", "tilting_gap", "greatest_tilting_speed", "resolve_tilting_floor", "write_plane_sums"),
+TILTING = EXPLICIT | {
+    *("shift_first_stage", "tilting_gap", "resolve_tilting_floor", "write_plane_sums"),
 }
 HOT_FUNCTIONS = {"dp5": EXPLICIT, "hybrid": RIGID}
 

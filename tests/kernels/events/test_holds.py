@@ -9,6 +9,7 @@ import pytest
 import warpchain
 from tests.support.setups import setup_walk
 from warpchain import InputError, Status, preset
+from warpchain.engine.batch import ATTEMPTS
 from warpchain.inputs.link_values import alternating
 from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL
 from warpchain.inputs.scene import Scene, fewest_links
@@ -78,11 +79,11 @@ def test_a_drive_depends_neither_on_its_launches_nor_on_its_neighbours(monkeypat
     ]
 
     def outcomes(attempts: int, slots: int) -> dict[int, tuple[Any, ...]]:
-        monkeypatch.setitem(scheduler.ATTEMPTS, "cpu", attempts)
+        monkeypatch.setitem(ATTEMPTS, "cpu", attempts)
         found = {}
         for place, run in scheduler.run_setups(setups, slots=slots):
             assert run.status == Status.TIME_LIMIT
-            found[place] = (run.hold_time, run.drift, run.drive_counts, run.energy(), run.raised)
+            found[place] = (run.hold_time, run.drift, run.counts, run.energy(), run.raised)
         return found
 
     whole = outcomes(20_000, 1)

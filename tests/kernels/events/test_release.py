@@ -22,7 +22,6 @@ from warpchain.kernels.events.release import (
     load_at,
     watch_steadiness,
 )
-from warpchain.kernels.events.summary import Summary
 from warpchain.kernels.physics.scaled_loads import under_load
 from warpchain.kernels.types import Drive, Model, State
 
@@ -48,15 +47,9 @@ def _watch(
 ):
     """Feeds one made-up sample after the other to the release rule, as `events.sample` does."""
     for i in range(samples.shape[0]):
-        time = samples[i, 0]
-        summary = Summary()
-        summary.height = samples[i, 1]
-        summary.width = samples[i, 2]
-        summary.center_x = samples[i, 3]
-        summary.center_y = samples[i, 4]
-        summary.loop_speed = samples[i, 5]
+        time = samples[i, layout.TIME]
         chain = under_load(model.chains[0], state.load_factor[0])
-        watch_steadiness(chain, state, drive, 0, time, summary)
+        watch_steadiness(chain, state, drive, 0, samples[i])
         state.load_factor[0] = load_at(state, drive, 0, time)
         loads[i] = state.load_factor[0]
 
@@ -65,10 +58,8 @@ def _watch(
 class Watched:
     """A loop that is sampled every STEP, and the world that watches it.
 
-    Attributes:
-        duration: Of all samples [s].
-        drive: Fields of the world's drive that are not the usual ones.
-        loads: Factor of the loads after each sample.
+    `drive` has fields of the world's drive that are not the usual ones, `loads` the factor of the loads after each
+    sample.
     """
 
     duration: float = 4.0
@@ -89,7 +80,10 @@ class Watched:
         """Samples from one time to before another of a loop that is as usual, except for the quantities given."""
         of = (first - STEP / 2 < self.time) & (self.time < last - STEP / 2)
         time = self.time[of]
-        rows = np.stack([time, *(np.broadcast_to(value, time.shape) for value in (USUAL | seen).values())], axis=1)
+        rows = np.zeros((len(time), layout.SAMPLE_COLUMNS))
+        rows[:, layout.TIME] = time
+        for column, value in zip(layout.WATCHED_COLUMNS, (USUAL | seen).values(), strict=True):
+            rows[:, column] = value
         loads = wp.full(len(rows), np.nan, dtype=wp.float64, device=CPU)
         samples = wp.array(rows, dtype=wp.float64, device=CPU)
         inputs = [self.batch.model, self.batch.drive, self.batch.state, samples, loads]
@@ -122,13 +116,9 @@ def first_sample(moment: float) -> float:
 
 
 def end_of_watch(start: float, window: float, wanted: float, since: float | None = None) -> float:
-    """When the first window ends that is not before a time wanted.
+    """When the first window ends that is not before a time wanted, for which the shape must be kept.
 
-    Args:
-        start: Of the first window.
-        window: Length of each.
-        wanted: The time for which the shape must be kept.
-        since: From when on it is counted; None: from the end of the first window.
+    The time is counted from `since`, or from the end of the first window.
     """
     length = first_sample(window)
     if since is None:

@@ -46,7 +46,7 @@ def everything(batch: Batch, world: int) -> dict[str, NDArray[np.generic]]:
     found = {name: getattr(batch.state, name).numpy()[world].copy() for name in State.vars}
     found["board"] = batch.scratch.numpy()[world, layout.BOARD_LOST_SELF : layout.BOARD_VALUES, :LINKS].copy()
     found["pairs"] = np.array(sorted(listed_pairs(batch, world)))
-    found["samples"] = batch.drain_samples(world)
+    found["samples"] = batch.drain(world).samples
     return found
 
 

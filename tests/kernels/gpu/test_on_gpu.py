@@ -17,7 +17,7 @@ import yaml
 
 from tests.kernels.methods.test_flight import FLIGHTS, exact_flight, greatest
 from tests.run.test_sweep_run import brief_setup, data_of, outcomes
-from tests.support.blocks_under_test import FIXED_STEP, HILLS, SOFT, heap
+from tests.support.blocks_under_test import FIXED_STEP, HILLS, SOFT, floor_with, heap
 from warpchain import simulate, sweep, walk
 from warpchain.engine.batch import Batch
 from warpchain.engine.sprocket_motion import motion_rows
@@ -39,11 +39,12 @@ def fixed_steps(device: str, method: str, fixed_body: str) -> dict[str, np.ndarr
         if fixed_body == "sprocket":
             position[:, 1] += 0.9 * SOFT.sprocket_radius
         batch.set_chain(world, SOFT, LINKS)
-        batch.set_floor(world, HILLS if fixed_body == "terrain" else HILLS[[0, -1]], SOFT)
+        points = HILLS if fixed_body == "terrain" else HILLS[[0, -1]]
+        batch.set_floor(world, floor_with(points, SOFT))
         batch.load(world, position, velocity, stop_time=STEPS * FIXED_STEP, stop_status=Status.FINISHED)
         batch.set_drive(world, sprocket_speed=-50.0)
         batch.set_drive(world, motion=motion_rows(((0.01, 0.002, -0.01, 5.0),), 8.0, 0.02))
-        batch._edit(batch.state.step)[world] = FIXED_STEP
+        batch.set_state(world, step=FIXED_STEP)
     moves = fixed_body == "floor and sprocket"
     batch.run(range(2), batch.features(fixed_body="floor" if moves else fixed_body, moving_sprocket=moves))
     worlds = range(2)
@@ -109,17 +110,20 @@ def test_a_walk_gives_the_same_bits_in_any_batch(device: str, monkeypatch: pytes
     together = outcomes(setups)
     assert [outcomes([setup])[0] for setup in setups] == together
     assert outcomes(setups[::-1], slots=2)[::-1] == together
-    assert outcomes(setups, threads=64) == together
+    monkeypatch.setattr(scheduler, "SHARED_WALKS", 0)
+    assert outcomes(setups) == together
     monkeypatch.setattr("warpchain.engine.batch.LAUNCH_SECONDS", 0.0)
     assert outcomes(setups * 3) == together * 3
 
 
 @pytest.mark.usefixtures("gpu")
 @pytest.mark.parametrize("method", ["explicit", "rkf78", "dp5", "bs32"])
-def test_a_walk_gives_the_same_bits_in_any_block(method: str) -> None:
-    """In the block of its own size, or in one that it shares with the longest chain, see `shared_threads`."""
+def test_a_walk_gives_the_same_bits_in_any_block(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the block of its own size, or in one that it shares with the longest chain."""
     setups = [brief_setup(links, links=links, device="cuda", method=method) for links in (30, 90, 180)]
-    assert outcomes(setups, threads=192) == outcomes(setups)
+    shared = outcomes(setups)
+    monkeypatch.setattr(scheduler, "SHARED_WALKS", 0)
+    assert outcomes(setups) == shared
 
 
 def test_memory_that_holds_few_chains_only_takes_longer(device: str, monkeypatch: pytest.MonkeyPatch) -> None:

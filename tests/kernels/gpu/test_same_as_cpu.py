@@ -18,6 +18,7 @@ from tests.support.blocks_under_test import (
     SOFT,
     assert_same,
     batch_of,
+    floor_with,
     heap,
     launch_blocks,
     launch_chains,
@@ -53,7 +54,7 @@ def test_fixed_steps_equal_a_cpu_kernel(method: str, fixed_body: str, self_conta
     ours, theirs = (batch_of(chains, method=method, self_contact=self_contact) for _ in range(2))
     for batch in (ours, theirs):
         for world in range(2):
-            batch.set_floor(world, HILLS, SOFT)
+            batch.set_floor(world, floor_with(HILLS, SOFT))
     features = ours.features(fixed_body=fixed_body)
     launch_blocks(ours, features, 40, block_dim=block_dim)
     launch_chains(theirs, features, 40)
@@ -85,7 +86,7 @@ def test_chains_too_long_for_shared_memory_equal_a_cpu_kernel(block_dim: int, mo
     """Long chains keep their board in the scratch, with the same result, even with more threads than columns."""
     monkeypatch.setattr(functions, "LARGEST_SHARED_BLOCK", LINKS - 1)
     make_advance_block.cache_clear()
-    ours, theirs = (batch_of([heap(LINKS)], method="bs32") for _ in range(2))
+    ours, theirs = (batch_of([heap(LINKS)], method="os32") for _ in range(2))
     features = ours.features(fixed_body="floor")
     launch_blocks(ours, features, 20, block_dim=block_dim)
     make_advance_block.cache_clear()
@@ -135,14 +136,9 @@ def test_samples_frames_and_rest_equal_a_cpu_kernel() -> None:
     for name in ("first_sample", "last_sample"):
         expected = getattr(theirs.state, name).numpy()
         assert np.array_equal(getattr(ours.state, name).numpy(), expected)
-    assert np.array_equal(ours.drain_samples(1), theirs.drain_samples(1))
-    our_loads, their_loads = ours.frame_loads(1), theirs.frame_loads(1)
-    our_times, our_frames = ours.drain_frames(1)
-    their_times, their_frames = theirs.drain_frames(1)
-    assert len(our_times) > 1
-    assert np.array_equal(our_times, their_times)
-    assert np.array_equal(our_frames, their_frames)
-    assert our_loads.shape == (len(our_times), LINKS, 3) and np.array_equal(our_loads, their_loads)
+    recorded, expected = ours.drain(1), theirs.drain(1)
+    assert len(recorded.times) > 1 and recorded.loads.shape == (len(recorded.times), LINKS, 3)
+    assert all(map(np.array_equal, recorded, expected))
 
 
 def test_frames_between_samples_equal_a_cpu_kernel() -> None:
@@ -165,13 +161,11 @@ def test_frames_between_samples_equal_a_cpu_kernel() -> None:
     ours, theirs, coarse = runs
     assert_same(ours, theirs)
     assert_same(theirs, coarse)
-    assert np.array_equal(ours.frame_loads(1), theirs.frame_loads(1))
-    few, _ = coarse.drain_frames(1)
-    our_times, our_frames = ours.drain_frames(1)
-    their_times, their_frames = theirs.drain_frames(1)
-    assert np.array_equal(our_times, their_times) and np.array_equal(our_frames, their_frames)
-    marks = np.floor(our_times / (2.5 * FIXED_STEP) + 1e-9)
-    assert len(few) < 6 and len(our_times) > 12 and np.all(np.diff(marks) >= 1)
+    recorded, expected, few = (batch.drain(1) for batch in runs)
+    assert np.array_equal(recorded.loads, expected.loads)
+    assert np.array_equal(recorded.times, expected.times) and np.array_equal(recorded.frames, expected.frames)
+    marks = np.floor(recorded.times / (2.5 * FIXED_STEP) + 1e-9)
+    assert len(few.times) < 6 and len(marks) > 12 and np.all(np.diff(marks) >= 1)
 
 
 def test_failures_stop_one_chain_and_leave_the_others() -> None:
@@ -206,22 +200,21 @@ SHARED_MEMORY = 163 * 1024
 """Bytes that a block can have on a GPU of the older generation."""
 
 
-GENERATIONS = (80, 90)
-"""Of GPUs: sm_80 and sm_90."""
-
-
-def compiles_for_gpus(folder: Path, features: Features, block_dim: int) -> None:
-    """Compile a kernel to machine code of two GPU generations, which needs no GPU; the registers are the engine's."""
+def compiles_for_gpus(folder: Path, features: Features, block_dim: int, *generations: int) -> None:
+    """Compile a kernel to machine code of some GPU generations, which needs no GPU; the registers are the engine's."""
     module = make_advance_block(features, block_dim, most_registers(block_dim)).module
     module.options["block_dim"] = block_dim
-    wp.compile_aot_module(module, arch=list(GENERATIONS), module_dir=str(folder), use_ptx=False)
-    assert len(list(folder.glob("*.cubin"))) == len(GENERATIONS)
+    wp.compile_aot_module(module, arch=list(generations), module_dir=str(folder), use_ptx=False)
+    assert len(list(folder.glob("*.cubin"))) == len(generations)
     shared = [size for path in folder.glob("*.meta") for size in json.loads(path.read_text(encoding="utf-8")).values()]
     assert 0 < max(shared) <= SHARED_MEMORY
 
 
-@pytest.mark.parametrize(("fixed_body", "moves"), [("sprocket", False), ("terrain", False), ("floor", True)])
-def test_a_kernel_compiles_for_gpus(tmp_path: Path, fixed_body: str, moves: bool) -> None:
-    """The kernels of the drive, of a profile, and of a floor with a moving sprocket compile for sm_80 and sm_90."""
+@pytest.mark.parametrize(
+    ("fixed_body", "moves", "generations"),
+    [("sprocket", False, (80, 90)), ("terrain", False, (80,)), ("floor", True, (90,))],
+)
+def test_a_kernel_compiles_for_gpus(tmp_path: Path, fixed_body: str, moves: bool, generations: tuple[int, ...]) -> None:
+    """That of the drive compiles for sm_80 and sm_90; those of a profile and of a moving sprocket for one of these."""
     features = Features("os32", layout.padded_width(60), fixed_body, True, moving_sprocket=moves)
-    compiles_for_gpus(tmp_path, features, 64)
+    compiles_for_gpus(tmp_path, features, 64, *generations)

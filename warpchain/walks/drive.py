@@ -1,0 +1,120 @@
+"""What the sprocket does with a chain until the release, as kernels read it."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpchain.engine.control import SOFT, SOFTEST
+from warpchain.inputs.link_values import LinkValues, mean_value
+from warpchain.inputs.options import Options
+from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.scene import joint_radius, loop_speed, settling_time
+from warpchain.inputs.setup import Setup
+from warpchain.inputs.start_shapes import lay_chain, stadium
+
+Array = NDArray[np.float64]
+
+HOLD_STRAIN = 3e-4
+"""Greatest strain of a held loop on softened joints by its speed."""
+LOADED_STRAIN = 1e-3
+"""Greatest strain by speed and mean weight while loads are multiplied."""
+GREATEST_LOAD = 50.0
+"""Factor by which loads are multiplied, unless the chain bears less.
+
+With 15, 30 and 60 the loop that is released is the same to 0.2 % of its height and 0.4 % of its width (60 to 180
+links, 5 to 30 Hz), and within 0.8 % of the width of one that was held for 40 s under its own loads. Twice as much
+makes it stationary in two thirds of the time, in steps that are shorter by as much.
+"""
+PUSH = 0.25
+"""Part of its depth by which the sprocket pushes a circle out in the longest step near a contact."""
+FASTEST_PUSH = 5e3
+"""Greatest rate [1/s] of that push.
+
+With it circles of 60 to 180 links at 5 to 30 Hz sink in by 0.1 mm at most under load, without it by 0.3 mm and more.
+"""
+STILL_PERIOD = 0.25
+"""Loop period [s] that is assumed when the sprocket stands still."""
+SHORTEST_WINDOW, LONGEST_WINDOW = 0.05, 0.25
+"""Bounds of the time [s] over which a loop under its own loads is averaged; between them half a loop period.
+
+Loops whose links do not alternate are averaged over whole periods, no more than the lower bound needs."""
+BY_ITSELF = -1.0
+"""As `steady_time` means: the kernel chooses how long to watch, see :mod:`warpchain.kernels.events.release`."""
+
+
+def drive_of(setup: Setup, links: LinkValues) -> tuple[tuple[Array, Array], dict[str, float]]:
+    """Position and velocity (n, 3) of a chain on its sprocket, about the origin, and fields of `Drive` by name.
+
+    Args:
+        setup: Of the walk.
+        links: What each of its links has.
+    """
+    scene, parameters, options = setup.scene, setup.parameters, setup.options
+    from_rest = scene.start == "rest"
+    radius = joint_radius(scene, parameters)
+    speed = 2 * math.pi * scene.frequency * radius
+    density = mean_value(links.mass) / parameters.link_length
+    tension = density * speed**2
+    side = max(0.0, scene.links * parameters.link_length / 2 - math.pi * radius)
+    weight = density * parameters.gravity * side / 2  # the tension that it causes in the middle of the sides
+    load_factor = scene.load_factor or _suitable_load(parameters, links, options, weight)
+    softness = loaded_softness = 0.0
+    if options.soften_drive:
+        softness = _softness(parameters, tension, HOLD_STRAIN)
+        loaded_softness = _softness(parameters, tension + load_factor * weight, LOADED_STRAIN)
+    period = scene.links * parameters.link_length / speed if speed > 0 else STILL_PERIOD
+    window = min(max(period / 2, SHORTEST_WINDOW), LONGEST_WINDOW)
+    if not links.alternates:  # the loop swings as it turns: only over whole turns does its mean stay
+        window = period * math.ceil(SHORTEST_WINDOW / period)
+    longest_step = max(options.contact_step, options.soft_contact_step if options.soften_drive else 0.0)
+    settled, spin_up = settling_time(scene), scene.spin_up_time if from_rest and speed > 0 else 0.0
+    drive = {
+        "sprocket_speed": -2 * math.pi * scene.frequency,  # clockwise, so that the walk goes towards +x
+        "spin_up_start": settled,
+        "spin_up_time": spin_up,
+        "hold_start": settled + spin_up,
+        "loop_speed": loop_speed(scene, parameters),
+        "loop_period": period,
+        "load_factor": load_factor,
+        "steady_window": window,
+        "steady_time": BY_ITSELF if scene.steady_time is None else scene.steady_time,
+        "steady_tolerance": scene.steady_tolerance,
+        "further_hold": scene.further_hold,
+        "release_phase": scene.phase,
+        "hold_softness": softness,
+        "loaded_softness": loaded_softness,
+        "push_rate": min(FASTEST_PUSH, PUSH / longest_step),
+    }
+    return lay_chain(stadium(radius), scene.links, parameters.link_length, 0.0 if from_rest else speed), drive
+
+
+def _softness(parameters: Parameters, tension: float, strain: float) -> float:
+    """Softness of joints, from 1 for soft ones to 2 for the softest, that a tension [N] stretches by so much.
+
+    Args:
+        parameters: The chain's parameters.
+        tension: T, which stretches the joints by T/k.
+        strain: Greatest T/k, in link lengths.
+    """
+    wanted = tension / (strain * parameters.link_length)
+    soft = min(parameters.joint_stiffness, SOFT.joint_stiffness)  # as no joint becomes stiffer than its own
+    softest = SOFTEST.joint_stiffness
+    if soft <= softest:
+        return 2.0
+    return 1.0 + max(0.0, math.log(soft / max(wanted, softest)) / math.log(soft / softest))
+
+
+def _suitable_load(parameters: Parameters, links: LinkValues, options: Options, weight: float) -> float:
+    """Factor by which loads are multiplied while a loop becomes stationary, unless the scene gives one.
+
+    Unless links alternate, the loop under load is another, and it is 1.
+    """
+    if not links.alternates:
+        return 1.0
+    stiffness = parameters.joint_stiffness
+    if options.soften_drive:
+        stiffness = min(stiffness, SOFT.joint_stiffness)
+    bearable = LOADED_STRAIN * stiffness * parameters.link_length
+    limit = min(GREATEST_LOAD, links.greatest_load(parameters.link_length))
+    return max(1.0, min(limit, bearable / weight) if weight > 0 else limit)
