@@ -40,10 +40,8 @@ def observation(features: Features):
     def observe(K: Rows, chain: Chain, state: State, record: Record, world: int, time: wp.float64):
         area = summarise(K, chain, state.last_sample[world])
         if wp.static(has_energy):
-            i = int(0)
-            while i < chain.link_count:
+            for i in range(chain.link_count):
                 state.last_sample[world, GRAVITATIONAL] += energy(chain, i, read_link(K, chain, i))
-                i += 1
         if wp.static(features.tilts):
             move_into_room(K, state.plane[world], chain, state.last_sample[world])
         keep_sample(state, record, world, time)

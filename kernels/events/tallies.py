@@ -40,10 +40,8 @@ def raise_extreme(state: State, world: int, extreme: int, value: wp.float64):
 def row_total(K: Rows, row: int, n: int):
     """Sum of the first n numbers of a row, in their order."""
     total = wp.float64(0.0)
-    i = int(0)
-    while i < n:
+    for i in range(n):
         total += K[row, i]
-        i += 1
     return total
 
 

@@ -43,8 +43,7 @@ def move_into_room(K: Rows, P: Row, chain: Chain, sample: Row):
     n = chain.link_count
     square = sample[layout.RMS_SPEED] * sample[layout.RMS_SPEED] * wp.float64(n)
     bottom = order_key(wp.float64(wp.inf))
-    i = int(0)
-    while i < n:
+    for i in range(n):
         w = across_speed(P, K[X, i], K[Y, i])
         square += w * w
         left = order_key(component(P, UP, K[LEFT_X, i], K[LEFT_Y, i], ZERO))
@@ -54,7 +53,6 @@ def move_into_room(K: Rows, P: Row, chain: Chain, sample: Row):
             smaller = chain.circle_radius - K[layout.RADIUS, i]
             low = order_key(from_order_key(low) + smaller * wp.sqrt(ONE - P[UP + 2] * P[UP + 2]))
         bottom = wp.min(bottom, low)
-        i += 1
     slope = wp.sqrt(P[UP] * P[UP] + P[UP + 1] * P[UP + 1])
     extent = chain.circle_radius * slope + chain.half_width * wp.abs(P[UP + 2])
     x = sample[layout.CENTER_X]
@@ -72,10 +70,8 @@ def move_into_room(K: Rows, P: Row, chain: Chain, sample: Row):
     sample[layout.GRAVITATIONAL] = chain.gravity * P[layout.SUM_MASS] * sample[layout.CENTER_Y]
     sample[layout.LOWEST] = P[ORIGIN + 1] + from_order_key(bottom) - extent
     sample[layout.RMS_SPEED] = wp.sqrt(square / wp.float64(n))
-    k = int(0)
-    while k < PLANE_VALUES:
+    for k in range(PLANE_VALUES):
         sample[layout.PLANE_COLUMN + k] = P[k]
-        k += 1
 
 
 @wp.func
@@ -86,10 +82,8 @@ def write_frame_in_room(K: Rows, chain: Chain, state: State, record: Record, wor
     if record.frames.shape[1] == 0:
         return
     first = record.frames.shape[2] - PLANE_VALUES
-    k = int(0)
-    while k < PLANE_VALUES:
+    for k in range(PLANE_VALUES):
         record.frames[world, row, first + k] = state.plane[world, k]
-        k += 1
 
 
 @wp.func

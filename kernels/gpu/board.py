@@ -29,10 +29,8 @@ def find_link(empty: Run, chain: Chain, lane: int) -> Run:
 @wp.func
 def load_link(run: Run, state: State):
     """Writes a thread's link on the board; threads without a link get one at the origin that nothing acts on."""
-    row = int(0)
-    while row < SINE:
+    for row in range(SINE):
         run.K[row, run.lane] = ZERO
-        row += 1
     if run.lane < run.links:
         for k in range(6):
             run.K[X + k, run.lane] = state.links[run.world, X + k, run.lane]

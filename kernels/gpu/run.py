@@ -61,19 +61,15 @@ def block_run(features: Features, touch: TouchLayout, plane: BlockPlane):
         if lane < run.links:
             write_link(K, model, world, lane, state.load_factor[world])
             is_fresh = state.is_fresh[world] != 0
-            row = int(BOARD_LOST_SELF)
-            while row < wp.static(BOARD_VALUES):
+            for row in range(BOARD_LOST_SELF, wp.static(BOARD_VALUES)):
                 K[row, lane] = wp.where(is_fresh, ZERO, run.kept[row, lane])
-                row += 1
         if lane == 0:
             write_constants(K, present_chain(model, state, control, world))
             plane.load(run)
             write_bounds(run, drive, state, control, wp.static(is_driven))
             load_extremes(run, state, fixed_depth)
-            k = int(wp.static(touch.touching))
-            while k < wp.static(touch.size):
+            for k in range(wp.static(touch.touching), wp.static(touch.size)):
                 run.T[k] = 0
-                k += 1
             K[BOARD_VALUES, VALUE_DEADLINE] = clock() + control.launch_time
         barrier()  # the chain's constants are on the board
         publish(run)
@@ -101,10 +97,8 @@ def block_run(features: Features, touch: TouchLayout, plane: BlockPlane):
         if lane < run.links:
             for k in range(6):
                 state.links[world, layout.X + k, lane] = K[layout.X + k, lane]
-            row = int(BOARD_LOST_SELF)
-            while row < wp.static(BOARD_VALUES):
+            for row in range(BOARD_LOST_SELF, wp.static(BOARD_VALUES)):
                 run.kept[row, lane] = K[row, lane]
-                row += 1
         if lane == 0:
             plane.store(run)
             if is_last:

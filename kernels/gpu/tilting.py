@@ -89,20 +89,16 @@ def added_up(memory: Row, k: int, block_dim: int):
     """The sum over all threads of the block of the value ``k``."""
     warps = wp.where(warp_width() > 1, block_dim // 32, 1)
     total = ZERO
-    i = int(0)
-    while i < warps:
+    for i in range(warps):
         total += memory[k * warps + i]
-        i += 1
     return total
 
 
 @wp.func
 def copy_plane(target: Row, source: Row):
     """Copies a plane with all its sums."""
-    row = int(0)
-    while row < layout.PLANE_ROWS:
+    for row in range(layout.PLANE_ROWS):
         target[row] = source[row]
-        row += 1
 
 
 @wp.func

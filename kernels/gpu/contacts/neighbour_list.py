@@ -56,10 +56,8 @@ def block_list(columns: int, block_dim: int):
         square = reach * reach
         if lane == 0:
             L[wp.static(lists.count)] = 0
-        i = lane
-        while i < wp.static(lists.table):
+        for i in range(lane, wp.static(lists.table), wp.static(block_dim)):
             L[wp.static(lists.bucket) + i] = -1
-            i += wp.static(block_dim)
         barrier()
         if lane < n:
             K[BOARD_LISTED_X, lane] = K[RIGHT_X, lane]

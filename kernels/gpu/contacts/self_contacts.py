@@ -141,25 +141,19 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         It is called when not every contact has a thread of its own. A thread's first contact takes other code than
         further ones, which rounds differently; so that choice must not depend on the order in which pairs were found.
         """
-        k = lane
-        while k < touching:
+        for k in range(lane, touching, wp.static(block_dim)):
             pair = pair_at(L, T, k)
             rank = int(0)
-            other = int(0)
-            while other < touching:
+            for other in range(touching):
                 rank += wp.where(pair_at(L, T, other) < pair, 1, 0)
-                other += 1
             L[wp.static(lists.pending) + rank] = pair
-            k += wp.static(block_dim)
         barrier()
-        k = lane
-        while k < touching:
+        for k in range(lane, touching, wp.static(block_dim)):
             pair = L[wp.static(lists.pending) + k]
             if k < wp.static(touch.shared_pairs):
                 T[wp.static(touch.pairs) + k] = pair
             else:
                 L[wp.static(lists.touching) + k] = pair
-            k += wp.static(block_dim)
         barrier()
 
     @wp.func
@@ -171,8 +165,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         lane = run.lane
         reach = TWO * chain.circle_radius + TWO * opening
         square = reach * reach
-        k = lane
-        while k < pairs:
+        for k in range(lane, pairs, wp.static(block_dim)):
             p = L[wp.static(lists.first) + k]
             q = L[wp.static(lists.second) + k]
             dx = K[RIGHT_X, q] - K[RIGHT_X, p]
@@ -183,7 +176,6 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
                     T[wp.static(touch.pairs) + slot] = pair_key(p, q)
                 else:
                     L[wp.static(lists.touching) + slot] = pair_key(p, q)
-            k += wp.static(block_dim)
         barrier()
         touching = T[wp.static(touch.touching)]
         if 2 * touching > wp.static(block_dim):
@@ -290,8 +282,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         in_turn = 4 * touching > wp.static(block_dim)
         if not in_turn:
             contacts = 4 * touching
-        turn = int(0)
-        while turn < wp.where(in_turn, 2, 1):
+        for turn in range(wp.where(in_turn, 2, 1)):
             own_key = int(DONE)
             own_depth = wp.float64(0.0)
             if lane < contacts:
@@ -338,7 +329,6 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
                 owners = next_owners
                 next_owners = last_owners
                 last_owners = used
-            turn += 1
         return impulses
 
     return clear, find, resolve
