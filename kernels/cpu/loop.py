@@ -98,13 +98,7 @@ def make_advance(features: Features):
         """Takes a sample → the chain as the sample has left it."""
         softness = state.softness[world]
         load_factor = state.load_factor[world]
-        touches = state.counts[world, layout.SELF_IMPULSES]
-        meetings = state.counts[world, layout.STRAND_IMPULSES]
-        last_impulse = state.watch[world, layout.LAST_FLOOR_IMPULSE]
-        time = state.time[world]
-        state.status[world] = sample(
-            K, chain, drive, state, record, control, world, time, touches, meetings, last_impulse
-        )
+        state.status[world] = sample(K, chain, drive, state, record, control, world, state.time[world])
         after = chain
         if has_changed(state, world, softness, load_factor):
             after = present_chain(model, state, control, world)

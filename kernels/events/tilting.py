@@ -43,7 +43,8 @@ def move_into_room(K: Rows, P: Row, chain: Chain, sample: Row):
     n = chain.link_count
     square = sample[layout.RMS_SPEED] * sample[layout.RMS_SPEED] * wp.float64(n)
     bottom = order_key(wp.float64(wp.inf))
-    for i in range(n):
+    i = int(0)
+    while i < n:
         w = across_speed(P, K[X, i], K[Y, i])
         square += w * w
         left = order_key(component(P, UP, K[LEFT_X, i], K[LEFT_Y, i], ZERO))
@@ -53,6 +54,7 @@ def move_into_room(K: Rows, P: Row, chain: Chain, sample: Row):
             smaller = chain.circle_radius - K[layout.RADIUS, i]
             low = order_key(from_order_key(low) + smaller * wp.sqrt(ONE - P[UP + 2] * P[UP + 2]))
         bottom = wp.min(bottom, low)
+        i += 1
     slope = wp.sqrt(P[UP] * P[UP] + P[UP + 1] * P[UP + 1])
     extent = chain.circle_radius * slope + chain.half_width * wp.abs(P[UP + 2])
     x = sample[layout.CENTER_X]

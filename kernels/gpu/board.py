@@ -4,7 +4,7 @@ import warp as wp
 
 from warpchain.kernels import layout
 from warpchain.kernels.gpu.stage import Attempt, Run, constants, read_link
-from warpchain.kernels.layout import BOARD_VALUES, COSINE, LEFT_X, LEFT_Y, RIGHT_X, RIGHT_Y, SINE, THETA, U, X
+from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, RIGHT_X, RIGHT_Y, SINE, THETA, U, X
 from warpchain.kernels.physics.elementary import ZERO, cos_sin
 from warpchain.kernels.physics.geometry import Link, end_positions
 from warpchain.kernels.types import Chain, Rows, State
@@ -51,28 +51,6 @@ def write_attempt(run: Run, result: Attempt, h: wp.float64):
             K[U + k, lane] = result.velocity[k]
         K[COSINE, lane] = result.cosine
         K[SINE, lane] = result.sine
-
-
-@wp.func
-def load_extremes(run: Run, state: State, fixed_depth: int):
-    """Writes what is greatest or latest so far on the board; for one thread."""
-    run.K[BOARD_VALUES, layout.VALUE_OPENING] = state.extremes[run.world, layout.OPENING]
-    run.K[BOARD_VALUES, layout.VALUE_FIXED_DEPTH] = state.extremes[run.world, fixed_depth]
-    run.K[BOARD_VALUES, layout.VALUE_LAST_IMPULSE] = state.watch[run.world, layout.LAST_FLOOR_IMPULSE]
-
-
-@wp.func
-def raise_value(K: Rows, value: int, x: wp.float32):
-    """Raises one of the chain's values on the board to x; for one thread."""
-    K[BOARD_VALUES, value] = wp.max(K[BOARD_VALUES, value], wp.float64(x))
-
-
-@wp.func
-def store_extremes(run: Run, state: State, fixed_depth: int):
-    """Stores what :func:`load_extremes` has written; for one thread."""
-    state.extremes[run.world, layout.OPENING] = run.K[BOARD_VALUES, layout.VALUE_OPENING]
-    state.extremes[run.world, fixed_depth] = run.K[BOARD_VALUES, layout.VALUE_FIXED_DEPTH]
-    state.watch[run.world, layout.LAST_FLOOR_IMPULSE] = run.K[BOARD_VALUES, layout.VALUE_LAST_IMPULSE]
 
 
 @wp.func

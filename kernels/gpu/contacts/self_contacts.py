@@ -41,10 +41,9 @@ class TouchLayout:
     pairs: int  # see ``shared_pairs``
     touching: int  # number of touching pairs of joints
     votes: int  # see :func:`gpu.threads.barrier_count`
-    fixed_hits: int  # impulses with floor or sprocket in this launch
-    self_hits: int  # impulses between links in this launch
+    fixed_hits: int  # impulses with floor or sprocket that are not booked yet
+    self_hits: int  # likewise between links
     strand_hits: int  # those between strands of the loop
-    mailbox: int  # A status from one thread to all
     deepest: int  # greatest depth of a contact in this launch [m], bits of a single-precision number
     is_late: int  # 1 when the launch has lasted long enough
     size: int  # integers from the row's start to the end of the last
@@ -54,7 +53,7 @@ class TouchLayout:
 def touch_layout(columns: int, block_dim: int, in_lists: bool) -> TouchLayout:
     """Layout for shared memory of its own, a pair per thread, or inside the scratch parts of the list's row."""
     width, shared_pairs = (columns, 0) if in_lists else (block_dim, block_dim)
-    single = ("touching", "votes", "fixed_hits", "self_hits", "strand_hits", "mailbox", "deepest", "is_late")
+    single = ("touching", "votes", "fixed_hits", "self_hits", "strand_hits", "deepest", "is_late")
     integers = consecutive_offsets(
         list_layout(columns).owners if in_lists else 0,
         **{"owners": 3 * width, "pairs": shared_pairs} | dict.fromkeys(single, 1),
