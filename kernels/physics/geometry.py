@@ -61,6 +61,12 @@ def put(rows: Rows, first: int, i: int, values: Any):
 
 
 @wp.func
+def two(rows: Rows, first: int, i: int):
+    """Column i of two consecutive rows."""
+    return wp.vec2d(rows[first, i], rows[first + 1, i])
+
+
+@wp.func
 def three(rows: Rows, first: int, i: int):
     """Column i of three consecutive rows."""
     return wp.vec3d(rows[first, i], rows[first + 1, i], rows[first + 2, i])

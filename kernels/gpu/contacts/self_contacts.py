@@ -16,7 +16,16 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from warpchain.kernels.contacts.link_pair import are_strands, collide, links_of, natural, touching_circles
+from warpchain.kernels.contacts.link_pair import (
+    B_T,
+    DEPTH,
+    Contact,
+    are_strands,
+    collide,
+    links_of,
+    natural,
+    touching_circles,
+)
 from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.gpu.stage import Run
 from warpchain.kernels.gpu.threads import barrier, barrier_count
@@ -200,16 +209,14 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         E = run.E
         F = run.F
         lane = run.lane
-        depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = circles_at(run.K, chain, key)
+        contact, inverse_nn, inverse_determinant = circles_at(run.K, chain, key)
+        depth = contact[DEPTH]
         own = int(DONE)
         if depth > ZERO:
             own = key
-            E[0, lane] = nx
-            E[1, lane] = ny
-            E[2, lane] = a_n
-            E[3, lane] = a_t
-            E[4, lane] = b_n
-            F[0, lane] = b_t
+            for k in range(5):
+                E[k, lane] = contact[1 + k]
+            F[0, lane] = contact[B_T]
             F[1, lane] = inverse_nn
             F[2, lane] = inverse_determinant
             raise_depth(run.T, depth)
@@ -223,21 +230,8 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         F = run.F
         lane = run.lane
         lost_before = K[BOARD_LOST_SELF, link_a]
-        lost, hits = collide(
-            K,
-            chain,
-            link_a,
-            link_b,
-            E[0, lane],
-            E[1, lane],
-            E[2, lane],
-            E[3, lane],
-            E[4, lane],
-            F[0, lane],
-            F[1, lane],
-            F[2, lane],
-            depth,
-        )
+        contact = Contact(depth, E[0, lane], E[1, lane], E[2, lane], E[3, lane], E[4, lane], F[0, lane])
+        lost, hits = collide(K, chain, link_a, link_b, contact, F[1, lane], F[2, lane])
         K[BOARD_LOST_SELF, link_a] = lost_before + lost
         count_strands(run.T, chain, link_a, link_b, hits)
         return int(hits)
@@ -245,18 +239,16 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
     @wp.func
     def overlaps(run: Run, chain: Chain, key: int):
         """1 if the circles of a further contact overlap, else 0; raises the greatest depth."""
-        depth, _nx, _ny, _a_n, _a_t, _b_n, _b_t, _inverse_nn, _inverse_determinant = circles_at(run.K, chain, key)
-        raise_depth(run.T, depth)
-        return wp.where(depth > ZERO, 1, 0)
+        contact, _inverse_nn, _inverse_determinant = circles_at(run.K, chain, key)
+        raise_depth(run.T, contact[DEPTH])
+        return wp.where(contact[DEPTH] > ZERO, 1, 0)
 
     @wp.func
     def resolve_further(run: Run, chain: Chain, key: int, link_a: int, link_b: int):
         """Resolves a further contact; returns the number of impulses."""
         K = run.K
-        depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = circles_at(K, chain, key)
-        lost, hits = collide(
-            K, chain, link_a, link_b, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant, depth
-        )
+        contact, inverse_nn, inverse_determinant = circles_at(K, chain, key)
+        lost, hits = collide(K, chain, link_a, link_b, contact, inverse_nn, inverse_determinant)
         K[BOARD_LOST_SELF, link_a] = K[BOARD_LOST_SELF, link_a] + lost
         count_strands(run.T, chain, link_a, link_b, hits)
         return int(hits)
