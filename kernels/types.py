@@ -121,7 +121,7 @@ class State:
     slack: wp.array(dtype=wp.float64)  # CPU: how far joints may move before the neighbour list is stale [m]
     step: wp.array(dtype=wp.float64)  # proposed next step [s]
     last_error: wp.array(dtype=wp.float64)  # error ratio of the last accepted step (PI controller)
-    is_rigid: wp.array(dtype=wp.int32)  # 1: joints are rigid, see cpu.implicit.joint_switch
+    is_rigid: wp.array(dtype=wp.int32)  # 1: joints are rigid, see cpu.implicit.flights
     other_step: wp.array(dtype=wp.float64)  # last step proposed for the other model of the joints [s]
     closing_time: wp.array(dtype=wp.float64)  # earliest time at which joints may close [s]
     next_sample: wp.array(dtype=wp.int64)  # index of the next sample mark
@@ -199,12 +199,11 @@ def read_ground(model: Model, world: int) -> Ground:
     return ground
 
 
-def make_entry(module: wp.Module, is_block: bool):
+def make_entry(module: wp.Module):
     """Kernel that does nothing, with name, arguments and threads of a step kernel, see :func:`cpu.loop.make_advance`.
 
     Args:
         module: Where it stands.
-        is_block: Whether it is launched with ``wp.launch_tiled``, one block a world.
     """
 
     def advance(
@@ -217,19 +216,6 @@ def make_entry(module: wp.Module, is_block: bool):
         lists: wp.array2d(dtype=wp.int32),
         control: Control,
     ):
-        _world = wp.tid()
+        _thread = wp.tid()
 
-    def advance_block(
-        worlds: wp.array(dtype=wp.int32),
-        model: Model,
-        drive: Drive,
-        state: State,
-        record: Record,
-        scratch: wp.array3d(dtype=wp.float64),
-        lists: wp.array2d(dtype=wp.int32),
-        control: Control,
-    ):
-        _block, _lane = wp.tid()
-
-    function = advance_block if is_block else advance
-    return wp.kernel(function, name="advance", module=module, enable_backward=False, grid_stride=False)
+    return wp.kernel(advance, name="advance", module=module, enable_backward=False, grid_stride=False)

@@ -18,8 +18,8 @@ from warpchain.kernels.cpu.contacts.proximity import greatest_opening
 from warpchain.kernels.cpu.contacts.time_to_contact import step_bound
 from warpchain.kernels.cpu.explicit import place_ends
 from warpchain.kernels.cpu.implicit.flights import rigid_in_flight
+from warpchain.kernels.cpu.implicit.rigid_layout import scratch_rows
 from warpchain.kernels.cpu.joints import springs
-from warpchain.kernels.cpu.rows import scratch_rows
 from warpchain.kernels.cpu.tilting import tilting_plane
 from warpchain.kernels.cpu.upright import upright_plane
 from warpchain.kernels.events.present_chain import has_changed, present_chain
