@@ -200,11 +200,7 @@ def read_ground(model: Model, world: int) -> Ground:
 
 
 def make_entry(module: wp.Module):
-    """Kernel that does nothing, with name, arguments and threads of a step kernel, see :func:`cpu.loop.make_advance`.
-
-    Args:
-        module: Where it stands.
-    """
+    """Kernel of a module that does nothing, with name and arguments of those of :func:`cpu.loop.make_advance`."""
 
     def advance(
         worlds: wp.array(dtype=wp.int32),

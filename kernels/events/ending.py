@@ -23,12 +23,7 @@ def note(state: State, world: int, first: int, time: wp.float64):
 def watch_ending(state: State, world: int, time: wp.float64, area: wp.float64, is_first: bool):
     """Notes the first samples with an impulse between links, or strands, before them, and with less than half the area.
 
-    Args:
-        state: Of all worlds.
-        world: Index.
-        time: Of the sample [s].
-        area: Inside the loop [m²]; a loop that is numbered clockwise has negative areas.
-        is_first: Whether this is the first sample of the run.
+    ``area`` is that inside the loop [m²]; a loop that is numbered clockwise has negative areas.
     """
     if is_first:
         state.first_area[world] = area

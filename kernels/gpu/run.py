@@ -56,14 +56,8 @@ def hits_booking(features: Features, touch: TouchLayout):
 def block_run(features: Features, touch: TouchLayout, plane: BlockPlane):
     """Warp functions for all threads of a block that load a chain's run and store it.
 
-    Args:
-        features: What the kernel is compiled for.
-        touch: Where the block's counters lie.
-        plane: Hooks of the chain's plane.
-
-    Returns:
-        ``load(run, model, drive, state, control)``, which ends with a barrier, and
-        ``store(run, model, state, record, control, time, status, accepted, attempts)``.
+    ``load(run, model, drive, state, control)``, which ends with a barrier, and
+    ``store(run, model, state, record, control, time, status, accepted, attempts)``.
     """
     is_driven = features.is_driven
     fixed_loss, _, _ = of_fixed_body(features.is_driven)

@@ -17,12 +17,7 @@ from warpchain.kernels.types import Integers, Rows
 
 @functools.cache
 def block_list(columns: int, block_dim: int):
-    """Warp function that builds the list of a chain and returns the number of pairs; above capacity it overflows.
-
-    Args:
-        columns: Width of the scratch, which sets the layout of the list.
-        block_dim: Threads in a block.
-    """
+    """Warp function that builds the list of a chain and returns the number of pairs; above capacity it overflows."""
     lists = list_layout(columns)
 
     @wp.func
