@@ -199,8 +199,13 @@ def read_ground(model: Model, world: int) -> Ground:
     return ground
 
 
-def make_entry(module: wp.Module):
-    """Kernel of a module that does nothing, with name and arguments of those of :func:`cpu.loop.make_advance`."""
+def make_entry(module: wp.Module, is_block: bool):
+    """Kernel that does nothing, with name, arguments and threads of a step kernel, see :func:`cpu.loop.make_advance`.
+
+    Args:
+        module: Where it stands.
+        is_block: Whether it is launched with ``wp.launch_tiled``, one block a world.
+    """
 
     def advance(
         worlds: wp.array(dtype=wp.int32),
@@ -212,6 +217,19 @@ def make_entry(module: wp.Module):
         lists: wp.array2d(dtype=wp.int32),
         control: Control,
     ):
-        _thread = wp.tid()
+        _world = wp.tid()
 
-    return wp.kernel(advance, name="advance", module=module, enable_backward=False, grid_stride=False)
+    def advance_block(
+        worlds: wp.array(dtype=wp.int32),
+        model: Model,
+        drive: Drive,
+        state: State,
+        record: Record,
+        scratch: wp.array3d(dtype=wp.float64),
+        lists: wp.array2d(dtype=wp.int32),
+        control: Control,
+    ):
+        _block, _lane = wp.tid()
+
+    function = advance_block if is_block else advance
+    return wp.kernel(function, name="advance", module=module, enable_backward=False, grid_stride=False)

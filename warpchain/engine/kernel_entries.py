@@ -65,7 +65,7 @@ def kernel_entry(features: Features, threads: int, registers: int | None) -> wp.
     parts = (SOURCES, features, *_given_by_scripts(features), threads, registers, sys.version, wp.__version__)
     text = repr((*parts, sorted(module.resolve_options(wp.config).items())))
     module.name = f"advance_{hashlib.sha256(text.encode()).hexdigest()[:32]}"
-    return make_entry(module)
+    return make_entry(module, is_block=registers is not None)
 
 
 def step_module(features: Features, threads: int, registers: int | None) -> wp.Module:
