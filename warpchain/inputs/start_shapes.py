@@ -128,9 +128,8 @@ def lay_chain(
             break
         s[1:] += change[:-1]
         size = max(size + float(change[-1]), 0.0)
-    joints, along, growth = curve.points(s, size)
-    closed = np.hypot(*(joints - joints[:, np.arange(links) - 1]))
-    if not (np.abs(closed - link_length) <= 1e-9 * link_length).all():
+    joints, along, growth = ends[:, :-1], along[:, :-1], growth[:, :-1]
+    if not (np.abs(np.hypot(*chord) - link_length) <= 1e-9 * link_length).all():
         raise ValueError(f"a closed chain of {links} links of {link_length} m does not fit this curve")
     # Rigid motion along the curve: s[0] moves at unit rate, the chords keep their lengths.
     drive = np.zeros(links)
