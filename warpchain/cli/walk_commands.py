@@ -146,7 +146,7 @@ def animate(
     from warpchain.walks.walk_result import load_walk
 
     record = walk / RECORD if walk.is_dir() else walk
-    result, path = load_walk(record), path or record.with_suffix(".gif")
+    result, path = load_walk(walk), path or record.with_suffix(".gif")
     try:
         result.animate(path, fps=fps, slow=slow)
     except (ValueError, ImportError) as error:
@@ -185,6 +185,8 @@ def _saved(path: Path, index: str | None) -> tuple["Setup", int | None]:
 
     found = saved(path, "give a saved walk, or the folder or merged file of a sweep and --index")
     if isinstance(found, WalkResult):
+        if index is not None:
+            raise InputError(f"--index: given, but {path} is a single walk; leave it out")
         return found.setup, found.seed
     if index is None:
         raise InputError(f"--like: {path} has many walks; give --index, the number of one, as well")
