@@ -121,13 +121,16 @@ def walk(
             record_loads=record_loads,
             on_progress=lambda progress: show(walk_progress_text(progress)),
         )
-    if as_json:
-        print(json.dumps(result.to_dict(), indent=2, allow_nan=False))
-    else:
-        print_walk(result)
-    if folder is not None:
-        for path in write_walk(result, folder):
-            if not as_json:
+    paths: list[Path] = []
+    try:
+        if folder is not None:
+            paths.extend(write_walk(result, folder))
+    finally:  # a full disk does not take the numbers, nor `| head` the files
+        if as_json:
+            print(json.dumps(result.to_dict(), indent=2, allow_nan=False))
+        else:
+            print_walk(result)
+            for path in paths:
                 print(printable(str(path)))
     if not result.status.ok:
         print(f"{result.status.label}: {result.status.sentence}", file=sys.stderr)
