@@ -40,7 +40,7 @@ _LIKE: Final = (
 )
 _INDEX: Final = "Number of the walk in the sweep that --like names, as in the column index of its results."
 _OUTPUT: Final = (
-    "Write walk.h5 and film_strip.png to this folder; figures of an earlier walk there are deleted. `warpchain plot` "
+    "Write walk.h5 and film_strip.png to this folder; pictures of an earlier walk there are deleted. `warpchain plot` "
     "draws the others, `warpchain animate` a film."
 )
 _FILM: Final = "The file to write; its name ends in .gif, .mp4 or .html. Default: walk.gif beside the walk."
