@@ -67,7 +67,7 @@ class Scene(Section):
     clearance: float = number_field(0.01, "m", ge=0, le=HIGHEST)
     """height of the lowest circle above the floor, of the chain that clearance_of names"""
     clearance_of: Literal["spinning", "hanging"] = "spinning"
-    """the chain that clearance is measured at: spinning at the release, or hanging at rest"""
+    """the chain that clearance is measured at: spinning at the release, or hanging at rest; neither starts in a wall"""
     sprocket_radius_is: Literal["contact", "pitch"] = "contact"
     """what sprocket_radius measures: where circles touch (contact) or joints ride (pitch)"""
     ellipse_aspect: float = number_field(1.5, "1", ge=0.05, le=20)

@@ -124,7 +124,7 @@ class WalkRun:
                 yield features["driven"]
                 if batch.status(world) != Status.FINISHED:
                     return
-                hanging = self._raise(batch.position(world))
+                hanging = self._raise(batch.position(world), setup.scene.clearance)
             batch.resume(world, self._at_full_speed + setup.scene.hold_limit, Status.NOT_STEADY)
             yield features["driven"]
             self.drift = batch.watched(world, layout.DRIFT)
@@ -364,9 +364,9 @@ class WalkRun:
             here |= state_of_plane(batch.plane(world))
         return all(values.tobytes() == getattr(start, name).tobytes() for name, values in here.items())
 
-    def _raise(self, position: Array) -> float:
-        """How far a chain at this position must be raised to its clearance [m]."""
-        clearance, length, radius = self.setup.scene.clearance, self.setup.parameters.link_length, self._links.radius
+    def _raise(self, position: Array, clearance: float) -> float:
+        """How far a chain at this position must be raised to a clearance [m]."""
+        length, radius = self.setup.parameters.link_length, self._links.radius
         return self.setup.floor.raised_by(circles_of(position, length), np.tile(radius, 2), clearance)
 
     def _set_farthest(self) -> None:
@@ -375,7 +375,11 @@ class WalkRun:
 
     def _release(self, position: Array, velocity: Array, hanging: float = math.nan) -> None:
         """Begin the walk of a chain; ``hanging``: how far it must be raised as it hung on its sprocket at rest [m]."""
-        self.raised = hanging if self.setup.scene.clearance_of == "hanging" else self._raise(position)
+        scene = self.setup.scene
+        if scene.clearance_of == "hanging":
+            self.raised = max(hanging, self._raise(position, 0.0))  # a loop is wider, and may reach into a wall
+        else:
+            self.raised = self._raise(position, scene.clearance)
         position[:, 1] += self.raised
         self._load(position, velocity)
         if self._tilts:
