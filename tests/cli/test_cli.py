@@ -139,7 +139,8 @@ def test_a_failed_walk_is_reported_and_kept(command: Command) -> None:
 def test_a_chain_that_was_never_released_leaves_no_pictures(command: Command) -> None:
     """A walk without time series leaves its record, and takes an earlier walk's pictures out of the folder."""
     Path("new").mkdir()
-    Path("new/energy.png").write_bytes(b"of an earlier walk")
+    for name in ("energy.png", "walk.gif"):
+        Path("new", name).write_bytes(b"of an earlier walk")
     options = "--links 32 --preset soft --method dp5 --start spinning --set hold_limit=0.001 -o new"
     answer = command("walk", *options.split())
     assert answer.status == 1 and "not_steady" in answer.out

@@ -34,6 +34,12 @@ def test_commands_work_with_stderr_closed(tmp_path: Path) -> None:
     assert shell(f"{WALK} >&- 2>&-", tmp_path).returncode == 1
 
 
+def test_a_reader_that_leaves_takes_no_file(tmp_path: Path) -> None:
+    """`walk -o DIR | head` writes the record and the film strip, too."""
+    shell(f"{WALK} -o out | true", tmp_path, PYTHONUNBUFFERED="1")
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"walk.h5", "film_strip.png"}
+
+
 @pytest.mark.parametrize("inside", ["", "/folder"])
 def test_a_kernel_cache_that_cannot_be_used_is_named(tmp_path: Path, inside: str) -> None:
     """Where `WARP_CACHE_PATH` is a file, or below one, one line says so and what to do."""

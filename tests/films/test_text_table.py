@@ -1,6 +1,7 @@
 """Films out of text tables: forms of files, units, directions, times."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -90,6 +91,16 @@ def test_what_is_no_film_is_refused(text: str, wrong: str, tmp_path: Path) -> No
     with pytest.raises(InputError, match=wrong) as error:
         films.read(write(tmp_path, text), links=60, frequency=20.0)
     assert str(error.value).startswith(str(tmp_path)) and "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "value", [{"links": "many"}, {"frequency": 0.0}, {"fps": -30.0}, {"speed": 0.0}, {"outline": [1, 2, 3]}]
+)
+def test_values_beside_the_file_are_checked(value: dict[str, Any], tmp_path: Path) -> None:
+    """A line names what is none of a film."""
+    path = write(tmp_path, TRACKER.format(table(FILM.time, FILM.center)))
+    with pytest.raises(InputError, match=f"^{next(iter(value))}: "):
+        films.read(path, **{"links": 60, "frequency": 20.0, "release": 0.0} | value)
 
 
 def test_an_unknown_unit_or_a_missing_file_is_refused(tmp_path: Path) -> None:

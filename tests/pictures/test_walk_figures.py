@@ -47,7 +47,8 @@ def test_refusals() -> None:
     """What a walk cannot show is refused with what happened to it, and unknown figures with those there are."""
     for walk, kind, problem in (
         (make_unreleased(), "height_and_speed", r"walk: it has no time series\. The chain did not circulate"),
-        (make_unreleased(), "film_strip", r"no frames \(not_steady\); run it again with a frame_interval"),
+        (make_unreleased(), "film_strip", r"no frames; it was not released\. The chain did not circulate"),
+        (make_unreleased(), "loop", "ended before its release; see its status"),
         (make_walk(), "pie", "kind: 'pie' is unknown"),
         (make_walk(), "tilt", "walk: its plane is fixed"),
     ):

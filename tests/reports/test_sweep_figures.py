@@ -142,6 +142,13 @@ def test_sensitivity_leaves_out_incomplete_samples(tmp_path: Path) -> None:
         sensitivities(make_sweep(tmp_path / "random", one_block(grid={"frequency": [10]})))
 
 
+def test_a_single_parameter_set_is_a_series_of_figure6(tmp_path: Path) -> None:
+    """Its number of links titles the panel."""
+    content = one_block(points={"links": [60]}, grid={"frequency": [10, 20]})
+    (panel,) = panels(figure6(make_sweep(tmp_path, content)))
+    assert panel.get_title(loc="left") == "$n$ = 60"
+
+
 # All of them
 
 

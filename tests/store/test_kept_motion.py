@@ -91,6 +91,16 @@ def test_motions_do_not_depend_on_their_batch() -> None:
     assert outcomes(setups) == [end for _, end in alone[0]]
 
 
+def test_a_fixed_plane_has_no_places_in_the_room_beside_one_that_tilts() -> None:
+    """Frames of a walk in a fixed plane are those of the walk alone, whatever ran with it."""
+    setups = [brief_setup(1, plane=plane) for plane in ("tilting", "fixed")]
+    keeps = [Keep(series_every=1, frame_every=1)] * 2
+    motions = {place: run.recorder.motion() for place, run in run_setups(setups, keeps=keeps)}
+    ((_, alone),) = run_setups(setups[1:], keeps=keeps[1:])
+    assert len(motions[0]["frame_origin"]) == len(motions[0]["frame_time"]) > 3
+    assert motion_bytes(motions[1]) == motion_bytes(alone.recorder.motion())
+
+
 def test_long_motions_are_drained_between_launches() -> None:
     """A series longer than the device's record has a row at every mark, in order and without a gap."""
     setup = brief_setup(1, record_interval=1e-6, walk_limit=0.04)  # a sample after each step

@@ -89,11 +89,19 @@ def test_a_walk_that_is_not_named_is_refused(command: Command, folder: Path, wor
     assert answer.status == 2 and problem.replace("DIR", str(folder)) in answer.err
 
 
+def test_a_film_of_a_whole_sweep_is_refused(command: Command, folder: Path) -> None:
+    """The line says how to get the walk of a sweep that a film takes."""
+    answer = command("animate", str(folder))
+    assert answer.status == 2 and "the folder of a sweep, not of a saved walk; give a saved walk" in answer.err
+
+
 def test_numbers_that_say_no_walk_are_refused(folder: Path) -> None:
-    """A number beside values of axes, or a truth value."""
+    """A number beside values of axes or a sample, or a truth value."""
     result = warpchain.load(folder)
     with pytest.raises(InputError, match="frequency: given together with index"):
         result.walk(0, frequency=3.0)
+    with pytest.raises(InputError, match="sample: given together with index"):
+        result.walk(0, sample=1)
     with pytest.raises(InputError, match="index: True is not the number"):
         result.walk(True)
 

@@ -52,6 +52,16 @@ def test_a_walk_down_a_steep_slope_ends_by_its_distance():
     assert walk.center[-1, 0] >= 0.5 * np.cos(np.radians(30)) > walk.center[-3, 0]
 
 
+def test_a_loop_wider_than_the_hanging_chain_starts_outside_of_walls():
+    """Between walls that the hanging chain clears the spinning one is raised until no circle is in one."""
+    walls = [[-1, 0.2], [-0.068, 0.2], [-0.068, 0], [0.068, 0], [0.068, 0.2], [1, 0.2]]
+    walk = warpchain.walk(
+        links=40, preset="soft", clearance_of="hanging", clearance=0.003, floor=walls, walk_until=1e-3
+    )
+    x, y = walk.frame_joints[0].T
+    assert x.min() < -0.068 and y[np.abs(x) > 0.068].min() > 0.2
+
+
 def test_the_release_is_at_its_clearance_from_the_profile():
     """The nearest circle of the first frame is at the clearance from the floor, whatever is below the chain."""
     for scene in ({"slope": 20.0}, {"floor": BOX.tolist()}):

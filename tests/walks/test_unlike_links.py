@@ -10,7 +10,7 @@ import warpchain
 from tests.support.setups import setup_walk
 from warpchain import Status, preset
 from warpchain.inputs.link_values import alternating
-from warpchain.inputs.scene import link_values
+from warpchain.inputs.scene import link_values, riding_radius
 from warpchain.pictures.chain import circle_radii, link_outlines
 
 SOFT = preset("soft")
@@ -52,8 +52,8 @@ def test_the_sprocket_knows_the_circles_of_the_links(measures: str) -> None:
 
 def test_joints_ride_on_the_wider_of_their_circles() -> None:
     """Every second link may be narrow, and a charm wide: the other joints ride as high as without."""
-    assert values_of(link_radii=[2e-3, 6e-3] * 30).riding_radius == 6e-3
-    assert values_of(charm_radius=6e-3).riding_radius == SOFT.circle_radius
+    for wide, height in (({"link_radii": [2e-3, 6e-3] * 30}, 6e-3), ({"charm_radius": 6e-3}, SOFT.circle_radius)):
+        assert riding_radius(setup_walk("soft", {"links": 60, **wide}, None).scene, SOFT) == height
 
 
 def test_a_charm_closes_the_ledger_and_is_read_back(tmp_path: Path) -> None:

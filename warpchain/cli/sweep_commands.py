@@ -47,7 +47,7 @@ def sweep(
     from warpchain.sweeps.shipped import write_new_sweep
 
     if new is not None:
-        if any(value for name, value in context.params.items() if name != "new"):
+        if any(value is not None and value is not False for name, value in context.params.items() if name != "new"):
             raise InputError("--new: given together with other arguments; leave them out")
         write_new_sweep(new)
         print(printable(str(new)))

@@ -40,7 +40,7 @@ _LIKE: Final = (
 )
 _INDEX: Final = "Number of the walk in the sweep that --like names, as in the column index of its results."
 _OUTPUT: Final = (
-    "Write walk.h5 and film_strip.png to this folder; figures of an earlier walk there are deleted. `warpchain plot` "
+    "Write walk.h5 and film_strip.png to this folder; pictures of an earlier walk there are deleted. `warpchain plot` "
     "draws the others, `warpchain animate` a film."
 )
 _FILM: Final = "The file to write; its name ends in .gif, .mp4 or .html. Default: walk.gif beside the walk."
@@ -121,13 +121,16 @@ def walk(
             record_loads=record_loads,
             on_progress=lambda progress: show(walk_progress_text(progress)),
         )
-    if as_json:
-        print(json.dumps(result.to_dict(), indent=2, allow_nan=False))
-    else:
-        print_walk(result)
-    if folder is not None:
-        for path in write_walk(result, folder):
-            if not as_json:
+    paths: list[Path] = []
+    try:
+        if folder is not None:
+            paths.extend(write_walk(result, folder))
+    finally:  # a full disk does not take the numbers, nor `| head` the files
+        if as_json:
+            print(json.dumps(result.to_dict(), indent=2, allow_nan=False))
+        else:
+            print_walk(result)
+            for path in paths:
                 print(printable(str(path)))
     if not result.status.ok:
         print(f"{result.status.label}: {result.status.sentence}", file=sys.stderr)
@@ -146,7 +149,7 @@ def animate(
     from warpchain.walks.walk_result import load_walk
 
     record = walk / RECORD if walk.is_dir() else walk
-    result, path = load_walk(record), path or record.with_suffix(".gif")
+    result, path = load_walk(walk), path or record.with_suffix(".gif")
     try:
         result.animate(path, fps=fps, slow=slow)
     except (ValueError, ImportError) as error:
@@ -185,6 +188,8 @@ def _saved(path: Path, index: str | None) -> tuple["Setup", int | None]:
 
     found = saved(path, "give a saved walk, or the folder or merged file of a sweep and --index")
     if isinstance(found, WalkResult):
+        if index is not None:
+            raise InputError(f"--index: given, but {path} is a single walk; leave it out")
         return found.setup, found.seed
     if index is None:
         raise InputError(f"--like: {path} has many walks; give --index, the number of one, as well")

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from warpchain.walks.walk_result import WalkResult
 
 RECORD: Final = "walk.h5"
+_PICTURES: Final = (*(f"{kind}.png" for kind in get_args(Kind)), "walk.gif")
+"""What `plot` and `animate` write beside the record unless told otherwise."""
 
 
 def saved(path: Path, wanted: str) -> "WalkResult | SweepResult":
@@ -55,14 +57,14 @@ def try_walk_folder(folder: Path) -> None:
         with tempfile.TemporaryDirectory(prefix=".warpchain-", dir=nearest):
             pass
     if folder.is_dir():
-        for name in (RECORD, *(f"{kind}.png" for kind in get_args(Kind))):
+        for name in (RECORD, *_PICTURES):
             checked_output(folder / name)
 
 
 def write_walk(result: "WalkResult", folder: Path) -> Iterator[Path]:
     """Write the record, then its film strip, whole or not at all; yield the path of each.
 
-    Figures of an earlier walk are deleted: they do not belong to this record.
+    Figures and film of an earlier walk are deleted: they do not belong to this record.
 
     Raises:
         OSError: a file cannot be written.
@@ -70,8 +72,8 @@ def write_walk(result: "WalkResult", folder: Path) -> Iterator[Path]:
     make_folder(folder)
     result.save(folder / RECORD)
     yield folder / RECORD
-    for kind in get_args(Kind):
-        remove_output(folder / f"{kind}.png")
+    for name in _PICTURES:
+        remove_output(folder / name)
     yield from draw_figures(result, folder, ["film_strip"])
 
 

@@ -4,14 +4,17 @@ import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final, Literal
+from typing import Annotated, Final, Literal
 
 import numpy as np
+from pydantic import Field
 
 from warpchain.films.film import BEFORE, GRAVITY, Array, Film
-from warpchain.inputs.validation import InputError, shown
+from warpchain.inputs.validation import InputError, Whole, checked, shown
 
 UNITS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+_POSITIVE: Final = Annotated[float, Field(gt=0)]
+_EDGES: Final = Annotated[list[float], Field(min_length=4, max_length=4)]
 
 
 def read(
@@ -46,8 +49,13 @@ def read(
 
     Raises:
         OSError: the file cannot be read.
-        InputError: it has no such columns, or a line that is not numbers.
+        InputError: it has no such columns, or a line that is not numbers; or another value is refused.
     """
+    checked(links, "links", Annotated[Whole, Field(ge=4)])
+    checked(frequency, "frequency", _POSITIVE, "Hz")
+    checked(fps, "fps", _POSITIVE | None)
+    checked(speed, "speed", _POSITIVE | None, "m/s")
+    checked(outline, "outline", _EDGES | None)
     if unit not in (None, *UNITS) or direction not in ("right", "left"):
         raise InputError(f"unit: {shown(unit)}, direction: {shown(direction)}; give m, cm or mm, and right or left")
     lines = [_cells(line) for line in Path(path).read_text(encoding="utf-8-sig", errors="replace").splitlines()]

@@ -44,11 +44,6 @@ class LinkValues:
         return all(np.array_equal(row[2:], row[:-2]) for row in vars(self).values())
 
     @property
-    def riding_radius(self) -> float:
-        """Height [m] of the joints above a surface that the chain rides on: half of them are at least so high."""
-        return float(np.median(np.maximum(self.radius, np.roll(self.radius, -1))))
-
-    @property
     def total_mass(self) -> float:
         """Mass of the chain [kg]; of two kinds of links as many times the rounded sum of a pair as there are pairs."""
         return math.fsum(np.add.reduceat(self.mass, range(0, len(self.mass), 2)))
@@ -73,9 +68,11 @@ def mean_value(values: Array) -> float:
 
 def alternating(parameters: Parameters, links: int) -> LinkValues:
     """A chain of inner links 0, 2, 4, … and outer links 1, 3, 5, …, whose joints are alike."""
+    mass, inertia = np.full(links, parameters.inner_mass), np.full(links, parameters.inner_inertia)
+    mass[1::2], inertia[1::2] = parameters.outer_mass, parameters.outer_inertia
     return LinkValues(
-        mass=np.resize([parameters.inner_mass, parameters.outer_mass], links),
-        inertia=np.resize([parameters.inner_inertia, parameters.outer_inertia], links),
+        mass=mass,
+        inertia=inertia,
         viscous_friction=np.full(links, parameters.viscous_friction),
         coulomb_friction=np.full(links, parameters.coulomb_friction),
         radius=np.full(links, parameters.circle_radius),

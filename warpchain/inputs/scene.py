@@ -67,7 +67,7 @@ class Scene(Section):
     clearance: float = number_field(0.01, "m", ge=0, le=HIGHEST)
     """height of the lowest circle above the floor, of the chain that clearance_of names"""
     clearance_of: Literal["spinning", "hanging"] = "spinning"
-    """the chain that clearance is measured at: spinning at the release, or hanging at rest"""
+    """the chain that clearance is measured at: spinning at the release, or hanging at rest; neither starts in a wall"""
     sprocket_radius_is: Literal["contact", "pitch"] = "contact"
     """what sprocket_radius measures: where circles touch (contact) or joints ride (pitch)"""
     ellipse_aspect: float = number_field(1.5, "1", ge=0.05, le=20)
@@ -230,11 +230,19 @@ def settling_time(scene: Scene) -> float:
     return 2.0 if scene.clearance_of == "hanging" else 0.1
 
 
+def riding_radius(scene: Scene, parameters: Parameters) -> float:
+    """Height [m] of the joints above a surface that the chain rides on: half of them are at least so high."""
+    if scene.link_radii is None and scene.charm_radius is None:
+        return parameters.circle_radius
+    radius = link_values(scene, parameters).radius
+    return float(np.median(np.maximum(radius, np.roll(radius, -1))))
+
+
 def joint_radius(scene: Scene, parameters: Parameters) -> float:
     """Distance from the sprocket's centre at which the joints ride, in m."""
     if scene.sprocket_radius_is == "pitch":
         return parameters.sprocket_radius
-    return parameters.sprocket_radius + link_values(scene, parameters).riding_radius
+    return parameters.sprocket_radius + riding_radius(scene, parameters)
 
 
 def loop_speed(scene: Scene, parameters: Parameters) -> float:
@@ -250,7 +258,7 @@ def contact_radius(scene: Scene, parameters: Parameters) -> float:
     """Radius of the sprocket that the circles of the links touch, in m."""
     if scene.sprocket_radius_is == "contact":
         return parameters.sprocket_radius
-    return parameters.sprocket_radius - link_values(scene, parameters).riding_radius
+    return parameters.sprocket_radius - riding_radius(scene, parameters)
 
 
 def fewest_links(scene: Scene, parameters: Parameters) -> int:
@@ -286,7 +294,7 @@ def check_scene(scene: Scene, parameters: Parameters) -> None:
     if contact_radius(scene, parameters) <= 0:
         raise InputError(
             f"parameters.sprocket_radius: {parameters.sprocket_radius} is not greater than the circle radius "
-            f"{link_values(scene, parameters).riding_radius}, as sprocket_radius_is: pitch needs; give a larger radius"
+            f"{riding_radius(scene, parameters)}, as sprocket_radius_is: pitch needs; give a larger radius"
         )
     highest = scene.clearance + scene.links * parameters.link_length / 2  # of the sprocket's lowest point
     if scene.release and scene.is_level and (lowest := min(row[2] for row in scene.release)) < -highest:

@@ -5,6 +5,7 @@ joints' places on the curve together with the curve's size. The circulating velo
 the curve: the derivative of that solution with respect to the first joint's place.
 """
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -48,8 +49,8 @@ def stadium(radius: float) -> Curve:
         sine, cosine = np.sin(angle), np.cos(angle)
         along = np.array([cosine, -sine])
         # A longer straight moves points at the same s: past its end on the right, past its start and end on the left.
-        down_growth = np.where(s > quarter + size, 1.0, 0.0)
-        up_growth = np.where(s > 3 * quarter + size, np.where(s > turn - quarter, 1.0, -1.0), 0.0)
+        down_growth = (s > quarter + size) * 1.0
+        up_growth = (s > turn - quarter) * 2.0 - (s > 3 * quarter + size)
         growth = -(down_growth + up_growth + 2 * laps) * along  # every lap before grows as well
         growth[1] += up_growth - down_growth
         point = np.array([radius * sine, radius * cosine - down + up])
@@ -62,6 +63,7 @@ def stadium(radius: float) -> Curve:
     )
 
 
+@functools.lru_cache
 def ellipse(aspect: float) -> Curve:
     """An ellipse about the origin.
 
@@ -111,24 +113,23 @@ def lay_chain(
         s[0] = phase * period
         ends, along, growth = curve.points(np.concatenate([s, [s[0] + period]]), size)
         chord = ends[:, 1:] - ends[:, :-1]
-        residual = np.sum(chord**2, axis=0) - link_length**2
-        to_here = -2 * np.sum(chord * along[:, :-1], axis=0)
-        to_following = 2 * np.sum(chord * along[:, 1:], axis=0)
-        to_size = 2 * np.sum(chord * (growth[:, 1:] - growth[:, :-1]), axis=0)
+        residual = (chord * chord).sum(0) - link_length**2
+        to_here = -2 * (chord * along[:, :-1]).sum(0)
+        to_following = 2 * (chord * along[:, 1:]).sum(0)
+        to_size = 2 * (chord * (growth[:, 1:] - growth[:, :-1])).sum(0)
         # The first joint moves with the period; the last chord ends on it one period later.
         to_size[0] += to_here[0] * phase * period_growth
         to_size[-1] += to_following[-1] * (1 + phase) * period_growth
-        last, worst = worst, float(np.max(np.abs(residual)))
+        last, worst = worst, float(np.abs(residual).max())
         if last < 1e-9 * link_length**2 and worst > last / 2:  # rounding is reached
             break
         change = _solve_loop(to_here, to_following, to_size, -residual)
-        if not np.all(np.isfinite(change)):
+        if not np.isfinite(change).all():
             break
         s[1:] += change[:-1]
         size = max(size + float(change[-1]), 0.0)
-    joints, along, growth = curve.points(s, size)
-    closed = np.hypot(*(joints - np.roll(joints, 1, axis=1)))
-    if not np.allclose(closed, link_length, rtol=1e-9, atol=0.0):
+    joints, along, growth = ends[:, :-1], along[:, :-1], growth[:, :-1]
+    if not (np.abs(np.hypot(*chord) - link_length) <= 1e-9 * link_length).all():
         raise ValueError(f"a closed chain of {links} links of {link_length} m does not fit this curve")
     # Rigid motion along the curve: s[0] moves at unit rate, the chords keep their lengths.
     drive = np.zeros(links)
@@ -136,8 +137,8 @@ def lay_chain(
     drive[-1] -= to_following[-1]
     rates = _solve_loop(to_here, to_following, to_size, drive)
     first_rate = 1.0 + phase * period_growth * rates[-1]
-    joint_rate = np.append(first_rate, rates[:-1]) * along + rates[-1] * growth
-    joint_rate *= speed / np.mean(np.sqrt(np.sum(joint_rate**2, axis=0)))
+    joint_rate = np.concatenate([[first_rate], rates[:-1]]) * along + rates[-1] * growth
+    joint_rate *= speed / np.sqrt((joint_rate * joint_rate).sum(0)).mean()
     return links_between(joints.T, joint_rate.T)
 
 
@@ -148,11 +149,11 @@ def _solve_loop(to_here: Array, to_following: Array, to_size: Array, right: Arra
     From the first chord on, each gives the next δs as a + b δsize; the last one then gives δsize.
     """
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # a singular loop gives no finite change
-        scale = np.cumprod(-to_here[:-1] / to_following[:-1])  # of each δs per first δs
+        scale = (-to_here[:-1] / to_following[:-1]).cumprod()  # of each δs per first δs
         divisor = to_following[:-1] * scale
-        constant, slope = (scale * np.cumsum(side[:-1] / divisor) for side in (right, -to_size))
+        constant, slope = (scale * (side[:-1] / divisor).cumsum() for side in (right, -to_size))
         size = (right[-1] - to_here[-1] * constant[-1]) / (to_size[-1] + to_here[-1] * slope[-1])
-        return np.append(constant + slope * size, size)
+        return np.concatenate([constant + slope * size, [size]])
 
 
 def links_between(joints: Array, joint_rate: Array) -> tuple[Array, Array]:
@@ -165,7 +166,8 @@ def links_between(joints: Array, joint_rate: Array) -> tuple[Array, Array]:
     Returns:
         position (n, 3), velocity (n, 3).
     """
-    before, before_rate = np.roll(joints, 1, axis=0), np.roll(joint_rate, 1, axis=0)
+    order = np.arange(len(joints)) - 1
+    before, before_rate = joints[order], joint_rate[order]
     span, span_rate = joints - before, joint_rate - before_rate
     angle = np.unwrap(np.arctan2(span[:, 1], span[:, 0]))
     spin = (span[:, 0] * span_rate[:, 1] - span[:, 1] * span_rate[:, 0]) / np.sum(span**2, axis=1)

@@ -158,6 +158,8 @@ def average_loop(setup: Setup, before: BeforeRelease | None, center: Array | Non
             raise ValueError(
                 "walk: it began without a sprocket, so it has no loop on one; take a walk from its drive on"
             )
+        if center is None:
+            raise ValueError("walk: it ended before its release; see its status, which says what to try")
         raise ValueError("walk: nothing was kept of the time before its release; run it again with record_before")
     scene, parameters = setup.scene, setup.parameters
     if setup.options.soften_drive:

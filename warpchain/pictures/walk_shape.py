@@ -31,7 +31,9 @@ def checked_joints(walk: "WalkResult") -> Array:
         ValueError: the walk has no frames or broken ones.
     """
     if len(walk.frame_time) == 0:
-        raise ValueError(f"walk: it has no frames ({walk.status.label}); run it again with a frame_interval")
+        never = f"it was not released. {walk.status.sentence}"
+        remedy = "run it again with a frame_interval" if len(walk.time) else never
+        raise ValueError(f"walk: it has no frames; {remedy}")
     in_room = walk.joints_in_room
     joints = np.insert(walk.frame_joints, 2, 0.0, axis=2) if in_room is None else np.asarray(in_room)
     if not np.all(np.isfinite(joints)):

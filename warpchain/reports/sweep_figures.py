@@ -113,7 +113,8 @@ def figure6(result: SweepResult) -> Picture:
     for block, given in zip(result.blocks.values(), result.sweep["blocks"], strict=True):
         found, own = block.statistics("dx"), dict[str, str]()  # start → label
         for place in np.ndindex(*block.shape[:-1]) if _is_series(block) else ():
-            values = {**given["scene"], **cell_values(block.axes, place)}
+            of_point = {name: sets[0] for name, sets in block.planned.points.items()}  # there is one set at most
+            values = {**given["scene"], **of_point, **cell_values(block.axes, place)}
             if values["start"] not in own:
                 label, color, marker = _STARTS[values["start"]]
                 if label in looks:  # of another block with this start

@@ -202,7 +202,7 @@ def checked_part(given: object) -> tuple[int, int]:
         return 1, 1
     found = re.fullmatch(r"([1-9]\d{0,5})/([1-9]\d{0,5})", given) if isinstance(given, str) else None
     if found is None or int(found[1]) > int(found[2]):
-        raise InputError(f"part: {shown(given)} is no part; give k/N with 1 ≤ k ≤ N, such as 3/8")
+        raise InputError(f"part: {shown(given)} is no part; give k/N with 1 ≤ k ≤ N < 10⁶, such as 3/8")
     return int(found[1]), int(found[2])
 
 

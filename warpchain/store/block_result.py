@@ -179,7 +179,7 @@ class BlockResult:
         self,
         index: int | None = None,
         *,
-        sample: int = 0,
+        sample: int | None = None,
         frame_interval: float | None = 2e-3,
         record_before: float | None = None,
         record_loads: bool = False,
@@ -192,7 +192,7 @@ class BlockResult:
         Args:
             index: number of the walk, as in the column `index`; more samples change no number. None: the walk is that
                 of the other values.
-            sample: number of the sample.
+            sample: number of the sample; None: 0.
             frame_interval: as of `warpchain.walk`, like the next two.
             record_before: see there.
             record_loads: see there.
@@ -205,9 +205,9 @@ class BlockResult:
             InputWarning: the sweep has another Δx or status of this walk.
         """
         if index is None:
-            place = self.place(sample, at)
-        elif at:
-            raise InputError(f"{', '.join(at)}: given together with index; leave one out")
+            place = self.place(0 if sample is None else sample, at)
+        elif words := [*at, *["sample"] * (sample is not None)]:
+            raise InputError(f"{', '.join(words)}: given together with index; leave one out")
         else:
             _, place = located([self], index)
         from warpchain.walks.one_walk import run_walk

@@ -58,14 +58,15 @@ def drive_of(setup: Setup, links: LinkValues) -> tuple[tuple[Array, Array], dict
     tension = density * speed**2
     side = max(0.0, scene.links * parameters.link_length / 2 - math.pi * radius)
     weight = density * parameters.gravity * side / 2  # the tension that it causes in the middle of the sides
-    load_factor = scene.load_factor or _suitable_load(parameters, links, options, weight)
+    alternates = links.alternates  # else the loop under load is another
+    load_factor = scene.load_factor or (_suitable_load(parameters, links, options, weight) if alternates else 1.0)
     softness = loaded_softness = 0.0
     if options.soften_drive:
         softness = _softness(parameters, tension, HOLD_STRAIN)
         loaded_softness = _softness(parameters, tension + load_factor * weight, LOADED_STRAIN)
     period = scene.links * parameters.link_length / speed if speed > 0 else STILL_PERIOD
     window = min(max(period / 2, SHORTEST_WINDOW), LONGEST_WINDOW)
-    if not links.alternates:  # the loop swings as it turns: only over whole turns does its mean stay
+    if not alternates:  # the loop swings as it turns: only over whole turns does its mean stay
         window = period * math.ceil(SHORTEST_WINDOW / period)
     longest_step = max(options.contact_step, options.soft_contact_step if options.soften_drive else 0.0)
     settled, spin_up = settling_time(scene), scene.spin_up_time if from_rest and speed > 0 else 0.0
@@ -106,12 +107,7 @@ def _softness(parameters: Parameters, tension: float, strain: float) -> float:
 
 
 def _suitable_load(parameters: Parameters, links: LinkValues, options: Options, weight: float) -> float:
-    """Factor by which loads are multiplied while a loop becomes stationary, unless the scene gives one.
-
-    Unless links alternate, the loop under load is another, and it is 1.
-    """
-    if not links.alternates:
-        return 1.0
+    """Factor by which loads are multiplied while a loop of two kinds of links becomes stationary."""
     stiffness = parameters.joint_stiffness
     if options.soften_drive:
         stiffness = min(stiffness, SOFT.joint_stiffness)

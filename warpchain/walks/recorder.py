@@ -57,7 +57,7 @@ class Recorder:
         piece, keep = self._batch.drain(self._world), self.keep
         if released:
             series, frames = keep.series_every is not None, keep.frame_every is not None
-            wanted = zip(piece, (series, frames, frames, keep.loads, frames), strict=True)
+            wanted = zip(piece, (series, frames, frames, keep.loads, frames and self._tilts), strict=True)
             self._pieces.append(Recorded(*(rows if is_kept else rows[:0].copy() for rows, is_kept in wanted)))
         elif keep.before > 0:
             until = self._batch.time(self._world)

@@ -6,7 +6,7 @@ the release.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -35,6 +35,10 @@ Array = NDArray[np.float64]
 
 _OF_THE_RUN = ("raised", "drive_time", "drift", "_at_full_speed", "_has_sprocket")
 """What a run knows of the time before its release."""
+_NO_FALL: Mapping[str, float] = {
+    **dict.fromkeys(("lateral_drift", "final_tilt", "final_yaw", "greatest_tilt", "fell_at"), math.nan),
+    **dict.fromkeys(("fell_over", "fell_before_collapse"), -1),
+}
 
 
 def phase_features(setup: Setup) -> dict[str, Features]:
@@ -120,7 +124,7 @@ class WalkRun:
                 yield features["driven"]
                 if batch.status(world) != Status.FINISHED:
                     return
-                hanging = self._raise(batch.position(world))
+                hanging = self._raise(batch.position(world), setup.scene.clearance)
             batch.resume(world, self._at_full_speed + setup.scene.hold_limit, Status.NOT_STEADY)
             yield features["driven"]
             self.drift = batch.watched(world, layout.DRIFT)
@@ -244,13 +248,15 @@ class WalkRun:
         ledger["residual"] = at_release - at_end - sum(lost.values())
         return ledger if self._released else dict.fromkeys(ledger, math.nan)
 
-    def _fall(self, is_at_rest: bool) -> dict[str, Any]:
+    def _fall(self, is_at_rest: bool) -> Mapping[str, float]:
         """What became of the plane; NaN and −1 if it is fixed or was never released."""
+        if not (self._tilts and self._released):
+            return _NO_FALL
         last = self._batch.last_sample(self._world)
         tilt, yaw = angles(last[layout.PLANE_COLUMN :])
         rows = (layout.COLLAPSED_AT, layout.FELL_AT, layout.GREATEST_LEAN)
         collapsed_at, fell_at, lean = (self._batch.watched(self._world, row) for row in rows)
-        found: dict[str, float] = {
+        return {
             "lateral_drift": float(last[layout.CENTER_Z]) if is_at_rest else math.nan,
             "final_tilt": float(tilt),
             "final_yaw": float(yaw),
@@ -259,9 +265,6 @@ class WalkRun:
             "fell_over": int(not math.isnan(fell_at)),
             "fell_before_collapse": int(fell_at < (math.inf if math.isnan(collapsed_at) else collapsed_at)),
         }
-        if self._tilts and self._released:
-            return found
-        return {name: -1 if isinstance(value, int) else math.nan for name, value in found.items()}
 
     def _ending(self, moment: str, event: str, first: int) -> dict[str, Any]:
         """When an event came, after how many bounces begun, and how long after the last impulse on the floor.
@@ -361,9 +364,9 @@ class WalkRun:
             here |= state_of_plane(batch.plane(world))
         return all(values.tobytes() == getattr(start, name).tobytes() for name, values in here.items())
 
-    def _raise(self, position: Array) -> float:
-        """How far a chain at this position must be raised to its clearance [m]."""
-        clearance, length, radius = self.setup.scene.clearance, self.setup.parameters.link_length, self._links.radius
+    def _raise(self, position: Array, clearance: float) -> float:
+        """How far a chain at this position must be raised to a clearance [m]."""
+        length, radius = self.setup.parameters.link_length, self._links.radius
         return self.setup.floor.raised_by(circles_of(position, length), np.tile(radius, 2), clearance)
 
     def _set_farthest(self) -> None:
@@ -372,7 +375,11 @@ class WalkRun:
 
     def _release(self, position: Array, velocity: Array, hanging: float = math.nan) -> None:
         """Begin the walk of a chain; ``hanging``: how far it must be raised as it hung on its sprocket at rest [m]."""
-        self.raised = hanging if self.setup.scene.clearance_of == "hanging" else self._raise(position)
+        scene = self.setup.scene
+        if scene.clearance_of == "hanging":
+            self.raised = max(hanging, self._raise(position, 0.0))  # a loop is wider, and may reach into a wall
+        else:
+            self.raised = self._raise(position, scene.clearance)
         position[:, 1] += self.raised
         self._load(position, velocity)
         if self._tilts:
