@@ -31,7 +31,8 @@ def summarise(K: Rows, chain: Chain, sample: Row):
     bottom = order_key(K[RIGHT_Y, 0])
     top = bottom
     lowest = order_key(wp.float64(wp.inf))
-    for i in range(n):
+    i = int(0)
+    while i < n:
         m = K[MASS, i]
         speed = K[U, i] * K[U, i] + K[V, i] * K[V, i]
         mass += m
@@ -52,6 +53,7 @@ def summarise(K: Rows, chain: Chain, sample: Row):
         bottom = wp.min(bottom, order_key(low))
         lowest = wp.min(lowest, order_key(low - K[RADIUS, i]))
         top = wp.max(top, order_key(K[RIGHT_Y, i]))
+        i += 1
     sample[layout.CENTER_X] = mx / mass
     sample[layout.CENTER_Y] = my / mass
     sample[layout.CENTER_U] = mu / mass

@@ -42,13 +42,15 @@ def neighbour_list(columns: int):
         kept = int(0)
         parity = int(0)
         while parity < 4:
-            for k in range(total):
+            k = int(0)
+            while k < total:
                 p = L[wp.static(lists.found_first) + k]
                 q = L[wp.static(lists.found_second) + k]
                 if (p & 1) * 2 + (q & 1) == parity:
                     L[wp.static(lists.first) + kept] = p
                     L[wp.static(lists.second) + kept] = q
                     kept += 1
+                k += 1
             parity += 1
         L[wp.static(lists.count)] = total
 
@@ -57,9 +59,12 @@ def neighbour_list(columns: int):
         n = chain.link_count
         reach = listing_reach(chain, skin, opening)
         square = reach * reach
-        for i in range(wp.static(lists.table)):
+        i = int(0)
+        while i < wp.static(lists.table):
             L[wp.static(lists.bucket) + i] = -1
-        for i in range(n):
+            i += 1
+        i = int(0)
+        while i < n:
             cell_x = int(wp.floor(K[RIGHT_X, i] / reach))
             cell_y = int(wp.floor(K[RIGHT_Y, i] / reach))
             bucket = bucket_of(cell_x, cell_y, wp.static(lists.table))
@@ -69,9 +74,11 @@ def neighbour_list(columns: int):
             L[wp.static(lists.bucket) + bucket] = i
             K[LISTED_X, i] = K[RIGHT_X, i]
             K[LISTED_Y, i] = K[RIGHT_Y, i]
+            i += 1
         total = int(0)
         fits = bool(True)
-        for p in range(n):
+        p = int(0)
+        while p < n:
             start = total
             near = int(0)
             while near < 9:
@@ -97,6 +104,7 @@ def neighbour_list(columns: int):
                                 fits = bool(False)
                     q = L[wp.static(lists.next_joint) + q]
                 near += 1
+            p += 1
         arrange(L, total)
         return fits
 

@@ -64,7 +64,8 @@ def self_contacts(columns: int):
         square = reach * reach
         total = L[wp.static(lists.count)]
         touching = int(0)
-        for k in range(total):
+        k = int(0)
+        while k < total:
             p = natural(L[wp.static(lists.first) + k])
             q = natural(L[wp.static(lists.second) + k])
             dx = K[RIGHT_X, q] - K[RIGHT_X, p]
@@ -72,12 +73,14 @@ def self_contacts(columns: int):
             L[wp.static(lists.found_first) + touching] = p
             L[wp.static(lists.found_second) + touching] = q
             touching += wp.where(dx * dx + dy * dy < square, 1, 0)
+            k += 1
         return touching
 
     @wp.func
     def copy_circles(K: Rows, L: Integers, G: Rows, n: int, first: int, count: int):
         """Copies the circles of ``count`` touching pairs of joints side by side."""
-        for k in range(count):
+        k = int(0)
+        while k < count:
             p = natural(L[wp.static(lists.found_first) + first + k])
             q = natural(L[wp.static(lists.found_second) + first + k])
             after = wp.where(q + 1 == n, 0, q + 1)
@@ -85,6 +88,7 @@ def self_contacts(columns: int):
             copy_circle(K, G, P_RIGHT_HAND, k, K[LEFT_X, p + 1], K[LEFT_Y, p + 1], p + 1)
             copy_circle(K, G, Q_LEFT_HAND, k, K[RIGHT_X, q], K[RIGHT_Y, q], q)
             copy_circle(K, G, Q_RIGHT_HAND, k, K[LEFT_X, q + 1], K[LEFT_Y, q + 1], after)
+            k += 1
 
     @wp.func
     def evaluate(K: Rows, L: Integers, G: Rows, chain: Chain, first: int, count: int, half: int, second: int):
@@ -129,7 +133,8 @@ def self_contacts(columns: int):
         deepest = wp.int64(0)
         half = int(0)
         while half < 2:
-            for first in range(0, touching, GEOMETRY_COLUMNS):
+            first = int(0)
+            while first < touching:
                 count = wp.min(touching - first, GEOMETRY_COLUMNS)
                 if half == 0 or touching > GEOMETRY_COLUMNS:
                     copy_circles(K, L, G, chain.link_count, first, count)
@@ -137,7 +142,8 @@ def self_contacts(columns: int):
                 padded = (count + 7) & -8
                 evaluate(K, L, G, chain, first, padded, half, 0)
                 evaluate(K, L, G, chain, first, padded, half, 1)
-                for k in range(count):
+                k = int(0)
+                while k < count:
                     p = natural(L[wp.static(lists.found_first) + first + k])
                     q = natural(L[wp.static(lists.found_second) + first + k])
                     second = int(0)
@@ -157,6 +163,8 @@ def self_contacts(columns: int):
                             if are_strands(link_a, link_b, chain.link_count):
                                 strands += hits
                         second += 1
+                    k += 1
+                first += GEOMETRY_COLUMNS
             half += 1
         return impulses, strands, lost, wp.cast(deepest, wp.float64)
 
