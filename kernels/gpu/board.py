@@ -4,7 +4,7 @@ import warp as wp
 
 from warpchain.kernels import layout
 from warpchain.kernels.gpu.stage import Attempt, Run, constants, read_link
-from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, RIGHT_X, RIGHT_Y, SINE, THETA, U, X
+from warpchain.kernels.layout import BOARD_VALUES, COSINE, LEFT_X, LEFT_Y, RIGHT_X, RIGHT_Y, SINE, THETA, U, X
 from warpchain.kernels.physics.elementary import ZERO, cos_sin
 from warpchain.kernels.physics.geometry import Link, end_positions
 from warpchain.kernels.types import Chain, Rows, State
@@ -51,6 +51,12 @@ def write_attempt(run: Run, result: Attempt, h: wp.float64):
             K[U + k, lane] = result.velocity[k]
         K[COSINE, lane] = result.cosine
         K[SINE, lane] = result.sine
+
+
+@wp.func
+def raise_value(K: Rows, value: int, x: wp.float32):
+    """Raises one of the chain's values on the board to x; for one thread."""
+    K[BOARD_VALUES, value] = wp.max(K[BOARD_VALUES, value], wp.float64(x))
 
 
 @wp.func

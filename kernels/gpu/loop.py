@@ -18,7 +18,7 @@ from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.events.record import record_is_full
 from warpchain.kernels.events.tallies import attempts_made
 from warpchain.kernels.features import COMPILER_FLAGS, Features
-from warpchain.kernels.gpu.board import find_link, write_attempt
+from warpchain.kernels.gpu.board import find_link, raise_value, write_attempt
 from warpchain.kernels.gpu.contacts.contact_pass import block_contact_pass
 from warpchain.kernels.gpu.contacts.proximity import block_proximity
 from warpchain.kernels.gpu.contacts.self_contacts import touch_layout
@@ -237,10 +237,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 if wp.static(not reuses_last):
                     next_end, proximity = measure_proximity(ends, run)
                 if lane == 0:
-                    widest = K[wp.static(layout.BOARD_VALUES), layout.VALUE_OPENING]
-                    K[wp.static(layout.BOARD_VALUES), layout.VALUE_OPENING] = wp.max(
-                        widest, wp.float64(proximity.opening)
-                    )
+                    raise_value(K, layout.VALUE_OPENING, proximity.opening)
                 plane.end_step(run, h)
                 is_hit, pairs, reach, status = meet(run, drive, state, control, time, proximity, pairs)
                 if is_hit or wp.static(not reuses_last):

@@ -60,7 +60,7 @@ def block_run(features: Features, touch: TouchLayout, plane: BlockPlane):
     ``store(run, model, state, record, control, time, status, accepted, attempts)``.
     """
     is_driven = features.is_driven
-    fixed_loss, _, _ = of_fixed_body(features.is_driven)
+    fixed_loss, fixed_depth, _ = of_fixed_body(features.is_driven)
     book_hits = hits_booking(features, touch)
     write_sample = observation(features)
 
@@ -80,6 +80,7 @@ def block_run(features: Features, touch: TouchLayout, plane: BlockPlane):
             plane.load(run)
             write_bounds(run, drive, state, control, wp.static(is_driven))
             K[BOARD_VALUES, layout.VALUE_OPENING] = state.extremes[world, layout.OPENING]
+            K[BOARD_VALUES, layout.VALUE_FIXED_DEPTH] = state.extremes[world, fixed_depth]
             for k in range(wp.static(touch.touching), wp.static(touch.size)):
                 run.T[k] = 0
             K[BOARD_VALUES, VALUE_DEADLINE] = clock() + control.launch_time
@@ -121,6 +122,7 @@ def block_run(features: Features, touch: TouchLayout, plane: BlockPlane):
             add_count(state, world, layout.REJECTED, wp.int64(attempts - accepted))
             book_hits(T, state, world)
             state.extremes[world, layout.OPENING] = K[BOARD_VALUES, layout.VALUE_OPENING]
+            state.extremes[world, fixed_depth] = K[BOARD_VALUES, layout.VALUE_FIXED_DEPTH]
             deepest = wp.cast(T[wp.static(touch.deepest)], wp.float32)
             raise_extreme(state, world, layout.SELF_DEPTH, wp.float64(deepest))
             state.is_fresh[world] = 0

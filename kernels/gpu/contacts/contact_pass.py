@@ -7,9 +7,9 @@ import warp as wp
 from warpchain.kernels import layout
 from warpchain.kernels.codes import LIST_OVERFLOW, RUNNING
 from warpchain.kernels.contacts.list_layout import list_layout
-from warpchain.kernels.events.tallies import add_count, note_floor_impulse, of_fixed_body, raise_extreme
+from warpchain.kernels.events.tallies import add_count, note_floor_impulse
 from warpchain.kernels.features import Features
-from warpchain.kernels.gpu.board import publish
+from warpchain.kernels.gpu.board import publish, raise_value
 from warpchain.kernels.gpu.contacts.neighbour_list import block_list
 from warpchain.kernels.gpu.contacts.proximity import block_contact, block_proximity, upper_bound
 from warpchain.kernels.gpu.contacts.self_contacts import TouchLayout, block_self_contacts
@@ -32,7 +32,6 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
         after the step.
     """
     lists = list_layout(features.columns)
-    _, depth, _ = of_fixed_body(features.is_driven)
     has_floor = features.has_floor
     has_fixed = features.fixed_body != "none"
     has_self = features.self_contact
@@ -110,7 +109,7 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
             is_hit = barrier_count(T, wp.static(touch.votes), hits > 0) > 0
         if wp.static(has_fixed):
             if gap < wp.float32(0.0) and lane == 0:
-                raise_extreme(state, run.world, depth, wp.float64(-gap))
+                raise_value(run.K, layout.VALUE_FIXED_DEPTH, -gap)
                 if wp.static(has_floor):
                     if is_hit:
                         note_floor_impulse(state, run.world, time)
