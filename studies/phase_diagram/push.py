@@ -1,9 +1,9 @@
-"""What changed the distance of slow long chains since the million walks: the push of floor and links in the pile.
+"""What the push of floor and links in the pile does to the distance of slow long chains.
 
-    python -m studies.phase_diagram.push                            # prints the table of the page
-    python -m studies.phase_diagram.push FOLDER [without=FOLDER]    # reduces sweeps of sweeps/push.yaml first
+    python -m studies.phase_diagram.push                    # prints the table of the page
+    python -m studies.phase_diagram.push FOLDER WITHOUT     # first reduces sweeps of sweeps/push.yaml
 
-Each group is a block of the sweep; a folder with a name before it is of walks that differ in the engine.
+WITHOUT is of an engine without the push. Walks are compared one by one with those of joints that do not soften.
 """
 
 import csv
@@ -13,46 +13,37 @@ from pathlib import Path
 import numpy as np
 
 import warpchain
+from studies.common import at_rest, mean, standard_error, write_rows
 from studies.common import table as markdown
-from studies.common import write_rows
 
 RESULTS = Path(__file__).parent / "results"
-GROUPS = {
-    "today": "today",
-    "spin_up": "after a spin-up of 2 s",
-    "without": "without the push",
-    "stiff_pile": "with joints of their own in the pile",
-}
+GROUPS = {"today": "today", "without": "without the push", "stiff": "with joints of their own in the pile"}
 Cells = dict[tuple[str, str], tuple[float, float]]
 
 
-def reduce(arguments: list[str]) -> None:
-    """Write the mean, its standard error and the number of walks at rest of each cell of each group."""
+def reduce(*folders: str) -> None:
+    """Write Δx of each cell of each group, and how much further its walks go than the same with stiff joints."""
+    today, without = (at_rest(next(iter(warpchain.load(folder).blocks.values()))) for folder in folders)
+    stiff = today.sel(soften_pile=False)
     rows = []
-    for argument in arguments:
-        *given, folder = argument.split("=", 1)
-        for name, block in warpchain.load(folder).blocks.items():
-            if (group := given[0] if given else name) not in GROUPS:
-                raise SystemExit(
-                    f"{folder}: block {name} is no group; give one of {', '.join(GROUPS)} as NAME={folder}"
-                )
-            for i, links in enumerate(block.axes["links"]):
-                for j, frequency in enumerate(block.axes["frequency"]):
-                    dx = block.dx[i, j][block.status[i, j] == warpchain.Status.AT_REST]
-                    error = dx.std(ddof=1) / np.sqrt(len(dx))
-                    row = {"group": group, "links": links, "frequency": frequency, "walks": len(dx)}
-                    rows.append(row | {"dx": float(dx.mean()), "se": float(error)})
+    for group, dx in zip(GROUPS, (today.sel(soften_pile=True), without.sel(soften_pile=True), stiff), strict=True):
+        for i, links in enumerate(dx.links.values.tolist()):
+            for j, frequency in enumerate(dx.frequency.values.tolist()):
+                row = {"group": group, "links": links, "frequency": frequency}
+                for name, values in (("dx", dx[i, j]), ("more", dx[i, j] - stiff[i, j])):
+                    row |= {name: float(mean(values)), f"{name}_se": float(standard_error(values))}
+                rows.append(row)
     write_rows(RESULTS / "push.csv", rows)
 
 
-def cells_of(path: Path, mean: str, error: str) -> dict[str, Cells]:
-    """Mean and standard error of Δx [m] by group, links and frequency; where a file has no groups, that is ``""``."""
-    found: dict[str, Cells] = {}
+def cells_of(path: Path, group: str | None, mean: str, error: str) -> Cells:
+    """Mean and standard error of a column [m] by links and frequency, in a group if the file has groups."""
     with path.open(encoding="utf-8") as file:
-        for row in csv.DictReader(file):
-            key = row["links"], f"{float(row['frequency']):g}"
-            found.setdefault(row.get("group", ""), {})[key] = float(row[mean]), float(row[error])
-    return found
+        return {
+            (row["links"], f"{float(row['frequency']):g}"): (float(row[mean]), float(row[error]))
+            for row in csv.DictReader(file)
+            if row.get("group") == group
+        }
 
 
 def over(cells: Cells, others: Cells) -> str:
@@ -62,21 +53,34 @@ def over(cells: Cells, others: Cells) -> str:
         other, its = others[key]
         ratio.append(dx / other - 1)
         error.append(dx / other * np.hypot(se / dx, its / other))
-    return f"{100 * np.mean(ratio):+.2f} ± {100 * np.linalg.norm(error) / len(error):.2f} %".replace("-", "−")
+    return _shown(ratio, error)
+
+
+def further(more: Cells, stiff: Cells) -> str:
+    """Mean over cells of what walks go further than the same walks on stiff joints, as a share of those."""
+    return _shown(
+        *zip(*((value / stiff[key][0], se / stiff[key][0]) for key, (value, se) in more.items()), strict=True)
+    )
+
+
+def _shown(shares: list[float], errors: list[float]) -> str:
+    """Mean of shares in per cent, with its standard error."""
+    return f"{100 * np.mean(shares):+.2f} ± {100 * np.linalg.norm(errors) / len(errors):.2f} %".replace("-", "−")
 
 
 def table() -> str:
     """The table of the page."""
-    groups = cells_of(RESULTS / "push.csv", "dx", "se")
-    million = cells_of(RESULTS / "cells.csv", "dx_mean", "dx_se")[""]
+    own = RESULTS / "push.csv"
+    million = cells_of(RESULTS / "cells.csv", None, "dx_mean", "dx_se")
+    stiff = cells_of(own, "stiff", "dx", "dx_se")
     rows = []
-    for name, title in GROUPS.items():
-        beside = "" if name == "without" else over(groups[name], groups["without"])
-        rows.append([title, over(groups[name], million), beside])
-    return markdown("walks | over the million | over those without the push", rows)
+    for group, title in GROUPS.items():
+        beside = "" if group == "stiff" else further(cells_of(own, group, "more", "more_se"), stiff)
+        rows.append([title, over(cells_of(own, group, "dx", "dx_se"), million), beside])
+    return markdown("walks | over the million | over the same walks with joints of their own", rows)
 
 
 if __name__ == "__main__":
     if len(sys.argv) > 1:
-        reduce(sys.argv[1:])
+        reduce(*sys.argv[1:])
     print(table())

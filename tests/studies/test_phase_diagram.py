@@ -160,3 +160,4 @@ def test_the_table_of_the_push_is_of_its_file() -> None:
     """The page holds what the command prints; a tenth further than others whose mean is known to a tenth."""
     assert push.table() in (run.FOLDER / "README.md").read_text(encoding="utf-8")
     assert push.over({("60", "5"): (1.1, 0.0)}, {("60", "5"): (1.0, 0.1)}) == "+10.00 ± 11.00 %"
+    assert push.further({("60", "5"): (-0.1, 0.02)}, {("60", "5"): (2.0, 0.1)}) == "−5.00 ± 1.00 %"
