@@ -17,7 +17,12 @@ from warpchain.kernels.types import Integers, Rows
 
 @functools.cache
 def block_list(columns: int, block_dim: int):
-    """Warp function that builds the list of a chain and returns the number of pairs; above capacity it overflows."""
+    """Warp function that builds the list of a chain and returns the number of pairs; above capacity it overflows.
+
+    Args:
+        columns: Width of the scratch, which sets the layout of the list.
+        block_dim: Threads in a block.
+    """
     lists = list_layout(columns)
 
     @wp.func
@@ -51,8 +56,10 @@ def block_list(columns: int, block_dim: int):
         square = reach * reach
         if lane == 0:
             L[wp.static(lists.count)] = 0
-        for i in range(lane, wp.static(lists.table), wp.static(block_dim)):
+        i = lane
+        while i < wp.static(lists.table):
             L[wp.static(lists.bucket) + i] = -1
+            i += wp.static(block_dim)
         barrier()
         if lane < n:
             K[BOARD_LISTED_X, lane] = K[RIGHT_X, lane]
