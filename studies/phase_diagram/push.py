@@ -18,6 +18,7 @@ from studies.common import table as markdown
 
 RESULTS = Path(__file__).parent / "results"
 GROUPS = {"today": "today", "without": "without the push", "stiff": "with joints of their own in the pile"}
+BANDS = (("100 to 160 links", 100, 160), ("220 and 240 links", 220, 240))
 Cells = dict[tuple[str, str], tuple[float, float]]
 
 
@@ -77,6 +78,10 @@ def table() -> str:
     for group, title in GROUPS.items():
         beside = "" if group == "stiff" else further(cells_of(own, group, "more", "more_se"), stiff)
         rows.append([title, over(cells_of(own, group, "dx", "dx_se"), million), beside])
+    more = cells_of(own, "today", "more", "more_se")
+    for name, fewest, most in BANDS:
+        band = {key: value for key, value in more.items() if fewest <= int(key[0]) <= most}
+        rows.append([f"today, {name}", "", further(band, stiff)])
     return markdown("walks | over the million | over the same walks with joints of their own", rows)
 
 
