@@ -44,11 +44,11 @@ BOARD_LISTED_X, BOARD_LISTED_Y = 23, 24
 BOARD_FIRST = 25
 # Values of the whole chain, in the first columns of one more row; behind them its constants, see gpu.stage.constants.
 BOARD_VALUES = 30
-VALUE_OPENING, VALUE_FIXED_DEPTH, VALUE_LAST_IMPULSE, VALUE_STOP_TIME, VALUE_NEXT_SAMPLE = range(5)
-VALUE_DEADLINE, VALUE_CONTACT_STEP, VALUE_TOLERANCE = 5, 6, 7
+VALUE_OPENING, VALUE_FIXED_DEPTH, VALUE_STOP_TIME, VALUE_NEXT_SAMPLE, VALUE_DEADLINE = range(5)
+VALUE_CONTACT_STEP, VALUE_TOLERANCE = 5, 6
 # A plane that tilts in the middle of the attempt before: the first PLANE_VALUES of State.plane.
-VALUE_PLANE_BEFORE = 8
-VALUES = 20
+VALUE_PLANE_BEFORE = 7
+VALUES = 19
 BOARD_ROWS = 31
 
 # State.watch. Of each watched quantity of a loop on its sprocket, in the order of WATCHED_COLUMNS: the sum over the

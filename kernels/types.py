@@ -121,7 +121,7 @@ class State:
     slack: wp.array(dtype=wp.float64)  # CPU: how far joints may move before the neighbour list is stale [m]
     step: wp.array(dtype=wp.float64)  # proposed next step [s]
     last_error: wp.array(dtype=wp.float64)  # error ratio of the last accepted step (PI controller)
-    is_rigid: wp.array(dtype=wp.int32)  # 1: joints are rigid, see cpu.implicit.joint_switch
+    is_rigid: wp.array(dtype=wp.int32)  # 1: joints are rigid, see cpu.implicit.flights
     other_step: wp.array(dtype=wp.float64)  # last step proposed for the other model of the joints [s]
     closing_time: wp.array(dtype=wp.float64)  # earliest time at which joints may close [s]
     next_sample: wp.array(dtype=wp.int64)  # index of the next sample mark

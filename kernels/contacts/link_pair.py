@@ -4,9 +4,17 @@ import warp as wp
 
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.impulse import collision_impulse, inverse_masses
-from warpchain.kernels.layout import INVERSE_INERTIA, INVERSE_MASS, LEFT_X, LEFT_Y, OMEGA, STRANDS_APART, U, V, X, Y
+from warpchain.kernels.layout import INVERSE_INERTIA, INVERSE_MASS, LEFT_X, OMEGA, RIGHT_X, STRANDS_APART, U, V, X
 from warpchain.kernels.physics.elementary import HALF, ZERO, quotient
+from warpchain.kernels.physics.geometry import two
 from warpchain.kernels.types import Chain, Rows
+
+Contact = wp.types.vector(length=7, dtype=wp.float64)
+"""Depth of the overlap [m]; normal from A to B; levers of A crossed with normal and tangent [m]; likewise of B.
+
+A vector, not a struct: clang kept a struct in memory, and a pile on the CPU was twice as slow.
+"""
+DEPTH, NORMAL_X, NORMAL_Y, A_N, A_T, B_N, B_T = range(7)
 
 
 @wp.func
@@ -30,16 +38,12 @@ def are_strands(link_a: int, link_b: int, link_count: int):
 
 
 @wp.func
-def effective_masses(
-    mass: wp.float64,
-    inertia_a: wp.float64,
-    inertia_b: wp.float64,
-    a_n: wp.float64,
-    a_t: wp.float64,
-    b_n: wp.float64,
-    b_t: wp.float64,
-):
-    """W_nn, W_nt, W_tt [1/kg] of a contact; arguments as those and the results of :func:`circles_of_links`."""
+def effective_masses(mass: wp.float64, inertia_a: wp.float64, inertia_b: wp.float64, contact: Contact):
+    """W_nn, W_nt, W_tt [1/kg] of a contact, from inverse masses and inertias of its links."""
+    a_n = contact[A_N]
+    a_t = contact[A_T]
+    b_n = contact[B_N]
+    b_t = contact[B_T]
     return (
         mass + a_n * a_n * inertia_a + b_n * b_n * inertia_b,
         a_n * a_t * inertia_a + b_n * b_t * inertia_b,
@@ -51,29 +55,19 @@ def effective_masses(
 def circles_of_links(
     radius_a: wp.float64,
     radius_b: wp.float64,
-    end_a_x: wp.float64,
-    end_a_y: wp.float64,
-    end_b_x: wp.float64,
-    end_b_y: wp.float64,
-    center_a_x: wp.float64,
-    center_a_y: wp.float64,
-    center_b_x: wp.float64,
-    center_b_y: wp.float64,
-):
+    end_a: wp.vec2d,
+    end_b: wp.vec2d,
+    center_a: wp.vec2d,
+    center_b: wp.vec2d,
+) -> Contact:
     """Geometry of the contact of a circle of link A and one of link B, without branches.
 
-    It returns numbers, not a struct: clang kept a struct in memory, and a pile on the CPU was twice as slow.
-
-    Arguments: the radii of the circles of A and B, their centres ``end`` and centres of mass ``center`` of
-    the links [m].
-
-    Returns:
-        Depth of the overlap [m], 0 if there is none (concentric circles have no normal and count as none); normal from
-        A to B; levers of A crossed with normal and tangent [m], likewise of B. Without an overlap only the depth has a
-        meaning.
+    Arguments: the radii of the circles of A and B, their centres ``end`` and centres of mass ``center`` of the links
+    [m]. The depth is 0 without an overlap, and then only the depth has a meaning; concentric circles have no normal
+    and count as none.
     """
-    dx = end_b_x - end_a_x
-    dy = end_b_y - end_a_y
+    dx = end_b[0] - end_a[0]
+    dy = end_b[1] - end_a[1]
     touching = radius_a + radius_b
     square = dx * dx + dy * dy
     overlap = square < touching * touching and square > ZERO
@@ -83,31 +77,20 @@ def circles_of_links(
     ny = quotient(dy, distance)
     # the middle of the overlap; for circles of one size to the bit the middle of their centres
     beyond = HALF * (radius_a - radius_b)
-    px = HALF * (end_a_x + end_b_x) + beyond * nx
-    py = HALF * (end_a_y + end_b_y) + beyond * ny
-    ax = px - center_a_x
-    ay = py - center_a_y
-    bx = px - center_b_x
-    by = py - center_b_y
-    a_n = ax * ny - ay * nx
-    a_t = ax * nx + ay * ny
-    b_n = bx * ny - by * nx
-    b_t = bx * nx + by * ny
-    return depth, nx, ny, a_n, a_t, b_n, b_t
+    px = HALF * (end_a[0] + end_b[0]) + beyond * nx
+    py = HALF * (end_a[1] + end_b[1]) + beyond * ny
+    ax = px - center_a[0]
+    ay = py - center_a[1]
+    bx = px - center_b[0]
+    by = py - center_b[1]
+    return Contact(depth, nx, ny, ax * ny - ay * nx, ax * nx + ay * ny, bx * ny - by * nx, bx * nx + by * ny)
 
 
 @wp.func
-def divisors(K: Rows, link_a: int, link_b: int, a_n: wp.float64, a_t: wp.float64, b_n: wp.float64, b_t: wp.float64):
-    """1/W_nn [kg] and 1/det W [kg²] of a contact of two links; the levers are those of :func:`circles_of_links`."""
-    w_nn, w_nt, w_tt = effective_masses(
-        K[INVERSE_MASS, link_a] + K[INVERSE_MASS, link_b],
-        K[INVERSE_INERTIA, link_a],
-        K[INVERSE_INERTIA, link_b],
-        a_n,
-        a_t,
-        b_n,
-        b_t,
-    )
+def divisors(K: Rows, link_a: int, link_b: int, contact: Contact):
+    """1/W_nn [kg] and 1/det W [kg²] of a contact of two links."""
+    mass = K[INVERSE_MASS, link_a] + K[INVERSE_MASS, link_b]
+    w_nn, w_nt, w_tt = effective_masses(mass, K[INVERSE_INERTIA, link_a], K[INVERSE_INERTIA, link_b], contact)
     inverse_nn, inverse_determinant = inverse_masses(w_nn, w_nt, w_tt)
     return inverse_nn, inverse_determinant
 
@@ -121,35 +104,20 @@ def links_of(p: int, q: int, half: int, second: int, n: int):
 
 @wp.func
 def touching_circles(K: Rows, chain: Chain, p: int, q: int, half: int, second: int):
-    """Geometry of a contact and its divisors, see :func:`links_of`, :func:`circles_of_links` and :func:`divisors`.
-
-    The depth is 0 for links that share a joint.
+    """A contact of joints p < q, see :func:`links_of`, and its :func:`divisors`; of links that share a joint depth 0.
 
     Joint j's left-hand circle belongs to link j's right end, its right-hand circle to the left end of the link after.
     """
-    after_q = second ^ half
     link_a, link_b = links_of(p, q, half, second, chain.link_count)
-    ax = wp.where(second == 0, K[layout.RIGHT_X, p], K[LEFT_X, p + 1])
-    ay = wp.where(second == 0, K[layout.RIGHT_Y, p], K[LEFT_Y, p + 1])
-    bx = wp.where(after_q == 0, K[layout.RIGHT_X, q], K[LEFT_X, q + 1])
-    by = wp.where(after_q == 0, K[layout.RIGHT_Y, q], K[LEFT_Y, q + 1])
+    end_a = wp.where(second == 0, two(K, RIGHT_X, p), two(K, LEFT_X, p + 1))
+    end_b = wp.where(second == half, two(K, RIGHT_X, q), two(K, LEFT_X, q + 1))
     if are_neighbours(link_a, link_b, chain.link_count):
-        bx = ax
-        by = ay
-    depth, nx, ny, a_n, a_t, b_n, b_t = circles_of_links(
-        K[layout.RADIUS, link_a],
-        K[layout.RADIUS, link_b],
-        ax,
-        ay,
-        bx,
-        by,
-        K[X, link_a],
-        K[Y, link_a],
-        K[X, link_b],
-        K[Y, link_b],
+        end_b = end_a
+    contact = circles_of_links(
+        K[layout.RADIUS, link_a], K[layout.RADIUS, link_b], end_a, end_b, two(K, X, link_a), two(K, X, link_b)
     )
-    inverse_nn, inverse_determinant = divisors(K, link_a, link_b, a_n, a_t, b_n, b_t)
-    return depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant
+    inverse_nn, inverse_determinant = divisors(K, link_a, link_b, contact)
+    return contact, inverse_nn, inverse_determinant
 
 
 @wp.func
@@ -158,22 +126,22 @@ def collide(
     chain: Chain,
     link_a: int,
     link_b: int,
-    nx: wp.float64,
-    ny: wp.float64,
-    a_n: wp.float64,
-    a_t: wp.float64,
-    b_n: wp.float64,
-    b_t: wp.float64,
+    contact: Contact,
     inverse_nn: wp.float64,
     inverse_determinant: wp.float64,
-    depth: wp.float64,
 ):
     """Impulse between two overlapping links; returns energy lost [J] and number of impulses.
 
     They meet if they approach, or part more slowly than at ``chain.push_rate`` times the depth of the overlap [m]; the
     impulse is that of links which approach by so much faster.
     """
-    push = chain.push_rate * depth
+    push = chain.push_rate * contact[DEPTH]
+    nx = contact[NORMAL_X]
+    ny = contact[NORMAL_Y]
+    a_n = contact[A_N]
+    a_t = contact[A_T]
+    b_n = contact[B_N]
+    b_t = contact[B_T]
     # all is read before anything is written: the compiler does not know that A is not B, and would read again
     u_a = K[U, link_a]
     v_a = K[V, link_a]
@@ -194,7 +162,7 @@ def collide(
         mass_b = K[INVERSE_MASS, link_b]
         inertia_a = K[INVERSE_INERTIA, link_a]
         inertia_b = K[INVERSE_INERTIA, link_b]
-        w_nn, w_nt, w_tt = effective_masses(mass_a + mass_b, inertia_a, inertia_b, a_n, a_t, b_n, b_t)
+        w_nn, w_nt, w_tt = effective_masses(mass_a + mass_b, inertia_a, inertia_b, contact)
         jn, jt = collision_impulse(
             normal_speed,
             tangential_speed,

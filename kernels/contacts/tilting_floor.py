@@ -82,19 +82,13 @@ def greatest_across_speed(chain: Chain, x: wp.float64, y: wp.float64):
 
 
 @wp.func
-def approaches(
-    chain: Chain,
-    slope: wp.float64,
-    link: TiltingLink,
-    x: wp.float64,
-    y: wp.float64,
-    lever_x: wp.float64,
-    lever_y: wp.float64,
-):
-    """a₊ and a₋ [m/s] of the roller at (x, y); the lever leads from the link's centre to its lowest line."""
+def approaches(chain: Chain, slope: wp.float64, link: TiltingLink, at: Touching, x: wp.float64, y: wp.float64):
+    """a₊ and a₋ [m/s] of a link's roller at (x, y). The lever leads from the link's centre to its lowest line."""
     inverse = ONE / wp.max(slope, SMALLEST)
     point_x = x - chain.circle_radius * chain.up_x * inverse
     point_y = y - chain.circle_radius * chain.up_y * inverse
+    lever_x = x - at.x + (-chain.circle_radius * chain.up_x * inverse)
+    lever_y = y - at.y + (-chain.circle_radius * chain.up_y * inverse)
     across = link.plane_speed + link.turn_x * point_y - link.turn_y * point_x
     middle = -(
         chain.up_x * (link.u - link.omega * lever_y)
@@ -131,7 +125,7 @@ def meet_roller(
     y = circle_y + to_point_y
     lever_x = arm_x + to_point_x
     lever_y = arm_y + to_point_y
-    front, back = approaches(chain, slope, before, circle_x, circle_y, lever_x, lever_y)
+    front, back = approaches(chain, slope, before, link, circle_x, circle_y)
     total = front + back
     hit = total > ZERO
     z = chain.half_width * quotient(front - back, wp.where(hit, total, ONE))
@@ -219,15 +213,8 @@ def with_copy(chain: Chain, touching: Touching) -> TiltingLink:
 def link_touches(chain: Chain, slope: wp.float64, link: Touching):
     """1 if a roller of the link touches the floor, else 0."""
     own = with_copy(chain, link)
-    inverse = ONE / wp.max(slope, SMALLEST)
-    to_x = -chain.circle_radius * chain.up_x * inverse
-    to_y = -chain.circle_radius * chain.up_y * inverse
-    left_x = link.left_x
-    left_y = link.left_y
-    right_x = link.right_x
-    right_y = link.right_y
-    a, b = approaches(chain, slope, own, left_x, left_y, left_x - link.x + to_x, left_y - link.y + to_y)
-    c, d = approaches(chain, slope, own, right_x, right_y, right_x - link.x + to_x, right_y - link.y + to_y)
+    a, b = approaches(chain, slope, own, link, link.left_x, link.left_y)
+    c, d = approaches(chain, slope, own, link, link.right_x, link.right_y)
     return wp.where(a + b + c + d > ZERO, wp.int64(1), wp.int64(0))
 
 

@@ -119,16 +119,10 @@ def sums_over_stages(velocity: tuple[float, ...], position: tuple[float, ...]):
 
 @functools.cache
 def explicit_method(tableau: Tableau, acceleration: Any):
-    """Warp functions of one tableau: (evaluate the first stage, attempt a step, commit it).
+    """Warp functions of one tableau and a load: (evaluate the first stage, attempt a step, commit it).
 
-    Args:
-        tableau: Its coefficients.
-        acceleration: What accelerates a link besides its joints, see :attr:`features.Features.acceleration`; on a plane
-            that may move, ``chain`` is on that of the middle of the step.
-
-    Returns:
-        ``first_stage(K, chain)``, ``attempt(K, chain, h, tolerance)`` → bits of the greatest error ratio (see
-        :func:`order_bits`), ``commit(K, chain, h)``.
+    ``first_stage(K, chain)``, ``attempt(K, chain, h, tolerance)`` → bits of the greatest error ratio (see
+    :func:`order_bits`), ``commit(K, chain, h)``. On a plane that may move ``chain`` is on that of mid-step.
     """
     stages = tableau.stages
     reuses_last = tableau.first_same_as_last

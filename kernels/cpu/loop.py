@@ -18,8 +18,8 @@ from warpchain.kernels.cpu.contacts.proximity import greatest_opening
 from warpchain.kernels.cpu.contacts.time_to_contact import step_bound
 from warpchain.kernels.cpu.explicit import place_ends
 from warpchain.kernels.cpu.implicit.flights import rigid_in_flight
+from warpchain.kernels.cpu.implicit.rigid_layout import scratch_rows
 from warpchain.kernels.cpu.joints import springs
-from warpchain.kernels.cpu.rows import scratch_rows
 from warpchain.kernels.cpu.tilting import tilting_plane
 from warpchain.kernels.cpu.upright import upright_plane
 from warpchain.kernels.events.present_chain import has_changed, present_chain
@@ -39,28 +39,20 @@ from warpchain.kernels.types import Chain, Control, Drive, Integers, Model, Reco
 @wp.func
 def load_state(K: Rows, model: Model, state: State, chain: Chain, world: int):
     """Fills the rows of the state; rows of losses start at zero, columns behind the links are links without mass."""
-    i = int(0)
-    while i < whole_lanes(chain.link_count):
-        row = int(0)
-        while row < wp.static(layout.STAGES):
+    for i in range(whole_lanes(chain.link_count)):
+        for row in range(wp.static(layout.STAGES)):
             K[row, i] = ZERO
             if row < 6 and i < chain.link_count:
                 K[row, i] = state.links[world, row, i]
-            row += 1
-        i += 1
     write_links(K, model, world, state.load_factor[world])
 
 
 @wp.func
 def store_state(K: Rows, state: State, chain: Chain, world: int, fixed_loss: int):
     """Writes the state and the losses since loading."""
-    i = int(0)
-    while i < chain.link_count:
-        row = int(0)
-        while row < 6:
+    for i in range(chain.link_count):
+        for row in range(6):
             state.links[world, row, i] = K[row, i]
-            row += 1
-        i += 1
     store_losses(K, layout.LOST_FRICTION, state, world, chain.link_count, fixed_loss)
 
 
@@ -68,10 +60,8 @@ def store_state(K: Rows, state: State, chain: Chain, world: int, fixed_loss: int
 def state_is_finite(K: Rows, chain: Chain):
     """False if the state or its first derivative holds an infinity or a NaN."""
     finite = bool(True)
-    i = int(0)
-    while i < chain.link_count:
+    for i in range(chain.link_count):
         finite = finite and link_is_finite(K, i, layout.STAGES)
-        i += 1
     return finite
 
 
@@ -108,13 +98,7 @@ def make_advance(features: Features):
         """Takes a sample → the chain as the sample has left it."""
         softness = state.softness[world]
         load_factor = state.load_factor[world]
-        touches = state.counts[world, layout.SELF_IMPULSES]
-        meetings = state.counts[world, layout.STRAND_IMPULSES]
-        last_impulse = state.watch[world, layout.LAST_FLOOR_IMPULSE]
-        time = state.time[world]
-        state.status[world] = sample(
-            K, chain, drive, state, record, control, world, time, touches, meetings, last_impulse
-        )
+        state.status[world] = sample(K, chain, drive, state, record, control, world, state.time[world])
         after = chain
         if has_changed(state, world, softness, load_factor):
             after = present_chain(model, state, control, world)

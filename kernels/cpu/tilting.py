@@ -20,9 +20,9 @@ from warpchain.kernels.contacts.tilting_floor import (
 from warpchain.kernels.cpu.contacts.proximity import FURTHEST, any_negative, placed_link
 from warpchain.kernels.cpu.joints import Joints
 from warpchain.kernels.cpu.upright import Plane
-from warpchain.kernels.layout import INERTIA, LEFT_X, LOST_FIXED, MASS, OMEGA, SINE, STAGES, SUMS_OF_MOTION, U, V, X, Y
+from warpchain.kernels.layout import LEFT_X, LOST_FIXED, OMEGA, STAGES, SUMS_OF_MOTION, U, V
 from warpchain.kernels.physics.elementary import ZERO, from_order_key, order_key
-from warpchain.kernels.physics.geometry import LANES, read_link, whole_lanes
+from warpchain.kernels.physics.geometry import LANES, whole_lanes
 from warpchain.kernels.physics.plane import (
     begin_plane_step,
     end_plane_step,
@@ -30,7 +30,7 @@ from warpchain.kernels.physics.plane import (
     motion_terms,
     on_plane,
     place_terms,
-    plane_load,
+    shift_stage,
 )
 from warpchain.kernels.types import Chain, Ground, Row, Rows, State, with_circles
 
@@ -63,7 +63,7 @@ def write_sums_of_motion(K: Rows, P: Row, chain: Chain):
     count = whole_lanes(chain.link_count)
     i = int(0)
     while i < count:
-        motion = motion_terms(K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[U, i], K[V, i], K[OMEGA, i])
+        motion = motion_terms(K, i)
         for k in range(wp.static(SUMS_OF_MOTION)):
             K[wp.static(SUMS + k), i] = wp.where(i < chain.link_count, motion[k], ZERO)
         i += 1
@@ -77,7 +77,7 @@ def write_plane_sums(K: Rows, P: Row, chain: Chain):
     count = whole_lanes(chain.link_count)
     i = int(0)
     while i < count:
-        places = place_terms(chain, K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[layout.COSINE, i], K[SINE, i])
+        places = place_terms(K, chain, i)
         for k in range(wp.static(layout.SUMS_OF_PLACES)):
             K[wp.static(SUMS + k), i] = wp.where(i < chain.link_count, places[k], ZERO)
         i += 1
@@ -93,12 +93,7 @@ def shift_first_stage(K: Rows, before: Chain, now: Chain):
     """Changes the stored first stage from one plane to another; links are the same."""
     i = int(0)
     while i < whole_lanes(now.link_count):
-        link = read_link(K, now, i)
-        ax, ay, turn = plane_load(now, i, link, ZERO, ZERO)
-        old_ax, old_ay, old_turn = plane_load(before, i, link, ZERO, ZERO)
-        K[STAGES, i] = K[STAGES, i] + (ax - old_ax)
-        K[STAGES + 1, i] = K[STAGES + 1, i] + (ay - old_ay)
-        K[STAGES + 2, i] = K[STAGES + 2, i] + (turn - old_turn)
+        shift_stage(K, STAGES, i, before, now)
         i += 1
 
 

@@ -12,10 +12,8 @@ from warpchain.kernels.types import Chain, Record, Rows, State
 @wp.func
 def copy_sample(state: State, world: int, target: Rows, row: int):
     """Writes the latest sample of a chain as a row, as far as it has columns."""
-    column = int(0)
-    while column < target.shape[1]:
+    for column in range(target.shape[1]):
         target[row, column] = state.last_sample[world, column]
-        column += 1
 
 
 @wp.func
@@ -54,13 +52,11 @@ def write_frame(K: Rows, chain: Chain, _state: State, record: Record, world: int
         return
     n = chain.link_count
     row = record.frame_count[world]
-    i = int(0)
-    while i < n:
+    for i in range(n):
         record.frames[world, row, i] = K[RIGHT_X, i]
         record.frames[world, row, n + i] = K[RIGHT_Y, i]
         if record.frame_loads.shape[1] > 0:
             write_load(record.frame_loads[world], row, K, chain, i)
-        i += 1
     record.frame_times[world, row] = time
     record.frame_count[world] = row + 1
 

@@ -14,7 +14,7 @@ from warpchain.kernels.types import Control, Drive, Row, State
 
 
 @wp.func
-def watch_rest(state: State, drive: Drive, control: Control, world: int, sample: Row, last_floor_impulse: wp.float64):
+def watch_rest(state: State, drive: Drive, control: Control, world: int, sample: Row):
     """Status AT_REST once both speeds, the centre's and the rms, have been low for the rest time, else RUNNING.
 
     DISTANCE_LIMIT once the centre is as far away as a walk may go.
@@ -30,7 +30,7 @@ def watch_rest(state: State, drive: Drive, control: Control, world: int, sample:
     if wp.max(wp.sqrt(u * u + v * v), sample[layout.RMS_SPEED]) < control.rest_speed:
         if state.watch[world, REST_SINCE] < ZERO:
             state.watch[world, REST_SINCE] = time
-        is_held = time - last_floor_impulse <= control.rest_time
+        is_held = time - state.watch[world, layout.LAST_FLOOR_IMPULSE] <= control.rest_time
         if is_held and time - state.watch[world, REST_SINCE] >= control.rest_time:
             return AT_REST
     else:

@@ -40,10 +40,8 @@ def observation(features: Features):
     def observe(K: Rows, chain: Chain, state: State, record: Record, world: int, time: wp.float64):
         area = summarise(K, chain, state.last_sample[world])
         if wp.static(has_energy):
-            i = int(0)
-            while i < chain.link_count:
+            for i in range(chain.link_count):
                 state.last_sample[world, GRAVITATIONAL] += energy(chain, i, read_link(K, chain, i))
-                i += 1
         if wp.static(features.tilts):
             move_into_room(K, state.plane[world], chain, state.last_sample[world])
         keep_sample(state, record, world, time)
@@ -54,12 +52,11 @@ def observation(features: Features):
 
 @functools.cache
 def sampling(features: Features):
-    """Warp function ``sample`` of a chain whose ends are placed: time series, frame, watches; returns the status.
+    """Warp function of a sample of a chain whose ends are placed: time series, frame, watches.
 
-    It is called at or after :func:`next_mark`. If only a frame is due, nothing but the record changes. It may also
-    change the softness of the joints, and on a sprocket the chain's loads and the velocities of its links. Impulses
-    between links so far (``touches``), those between strands (``meetings``) and the time of the last one on the floor
-    [s] are arguments: on a GPU they are not in the state.
+    ``sample(K, chain, drive, state, record, control, world, time)`` → status. It is called at or after
+    :func:`next_mark`. If only a frame is due, nothing but the record changes. It may also change the softness of the
+    joints, and on a sprocket the chain's loads and the velocities of its links.
 
     On a sprocket it watches until the loop is stationary, on a floor until the chain rests or is far. The sums of a
     plane that tilts must be those of the present state.
@@ -78,9 +75,6 @@ def sampling(features: Features):
         control: Control,
         world: int,
         time: wp.float64,
-        touches: wp.int64,
-        meetings: wp.int64,
-        last_floor_impulse: wp.float64,
     ):
         frame_mark = state.next_frame[world]
         if frame_mark >= wp.int64(0) and time >= wp.float64(frame_mark) * control.frame_interval:
@@ -98,14 +92,14 @@ def sampling(features: Features):
         passed = wp.int64(wp.floor(time / control.sample_interval))
         state.next_sample[world] = wp.max(mark, passed) + wp.int64(1)
         if wp.static(not is_driven):
-            watch_ending(state, world, time, area, touches, meetings, last_floor_impulse, is_first)
+            watch_ending(state, world, time, area, is_first)
         if wp.static(has_floor):
             watch_stiffening(state, drive, control, world, time)
             watch_collapse(chain, state, control, world, time, area, is_first)
         if wp.static(features.tilts):
             watch_fall(state, world, time)
         if wp.static(has_floor):
-            return watch_rest(state, drive, control, world, state.last_sample[world], last_floor_impulse)
+            return watch_rest(state, drive, control, world, state.last_sample[world])
         if wp.static(is_driven):
             if state.load_factor[world] > wp.float64(1.0):
                 rate = drag_rate(chain, state, drive, world, state.last_sample[world, HEIGHT])

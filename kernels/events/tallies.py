@@ -24,10 +24,11 @@ def add_count(state: State, world: int, counter: int, number: wp.int64):
 
 
 @wp.func
-def count_bounce(state: State, world: int, time: wp.float64, last_impulse: wp.float64):
-    """Counts a floor impulse as the first of a new bounce if none has been for a while."""
-    if time - last_impulse > BOUNCE_PAUSE:
+def note_floor_impulse(state: State, world: int, time: wp.float64):
+    """Notes an impulse on the floor: the first of a new bounce if none has been for a while."""
+    if time - state.watch[world, layout.LAST_FLOOR_IMPULSE] > BOUNCE_PAUSE:
         add_count(state, world, BOUNCES, wp.int64(1))
+    state.watch[world, layout.LAST_FLOOR_IMPULSE] = time
 
 
 @wp.func
@@ -40,10 +41,8 @@ def raise_extreme(state: State, world: int, extreme: int, value: wp.float64):
 def row_total(K: Rows, row: int, n: int):
     """Sum of the first n numbers of a row, in their order."""
     total = wp.float64(0.0)
-    i = int(0)
-    while i < n:
+    for i in range(n):
         total += K[row, i]
-        i += 1
     return total
 
 

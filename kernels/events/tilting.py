@@ -72,10 +72,8 @@ def move_into_room(K: Rows, P: Row, chain: Chain, sample: Row):
     sample[layout.GRAVITATIONAL] = chain.gravity * P[layout.SUM_MASS] * sample[layout.CENTER_Y]
     sample[layout.LOWEST] = P[ORIGIN + 1] + from_order_key(bottom) - extent
     sample[layout.RMS_SPEED] = wp.sqrt(square / wp.float64(n))
-    k = int(0)
-    while k < PLANE_VALUES:
+    for k in range(PLANE_VALUES):
         sample[layout.PLANE_COLUMN + k] = P[k]
-        k += 1
 
 
 @wp.func
@@ -86,10 +84,8 @@ def write_frame_in_room(K: Rows, chain: Chain, state: State, record: Record, wor
     if record.frames.shape[1] == 0:
         return
     first = record.frames.shape[2] - PLANE_VALUES
-    k = int(0)
-    while k < PLANE_VALUES:
+    for k in range(PLANE_VALUES):
         record.frames[world, row, first + k] = state.plane[world, k]
-        k += 1
 
 
 @wp.func

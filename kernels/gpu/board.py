@@ -29,10 +29,8 @@ def find_link(empty: Run, chain: Chain, lane: int) -> Run:
 @wp.func
 def load_link(run: Run, state: State):
     """Writes a thread's link on the board; threads without a link get one at the origin that nothing acts on."""
-    row = int(0)
-    while row < SINE:
+    for row in range(SINE):
         run.K[row, run.lane] = ZERO
-        row += 1
     if run.lane < run.links:
         for k in range(6):
             run.K[X + k, run.lane] = state.links[run.world, X + k, run.lane]
@@ -56,25 +54,9 @@ def write_attempt(run: Run, result: Attempt, h: wp.float64):
 
 
 @wp.func
-def load_extremes(run: Run, state: State, fixed_depth: int):
-    """Writes what is greatest or latest so far on the board; for one thread."""
-    run.K[BOARD_VALUES, layout.VALUE_OPENING] = state.extremes[run.world, layout.OPENING]
-    run.K[BOARD_VALUES, layout.VALUE_FIXED_DEPTH] = state.extremes[run.world, fixed_depth]
-    run.K[BOARD_VALUES, layout.VALUE_LAST_IMPULSE] = state.watch[run.world, layout.LAST_FLOOR_IMPULSE]
-
-
-@wp.func
 def raise_value(K: Rows, value: int, x: wp.float32):
     """Raises one of the chain's values on the board to x; for one thread."""
     K[BOARD_VALUES, value] = wp.max(K[BOARD_VALUES, value], wp.float64(x))
-
-
-@wp.func
-def store_extremes(run: Run, state: State, fixed_depth: int):
-    """Stores what :func:`load_extremes` has written; for one thread."""
-    state.extremes[run.world, layout.OPENING] = run.K[BOARD_VALUES, layout.VALUE_OPENING]
-    state.extremes[run.world, fixed_depth] = run.K[BOARD_VALUES, layout.VALUE_FIXED_DEPTH]
-    state.watch[run.world, layout.LAST_FLOOR_IMPULSE] = run.K[BOARD_VALUES, layout.VALUE_LAST_IMPULSE]
 
 
 @wp.func

@@ -41,16 +41,9 @@ class Ahead:
 
 @functools.cache
 def explicit_attempt(features: Features, block_dim: int, write_proximity: Any, read_proximity: Any):
-    """Warp function that attempts a step in blocks of this size.
+    """Warp function ``attempt(ends, forces, run, h)`` → Attempt, from the state and first stage on the board.
 
-    Args:
-        features: What the kernel is compiled for.
-        block_dim: Threads in a block.
-        write_proximity: See :func:`gpu.contacts.proximity.block_proximity`.
-        read_proximity: See :func:`gpu.contacts.proximity.block_proximity`.
-
-    Returns:
-        ``attempt(ends, forces, run, h)`` → Attempt, from the state and first stage on the board.
+    It takes two functions of :func:`gpu.contacts.proximity.block_proximity`.
     """
     tableau = find_method(features.method).tableau
     stages, last = tableau.stages, tableau.stages - 1

@@ -11,7 +11,7 @@ from warpchain.kernels.events.sample import next_mark, observation, sampling
 from warpchain.kernels.events.softening import book_softening, contact_step, spring_tolerance
 from warpchain.kernels.events.tallies import add_count, of_fixed_body, raise_extreme, row_total, store_losses
 from warpchain.kernels.features import Features
-from warpchain.kernels.gpu.board import load_extremes, load_link, publish, store_extremes
+from warpchain.kernels.gpu.board import load_link, publish
 from warpchain.kernels.gpu.contacts.self_contacts import TouchLayout
 from warpchain.kernels.gpu.stage import Run, write_constants
 from warpchain.kernels.gpu.threads import barrier, clock
@@ -19,7 +19,7 @@ from warpchain.kernels.gpu.upright import BlockPlane
 from warpchain.kernels.layout import BOARD_LOST_SELF, BOARD_VALUES, SELF_IMPULSES, STRAND_IMPULSES, VALUE_DEADLINE
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.physics.scaled_loads import write_link
-from warpchain.kernels.types import Control, Drive, Model, Record, State
+from warpchain.kernels.types import Control, Drive, Integers, Model, Record, State
 
 
 @wp.func
@@ -36,20 +36,32 @@ def write_bounds(run: Run, drive: Drive, state: State, control: Control, is_driv
 
 
 @functools.cache
+def hits_booking(features: Features, touch: TouchLayout):
+    """Warp function ``book_hits(T, state, world)``: a block's impulses go to the state's counters; for one thread."""
+    _, _, fixed_count = of_fixed_body(features.is_driven)
+
+    @wp.func
+    def book_hits(T: Integers, state: State, world: int):
+        add_count(state, world, fixed_count, wp.int64(T[wp.static(touch.fixed_hits)]))
+        add_count(state, world, SELF_IMPULSES, wp.int64(T[wp.static(touch.self_hits)]))
+        add_count(state, world, STRAND_IMPULSES, wp.int64(T[wp.static(touch.strand_hits)]))
+        T[wp.static(touch.fixed_hits)] = 0
+        T[wp.static(touch.self_hits)] = 0
+        T[wp.static(touch.strand_hits)] = 0
+
+    return book_hits
+
+
+@functools.cache
 def block_run(features: Features, touch: TouchLayout, plane: BlockPlane):
     """Warp functions for all threads of a block that load a chain's run and store it.
 
-    Args:
-        features: What the kernel is compiled for.
-        touch: Where the block's counters lie.
-        plane: Hooks of the chain's plane.
-
-    Returns:
-        ``load(run, model, drive, state, control)``, which ends with a barrier, and
-        ``store(run, model, state, record, control, time, status, accepted, attempts)``.
+    ``load(run, model, drive, state, control)``, which ends with a barrier, and
+    ``store(run, model, state, record, control, time, status, accepted, attempts)``.
     """
     is_driven = features.is_driven
-    fixed_loss, fixed_depth, fixed_count = of_fixed_body(features.is_driven)
+    fixed_loss, fixed_depth, _ = of_fixed_body(features.is_driven)
+    book_hits = hits_booking(features, touch)
     write_sample = observation(features)
 
     @wp.func
@@ -61,19 +73,16 @@ def block_run(features: Features, touch: TouchLayout, plane: BlockPlane):
         if lane < run.links:
             write_link(K, model, world, lane, state.load_factor[world])
             is_fresh = state.is_fresh[world] != 0
-            row = int(BOARD_LOST_SELF)
-            while row < wp.static(BOARD_VALUES):
+            for row in range(BOARD_LOST_SELF, wp.static(BOARD_VALUES)):
                 K[row, lane] = wp.where(is_fresh, ZERO, run.kept[row, lane])
-                row += 1
         if lane == 0:
             write_constants(K, present_chain(model, state, control, world))
             plane.load(run)
             write_bounds(run, drive, state, control, wp.static(is_driven))
-            load_extremes(run, state, fixed_depth)
-            k = int(wp.static(touch.touching))
-            while k < wp.static(touch.size):
+            K[BOARD_VALUES, layout.VALUE_OPENING] = state.extremes[world, layout.OPENING]
+            K[BOARD_VALUES, layout.VALUE_FIXED_DEPTH] = state.extremes[world, fixed_depth]
+            for k in range(wp.static(touch.touching), wp.static(touch.size)):
                 run.T[k] = 0
-                k += 1
             K[BOARD_VALUES, VALUE_DEADLINE] = clock() + control.launch_time
         barrier()  # the chain's constants are on the board
         publish(run)
@@ -101,10 +110,8 @@ def block_run(features: Features, touch: TouchLayout, plane: BlockPlane):
         if lane < run.links:
             for k in range(6):
                 state.links[world, layout.X + k, lane] = K[layout.X + k, lane]
-            row = int(BOARD_LOST_SELF)
-            while row < wp.static(BOARD_VALUES):
+            for row in range(BOARD_LOST_SELF, wp.static(BOARD_VALUES)):
                 run.kept[row, lane] = K[row, lane]
-                row += 1
         if lane == 0:
             plane.store(run)
             if is_last:
@@ -113,10 +120,9 @@ def block_run(features: Features, touch: TouchLayout, plane: BlockPlane):
             state.losses[world, layout.LOSS_SELF] = row_total(K, BOARD_LOST_SELF, run.links)
             add_count(state, world, layout.ACCEPTED, wp.int64(accepted))
             add_count(state, world, layout.REJECTED, wp.int64(attempts - accepted))
-            add_count(state, world, fixed_count, wp.int64(T[wp.static(touch.fixed_hits)]))
-            add_count(state, world, SELF_IMPULSES, wp.int64(T[wp.static(touch.self_hits)]))
-            add_count(state, world, STRAND_IMPULSES, wp.int64(T[wp.static(touch.strand_hits)]))
-            store_extremes(run, state, fixed_depth)
+            book_hits(T, state, world)
+            state.extremes[world, layout.OPENING] = K[BOARD_VALUES, layout.VALUE_OPENING]
+            state.extremes[world, fixed_depth] = K[BOARD_VALUES, layout.VALUE_FIXED_DEPTH]
             deepest = wp.cast(T[wp.static(touch.deepest)], wp.float32)
             raise_extreme(state, world, layout.SELF_DEPTH, wp.float64(deepest))
             state.is_fresh[world] = 0
@@ -134,6 +140,7 @@ def block_sample(features: Features, touch: TouchLayout, plane: BlockPlane):
     """
     is_driven = features.is_driven
     sample = sampling(features)
+    book_hits = hits_booking(features, touch)
 
     @wp.func
     def take_sample(
@@ -147,13 +154,9 @@ def block_sample(features: Features, touch: TouchLayout, plane: BlockPlane):
         barrier()
         if run.lane == 0:
             plane.store(run)
+            book_hits(T, state, world)
             chain = present_chain(model, state, control, world)
-            touches = state.counts[world, SELF_IMPULSES] + wp.int64(T[wp.static(touch.self_hits)])
-            meetings = state.counts[world, STRAND_IMPULSES] + wp.int64(T[wp.static(touch.strand_hits)])
-            last_impulse = run.K[BOARD_VALUES, layout.VALUE_LAST_IMPULSE]
-            T[wp.static(touch.mailbox)] = sample(
-                run.K, chain, drive, state, record, control, world, time, touches, meetings, last_impulse
-            )
+            state.status[world] = sample(run.K, chain, drive, state, record, control, world, time)
             if has_changed(state, world, softness, load_factor):
                 after = present_chain(model, state, control, world)
                 book_softening(chain, after, state, world)
@@ -162,7 +165,7 @@ def block_sample(features: Features, touch: TouchLayout, plane: BlockPlane):
             if clock() > run.K[BOARD_VALUES, VALUE_DEADLINE]:
                 T[wp.static(touch.is_late)] = 1
         barrier()
-        status = T[wp.static(touch.mailbox)]
+        status = state.status[world]
         pauses = record_is_full(record, world) or T[wp.static(touch.is_late)] != 0
         barrier()
         changed = has_changed(state, world, softness, load_factor)

@@ -173,14 +173,9 @@ def greatest_of_three(error: vec3d, value: vec3d, rate: vec3d, h: wp.float64):
 def block_stage(features: Features, block_dim: int):
     """Warp functions for blocks of this size: (exchange ends, evaluate a stage).
 
-    Args:
-        features: What the kernel is compiled for.
-        block_dim: Threads in a block.
-
-    Returns:
-        ``exchange_ends(ends, run, link)`` → left end of the next link;
-        ``stage(forces, run, next_end, link, 1/m, 1/I)`` → rates: accelerations ẍ, ÿ [m/s²] and θ̈ [rad/s²] of the link,
-        power [W] lost in its right joint by friction, and by damping, divided by the joint's b.
+    ``exchange_ends(ends, run, link)`` → left end of the next link. ``stage(forces, run, next_end, link, 1/m, 1/I)`` →
+    rates: accelerations ẍ, ÿ [m/s²] and θ̈ [rad/s²] of the link, power [W] lost in its right joint by friction, and by
+    damping, divided by the joint's b.
     """
     load = features.acceleration
 

@@ -138,10 +138,8 @@ def block_maxima(block_dim: int):
     def greatest(tile: wp.tile[wp.int32, block_dim], lane: int, value: wp.int32):
         tile[lane // warp_width()] = warp_greatest(value)
         top = tile[0]
-        i = int(1)
-        while i < wp.static(block_dim) // warp_width():
+        for i in range(1, wp.static(block_dim) // warp_width()):
             top = wp.max(top, tile[i])
-            i += 1
         return top
 
     @wp.func
@@ -154,11 +152,9 @@ def block_maxima(block_dim: int):
     @wp.func
     def read_maxima(memory: wp.uint64):
         top = read_four(memory, 0)
-        i = int(1)
-        while i < wp.static(block_dim) // warp_width():
+        for i in range(1, wp.static(block_dim) // warp_width()):
             other = read_four(memory, i)
             top = wp.max(top, other)
-            i += 1
         return top
 
     return greatest, write_maxima, read_maxima

@@ -17,10 +17,10 @@ from warpchain.kernels.contacts.tilting_floor import (
     steepness,
 )
 from warpchain.kernels.gpu.contacts.proximity import touching_link
-from warpchain.kernels.gpu.stage import Run, constants, felt_plane, read_link
+from warpchain.kernels.gpu.stage import Run, constants, felt_plane
 from warpchain.kernels.gpu.threads import barrier, barrier_count, warp_width
 from warpchain.kernels.gpu.upright import BlockPlane
-from warpchain.kernels.layout import BOARD_VALUES, INERTIA, MASS, OMEGA, PLANE_MID, SINE, U, V, X, Y
+from warpchain.kernels.layout import BOARD_VALUES, OMEGA, PLANE_MID, U, V
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.physics.plane import (
     begin_plane_step,
@@ -29,9 +29,9 @@ from warpchain.kernels.physics.plane import (
     motion_terms,
     on_plane,
     place_terms,
-    plane_load,
+    shift_stage,
 )
-from warpchain.kernels.types import Drive, Row, Rows, with_circles
+from warpchain.kernels.types import Drive, Row, with_circles
 
 SUMS = layout.SUMS_OF_PLACES + layout.SUMS_OF_MOTION
 vec8d = wp.types.vector(length=8, dtype=wp.float64)
@@ -89,46 +89,16 @@ def added_up(memory: Row, k: int, block_dim: int):
     """The sum over all threads of the block of the value ``k``."""
     warps = wp.where(warp_width() > 1, block_dim // 32, 1)
     total = ZERO
-    i = int(0)
-    while i < warps:
+    for i in range(warps):
         total += memory[k * warps + i]
-        i += 1
     return total
 
 
 @wp.func
 def copy_plane(target: Row, source: Row):
     """Copies a plane with all its sums."""
-    row = int(0)
-    while row < layout.PLANE_ROWS:
+    for row in range(layout.PLANE_ROWS):
         target[row] = source[row]
-        row += 1
-
-
-@wp.func
-def shift_first_stage(run: Run):
-    """Changes a link's first stage on the board from the plane of the attempt before to that of this one."""
-    K = run.K
-    lane = run.lane
-    link = read_link(K, lane)
-    before = on_plane(constants(K), K[BOARD_VALUES], layout.VALUE_PLANE_BEFORE)
-    ax, ay, turn = plane_load(felt_plane(run), lane, link, ZERO, ZERO)
-    old_ax, old_ay, old_turn = plane_load(before, lane, link, ZERO, ZERO)
-    K[layout.BOARD_FIRST, lane] = K[layout.BOARD_FIRST, lane] + (ax - old_ax)
-    K[layout.BOARD_FIRST + 1, lane] = K[layout.BOARD_FIRST + 1, lane] + (ay - old_ay)
-    K[layout.BOARD_FIRST + 2, lane] = K[layout.BOARD_FIRST + 2, lane] + (turn - old_turn)
-
-
-@wp.func
-def places_of(K: Rows, i: int):
-    """The part of link i in the sums for its plane that depend on places."""
-    return place_terms(constants(K), K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[layout.COSINE, i], K[SINE, i])
-
-
-@wp.func
-def motion_of(K: Rows, i: int):
-    """The part of link i in those that depend on velocities."""
-    return motion_terms(K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[U, i], K[V, i], K[OMEGA, i])
 
 
 @functools.cache
@@ -158,12 +128,13 @@ def block_tilting(block_dim: int, votes: int) -> BlockPlane:
             begin_plane_step(run.P, constants(run.K).gravity, h)
         barrier()
         if run.lane < run.links:
-            shift_first_stage(run)
+            before = on_plane(constants(run.K), run.K[BOARD_VALUES], layout.VALUE_PLANE_BEFORE)
+            shift_stage(run.K, layout.BOARD_FIRST, run.lane, before, felt_plane(run))
 
     @wp.func
     def sum_up(run: Run):
-        places = places_of(run.K, run.column)
-        motion = motion_of(run.K, run.column)
+        places = place_terms(run.K, constants(run.K), run.column)
+        motion = motion_terms(run.K, run.column)
         terms = vec8d()
         if run.lane < run.links:
             for k in range(wp.static(layout.SUMS_OF_PLACES)):
@@ -216,7 +187,7 @@ def block_tilting(block_dim: int, votes: int) -> BlockPlane:
                 summed[1] = met.moment_x
                 summed[2] = met.moment_y
                 hits = int(met.hits)
-            motion = motion_of(K, run.column)
+            motion = motion_terms(K, run.column)
             if lane < run.links:
                 for k in range(wp.static(layout.SUMS_OF_MOTION)):
                     summed[3 + k] = motion[k]

@@ -46,14 +46,10 @@ def read_link(K: Rows, chain: Chain, i: int) -> Link:
 def link_is_finite(K: Rows, i: int, rates: int):
     """False if the state of link i, or its accelerations from row ``rates`` on, hold an infinity or a NaN."""
     finite = bool(True)
-    row = int(0)
-    while row < 6:
+    for row in range(6):
         finite = finite and wp.isfinite(K[row, i])
-        row += 1
-    row = int(0)
-    while row < 3:
+    for row in range(3):
         finite = finite and wp.isfinite(K[rates + row, i])
-        row += 1
     return finite
 
 
@@ -62,6 +58,12 @@ def put(rows: Rows, first: int, i: int, values: Any):
     """Writes a vector's components into column i of consecutive rows."""
     for k in range(len(values)):
         rows[first + k, i] = values[k]
+
+
+@wp.func
+def two(rows: Rows, first: int, i: int):
+    """Column i of two consecutive rows."""
+    return wp.vec2d(rows[first, i], rows[first + 1, i])
 
 
 @wp.func

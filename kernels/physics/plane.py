@@ -42,9 +42,9 @@ import warp as wp
 
 from warpchain.kernels import layout
 from warpchain.kernels.layout import AHEAD, MOMENTUM, ORIGIN, RATE_XX, SUM_MU, SUM_MV, SUM_MX, SUM_MY, SUM_XX, UP
-from warpchain.kernels.physics.elementary import HALF, ONE, quotient
-from warpchain.kernels.physics.geometry import Link
-from warpchain.kernels.types import Chain, Row
+from warpchain.kernels.physics.elementary import HALF, ONE, ZERO, quotient
+from warpchain.kernels.physics.geometry import Link, read_link
+from warpchain.kernels.types import Chain, Row, Rows
 
 THIRD = wp.constant(wp.float64(1.0 / 3.0))
 FIVE_SIXTHS = wp.constant(wp.float64(5.0 / 6.0))
@@ -77,16 +77,25 @@ def on_plane(own: Chain, P: Row, first: int) -> Chain:
 
 
 @wp.func
-def place_terms(
-    chain: Chain,
-    mass: wp.float64,
-    inertia: wp.float64,
-    x: wp.float64,
-    y: wp.float64,
-    cosine: wp.float64,
-    sine: wp.float64,
-):
-    """One link's part of the sums SUM_MX … SUM_YY, in that order."""
+def shift_stage(K: Rows, row: int, i: int, before: Chain, now: Chain):
+    """Changes a stage of link i, whose accelerations begin at this row, from one plane to another."""
+    link = read_link(K, now, i)
+    ax, ay, turn = plane_load(now, i, link, ZERO, ZERO)
+    old_ax, old_ay, old_turn = plane_load(before, i, link, ZERO, ZERO)
+    K[row, i] = K[row, i] + (ax - old_ax)
+    K[row + 1, i] = K[row + 1, i] + (ay - old_ay)
+    K[row + 2, i] = K[row + 2, i] + (turn - old_turn)
+
+
+@wp.func
+def place_terms(K: Rows, chain: Chain, i: int):
+    """Link i's part of the sums SUM_MX … SUM_YY, in that order."""
+    mass = K[layout.MASS, i]
+    inertia = K[layout.INERTIA, i]
+    x = K[layout.X, i]
+    y = K[layout.Y, i]
+    cosine = K[layout.COSINE, i]
+    sine = K[layout.SINE, i]
     mx = mass * x
     my = mass * y
     side = mass * chain.half_width * chain.half_width * THIRD
@@ -100,13 +109,11 @@ def place_terms(
 
 
 @wp.func
-def motion_terms(
-    mass: wp.float64, inertia: wp.float64, x: wp.float64, y: wp.float64, u: wp.float64, v: wp.float64, omega: wp.float64
-):
-    """One link's part of the sums SUM_MU, SUM_MV and SUM_MOMENT, in that order."""
-    mu = mass * u
-    mv = mass * v
-    return mu, mv, x * mv - y * mu + inertia * omega
+def motion_terms(K: Rows, i: int):
+    """Link i's part of the sums SUM_MU, SUM_MV and SUM_MOMENT, in that order."""
+    mu = K[layout.MASS, i] * K[layout.U, i]
+    mv = K[layout.MASS, i] * K[layout.V, i]
+    return mu, mv, K[layout.X, i] * mv - K[layout.Y, i] * mu + K[layout.INERTIA, i] * K[layout.OMEGA, i]
 
 
 @wp.func

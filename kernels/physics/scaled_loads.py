@@ -75,10 +75,8 @@ def write_link(K: Rows, model: Model, world: int, i: int, factor: wp.float64):
 @wp.func
 def write_links(K: Rows, model: Model, world: int, factor: wp.float64):
     """Writes the constants of all links and joints, see :func:`write_link`."""
-    i = int(0)
-    while i < model.chains[world].link_count:
+    for i in range(model.chains[world].link_count):
         write_link(K, model, world, i, factor)
-        i += 1
 
 
 @wp.func
@@ -109,8 +107,7 @@ def crossing_time(speed: wp.float64, gravity: wp.float64, radius: wp.float64, he
 def drag_shape(K: Rows, chain: Chain, left: wp.float64):
     """Multiplies the part of each link's velocity that is across the path of the loop by ``left``."""
     n = chain.link_count
-    i = int(0)
-    while i < n:
+    for i in range(n):
         before = wp.where(i == 0, n - 1, i - 1)
         after = wp.where(i == n - 1, 0, i + 1)
         # sines of the turns to the neighbours: their sum is the second difference of θ to third order
@@ -122,4 +119,3 @@ def drag_shape(K: Rows, chain: Chain, left: wp.float64):
         across = (left - ONE) * (K[V, i] * cosine - K[U, i] * sine)
         K[U, i] = K[U, i] - across * sine
         K[V, i] = K[V, i] + across * cosine
-        i += 1

@@ -23,7 +23,7 @@ from warpchain.inputs.scene import Scene, link_values
 from warpchain.inputs.state import Setup
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.list_layout import list_layout
-from warpchain.kernels.cpu.rows import scratch_rows
+from warpchain.kernels.cpu.implicit.rigid_layout import scratch_rows
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.functions import board_rows
 from warpchain.kernels.types import LOADING_TIME, Drive, Model, Record, State

@@ -14,7 +14,7 @@ from warpchain.kernels.cpu.contacts.proximity import fixed_contacts
 from warpchain.kernels.cpu.contacts.self_contacts import self_contacts
 from warpchain.kernels.cpu.joints import Joints
 from warpchain.kernels.cpu.upright import Plane
-from warpchain.kernels.events.tallies import add_count, book_loss, count_bounce, of_fixed_body, raise_extreme
+from warpchain.kernels.events.tallies import add_count, book_loss, note_floor_impulse, of_fixed_body, raise_extreme
 from warpchain.kernels.features import Features
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.types import Chain, Control, Drive, Ground, Integers, Row, Rows, State
@@ -48,8 +48,7 @@ def body_pass(features: Features, plane: Plane):
             add_count(state, world, count, impulses)
             if wp.static(has_floor):
                 if impulses > wp.int64(0):
-                    count_bounce(state, world, time, state.watch[world, layout.LAST_FLOOR_IMPULSE])
-                    state.watch[world, layout.LAST_FLOOR_IMPULSE] = time
+                    note_floor_impulse(state, world, time)
         if wp.static(moves):
             moved = sprocket_at(Face(), drive, world, time)
             overlap = -sprocket_gap(K, chain, ground, moved)

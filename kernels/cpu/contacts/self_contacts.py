@@ -17,6 +17,9 @@ import functools
 import warp as wp
 
 from warpchain.kernels.contacts.link_pair import (
+    B_T,
+    DEPTH,
+    Contact,
     are_neighbours,
     are_strands,
     circles_of_links,
@@ -28,15 +31,15 @@ from warpchain.kernels.contacts.link_pair import (
 from warpchain.kernels.contacts.list_layout import GEOMETRY_COLUMNS, GEOMETRY_ROWS, list_layout
 from warpchain.kernels.layout import LEFT_X, LEFT_Y, RADIUS, RIGHT_X, RIGHT_Y, X, Y
 from warpchain.kernels.physics.elementary import TWO, ZERO, order_bits
+from warpchain.kernels.physics.geometry import two
 from warpchain.kernels.types import Chain, Integers, Rows
 
 # Rows of the CPU's scratch of contacts, one column per pair of joints. First four circles, the left-hand and the
 # right-hand one of joint p, likewise of joint q: its own centre [m], the centre of mass of its link [m] and its radius.
 P_LEFT_HAND, P_RIGHT_HAND, Q_LEFT_HAND, Q_RIGHT_HAND = 0, 5, 10, 15
 END_X, END_Y, CENTER_X, CENTER_Y, END_RADIUS = range(5)
-# Then the two contacts of a half, each with the numbers that circles_of_links returns.
+# Then the two contacts of a half, each as a Contact.
 FIRST_CONTACT, SECOND_CONTACT = 20, 27
-DEPTH, NORMAL_X, NORMAL_Y, A_N, A_T, B_N, B_T = range(7)
 
 
 @wp.func
@@ -101,14 +104,10 @@ def self_contacts(columns: int):
             contact = circles_of_links(
                 G[a + END_RADIUS, k],
                 G[b + END_RADIUS, k],
-                G[a + END_X, k],
-                G[a + END_Y, k],
-                G[b + END_X, k],
-                G[b + END_Y, k],
-                G[a + CENTER_X, k],
-                G[a + CENTER_Y, k],
-                G[b + CENTER_X, k],
-                G[b + CENTER_Y, k],
+                two(G, a + END_X, k),
+                two(G, b + END_X, k),
+                two(G, a + CENTER_X, k),
+                two(G, b + CENTER_X, k),
             )
             G[row + DEPTH, k] = wp.where(are_neighbours(link_a, link_b, chain.link_count), ZERO, contact[DEPTH])
             for number in range(1, wp.static(B_T + 1)):
@@ -154,30 +153,11 @@ def self_contacts(columns: int):
                         if depth > ZERO:
                             deepest = wp.max(deepest, order_bits(depth))
                             link_a, link_b = links_of(p, q, half, second, chain.link_count)
-                            inverse_nn, inverse_determinant = divisors(
-                                K,
-                                link_a,
-                                link_b,
-                                G[row + A_N, k],
-                                G[row + A_T, k],
-                                G[row + B_N, k],
-                                G[row + B_T, k],
-                            )
-                            energy, hits = collide(
-                                K,
-                                chain,
-                                link_a,
-                                link_b,
-                                G[row + NORMAL_X, k],
-                                G[row + NORMAL_Y, k],
-                                G[row + A_N, k],
-                                G[row + A_T, k],
-                                G[row + B_N, k],
-                                G[row + B_T, k],
-                                inverse_nn,
-                                inverse_determinant,
-                                depth,
-                            )
+                            contact = Contact()
+                            for number in range(wp.static(B_T + 1)):
+                                contact[number] = G[row + number, k]
+                            inverse_nn, inverse_determinant = divisors(K, link_a, link_b, contact)
+                            energy, hits = collide(K, chain, link_a, link_b, contact, inverse_nn, inverse_determinant)
                             lost += energy
                             impulses += hits
                             if are_strands(link_a, link_b, chain.link_count):

@@ -8,8 +8,10 @@ import functools
 
 import warp as wp
 
+from warpchain.kernels import layout
 from warpchain.kernels.cpu.implicit.solver import SegmentLayout, segment_columns, segment_places
 from warpchain.kernels.methods import w_tableaus
+from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.types import Chain, Rows
 
 # Rows in segment order. The state; constants of the links and joints, in the order of the scratch.
@@ -33,9 +35,12 @@ FORCES = SegmentLayout(size=2, matrix=STAGE + 6 * w_tableaus.STAGES)
 FRICTION = SegmentLayout(size=3, matrix=FORCES.end)
 
 
-def flight_rows(columns: int) -> int:
-    """Rows of a chain's scratch of this width that a flight takes."""
-    return -(-FRICTION.end * segment_columns(columns) // columns)
+def scratch_rows(name: str, columns: int) -> int:
+    """Rows of a chain's scratch of this width, for a method; those of a flight lie behind those of its springs."""
+    method = find_method(name)
+    rows = layout.scratch_rows(method.tableau.stages)
+    of_flight = -(-FRICTION.end * segment_columns(columns) // columns)
+    return rows + of_flight if method.has_rigid_flight else rows
 
 
 @functools.cache

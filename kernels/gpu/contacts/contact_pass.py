@@ -7,7 +7,7 @@ import warp as wp
 from warpchain.kernels import layout
 from warpchain.kernels.codes import LIST_OVERFLOW, RUNNING
 from warpchain.kernels.contacts.list_layout import list_layout
-from warpchain.kernels.events.tallies import add_count, count_bounce
+from warpchain.kernels.events.tallies import add_count, note_floor_impulse
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.board import publish, raise_value
 from warpchain.kernels.gpu.contacts.neighbour_list import block_list
@@ -40,7 +40,6 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
     build_list = block_list(features.columns, block_dim)
     clear_contacts, find_contacts, resolve_contacts = block_self_contacts(features.columns, block_dim, touch)
     meet_sprocket = block_contact("moving sprocket")
-    values = layout.BOARD_VALUES
 
     @wp.func
     def list_pairs(run: Run, control: Control, opening: wp.float32):
@@ -113,8 +112,7 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
                 raise_value(run.K, layout.VALUE_FIXED_DEPTH, -gap)
                 if wp.static(has_floor):
                     if is_hit:
-                        count_bounce(state, run.world, time, run.K[wp.static(values), layout.VALUE_LAST_IMPULSE])
-                        run.K[wp.static(values), layout.VALUE_LAST_IMPULSE] = time
+                        note_floor_impulse(state, run.world, time)
         if wp.static(has_self):
             if is_stale:
                 if lane == 0:

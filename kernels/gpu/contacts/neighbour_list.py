@@ -17,12 +17,7 @@ from warpchain.kernels.types import Integers, Rows
 
 @functools.cache
 def block_list(columns: int, block_dim: int):
-    """Warp function that builds the list of a chain and returns the number of pairs; above capacity it overflows.
-
-    Args:
-        columns: Width of the scratch, which sets the layout of the list.
-        block_dim: Threads in a block.
-    """
+    """Warp function that builds the list of a chain and returns the number of pairs; above capacity it overflows."""
     lists = list_layout(columns)
 
     @wp.func
@@ -56,10 +51,8 @@ def block_list(columns: int, block_dim: int):
         square = reach * reach
         if lane == 0:
             L[wp.static(lists.count)] = 0
-        i = lane
-        while i < wp.static(lists.table):
+        for i in range(lane, wp.static(lists.table), wp.static(block_dim)):
             L[wp.static(lists.bucket) + i] = -1
-            i += wp.static(block_dim)
         barrier()
         if lane < n:
             K[BOARD_LISTED_X, lane] = K[RIGHT_X, lane]

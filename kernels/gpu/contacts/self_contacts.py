@@ -16,7 +16,16 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from warpchain.kernels.contacts.link_pair import are_strands, collide, links_of, natural, touching_circles
+from warpchain.kernels.contacts.link_pair import (
+    B_T,
+    DEPTH,
+    Contact,
+    are_strands,
+    collide,
+    links_of,
+    natural,
+    touching_circles,
+)
 from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.gpu.stage import Run
 from warpchain.kernels.gpu.threads import barrier, barrier_count
@@ -41,10 +50,9 @@ class TouchLayout:
     pairs: int  # see ``shared_pairs``
     touching: int  # number of touching pairs of joints
     votes: int  # see :func:`gpu.threads.barrier_count`
-    fixed_hits: int  # impulses with floor or sprocket in this launch
-    self_hits: int  # impulses between links in this launch
+    fixed_hits: int  # impulses with floor or sprocket that are not booked yet
+    self_hits: int  # likewise between links
     strand_hits: int  # those between strands of the loop
-    mailbox: int  # A status from one thread to all
     deepest: int  # greatest depth of a contact in this launch [m], bits of a single-precision number
     is_late: int  # 1 when the launch has lasted long enough
     size: int  # integers from the row's start to the end of the last
@@ -54,7 +62,7 @@ class TouchLayout:
 def touch_layout(columns: int, block_dim: int, in_lists: bool) -> TouchLayout:
     """Layout for shared memory of its own, a pair per thread, or inside the scratch parts of the list's row."""
     width, shared_pairs = (columns, 0) if in_lists else (block_dim, block_dim)
-    single = ("touching", "votes", "fixed_hits", "self_hits", "strand_hits", "mailbox", "deepest", "is_late")
+    single = ("touching", "votes", "fixed_hits", "self_hits", "strand_hits", "deepest", "is_late")
     integers = consecutive_offsets(
         list_layout(columns).owners if in_lists else 0,
         **{"owners": 3 * width, "pairs": shared_pairs} | dict.fromkeys(single, 1),
@@ -141,25 +149,19 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         It is called when not every contact has a thread of its own. A thread's first contact takes other code than
         further ones, which rounds differently; so that choice must not depend on the order in which pairs were found.
         """
-        k = lane
-        while k < touching:
+        for k in range(lane, touching, wp.static(block_dim)):
             pair = pair_at(L, T, k)
             rank = int(0)
-            other = int(0)
-            while other < touching:
+            for other in range(touching):
                 rank += wp.where(pair_at(L, T, other) < pair, 1, 0)
-                other += 1
             L[wp.static(lists.pending) + rank] = pair
-            k += wp.static(block_dim)
         barrier()
-        k = lane
-        while k < touching:
+        for k in range(lane, touching, wp.static(block_dim)):
             pair = L[wp.static(lists.pending) + k]
             if k < wp.static(touch.shared_pairs):
                 T[wp.static(touch.pairs) + k] = pair
             else:
                 L[wp.static(lists.touching) + k] = pair
-            k += wp.static(block_dim)
         barrier()
 
     @wp.func
@@ -171,8 +173,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         lane = run.lane
         reach = TWO * chain.circle_radius + TWO * opening
         square = reach * reach
-        k = lane
-        while k < pairs:
+        for k in range(lane, pairs, wp.static(block_dim)):
             p = L[wp.static(lists.first) + k]
             q = L[wp.static(lists.second) + k]
             dx = K[RIGHT_X, q] - K[RIGHT_X, p]
@@ -183,7 +184,6 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
                     T[wp.static(touch.pairs) + slot] = pair_key(p, q)
                 else:
                     L[wp.static(lists.touching) + slot] = pair_key(p, q)
-            k += wp.static(block_dim)
         barrier()
         touching = T[wp.static(touch.touching)]
         if 2 * touching > wp.static(block_dim):
@@ -209,16 +209,14 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         E = run.E
         F = run.F
         lane = run.lane
-        depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = circles_at(run.K, chain, key)
+        contact, inverse_nn, inverse_determinant = circles_at(run.K, chain, key)
+        depth = contact[DEPTH]
         own = int(DONE)
         if depth > ZERO:
             own = key
-            E[0, lane] = nx
-            E[1, lane] = ny
-            E[2, lane] = a_n
-            E[3, lane] = a_t
-            E[4, lane] = b_n
-            F[0, lane] = b_t
+            for k in range(5):
+                E[k, lane] = contact[1 + k]
+            F[0, lane] = contact[B_T]
             F[1, lane] = inverse_nn
             F[2, lane] = inverse_determinant
             raise_depth(run.T, depth)
@@ -232,21 +230,8 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         F = run.F
         lane = run.lane
         lost_before = K[BOARD_LOST_SELF, link_a]
-        lost, hits = collide(
-            K,
-            chain,
-            link_a,
-            link_b,
-            E[0, lane],
-            E[1, lane],
-            E[2, lane],
-            E[3, lane],
-            E[4, lane],
-            F[0, lane],
-            F[1, lane],
-            F[2, lane],
-            depth,
-        )
+        contact = Contact(depth, E[0, lane], E[1, lane], E[2, lane], E[3, lane], E[4, lane], F[0, lane])
+        lost, hits = collide(K, chain, link_a, link_b, contact, F[1, lane], F[2, lane])
         K[BOARD_LOST_SELF, link_a] = lost_before + lost
         count_strands(run.T, chain, link_a, link_b, hits)
         return int(hits)
@@ -254,18 +239,16 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
     @wp.func
     def overlaps(run: Run, chain: Chain, key: int):
         """1 if the circles of a further contact overlap, else 0; raises the greatest depth."""
-        depth, _nx, _ny, _a_n, _a_t, _b_n, _b_t, _inverse_nn, _inverse_determinant = circles_at(run.K, chain, key)
-        raise_depth(run.T, depth)
-        return wp.where(depth > ZERO, 1, 0)
+        contact, _inverse_nn, _inverse_determinant = circles_at(run.K, chain, key)
+        raise_depth(run.T, contact[DEPTH])
+        return wp.where(contact[DEPTH] > ZERO, 1, 0)
 
     @wp.func
     def resolve_further(run: Run, chain: Chain, key: int, link_a: int, link_b: int):
         """Resolves a further contact; returns the number of impulses."""
         K = run.K
-        depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = circles_at(K, chain, key)
-        lost, hits = collide(
-            K, chain, link_a, link_b, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant, depth
-        )
+        contact, inverse_nn, inverse_determinant = circles_at(K, chain, key)
+        lost, hits = collide(K, chain, link_a, link_b, contact, inverse_nn, inverse_determinant)
         K[BOARD_LOST_SELF, link_a] = K[BOARD_LOST_SELF, link_a] + lost
         count_strands(run.T, chain, link_a, link_b, hits)
         return int(hits)
@@ -290,8 +273,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         in_turn = 4 * touching > wp.static(block_dim)
         if not in_turn:
             contacts = 4 * touching
-        turn = int(0)
-        while turn < wp.where(in_turn, 2, 1):
+        for turn in range(wp.where(in_turn, 2, 1)):
             own_key = int(DONE)
             own_depth = wp.float64(0.0)
             if lane < contacts:
@@ -338,7 +320,6 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
                 owners = next_owners
                 next_owners = last_owners
                 last_owners = used
-            turn += 1
         return impulses
 
     return clear, find, resolve
