@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 FIRST_STEP = 1e-7  # s; it may grow fivefold per step
 LANES = 3
 """Streams on which kernels for different chain lengths run side by side: chains of one length do not fill a GPU."""
-LAUNCH_SECONDS = 0.1  # s, after which a launch on a GPU ends, progress is shown and Ctrl-C noticed
+LAUNCH_SECONDS = 0.05  # s, after which a launch on a GPU ends, progress is shown and Ctrl-C noticed
 ATTEMPTS = {"cpu": 5_000, "gpu": 200_000}
 """Most attempts of each chain per launch, by kind of device; what a walk gives does not depend on it.
 

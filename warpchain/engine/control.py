@@ -20,7 +20,7 @@ into the floor. From 0.9 of the area 1e6 N/m may shift Δx: by 8 ± 4 mm of 1 m 
 STIFFENING_TIME = 0.03
 """Time [s] in which joints that were soft on the sprocket return to their own values after the release."""
 
-PILE_PUSH = 1e3
+PILE_PUSH = 100.0
 """Rate [1/s] of the push by floor and links while joints are soft or softer.
 
 Without it circles that joints press on sink deeper in every step. In 12,800 walks with `explicit` (60 to 180 links, 5
