@@ -1,9 +1,9 @@
 """What the push of floor and links in the pile does to the distance of slow long chains.
 
     python -m studies.phase_diagram.push                    # prints the table of the page
-    python -m studies.phase_diagram.push FOLDER WITHOUT     # first reduces sweeps of sweeps/push.yaml
+    python -m studies.phase_diagram.push FOLDER FAST WITHOUT    # first reduces sweeps of sweeps/push.yaml
 
-WITHOUT is of an engine without the push. Walks are compared one by one with those of joints that do not soften.
+FAST is of an engine that pushes ten times as fast, WITHOUT of one that does not push. Walks are compared one by one with those of joints that do not soften.
 """
 
 import csv
@@ -17,17 +17,22 @@ from studies.common import at_rest, mean, standard_error, write_rows
 from studies.common import table as markdown
 
 RESULTS = Path(__file__).parent / "results"
-GROUPS = {"today": "today", "without": "without the push", "stiff": "with joints of their own in the pile"}
+GROUPS = {
+    "today": "today",
+    "fast": "with ten times the push",
+    "without": "without the push",
+    "stiff": "with joints of their own in the pile",
+}
 BANDS = (("100 to 160 links", 100, 160), ("220 and 240 links", 220, 240))
 Cells = dict[tuple[str, str], tuple[float, float]]
 
 
 def reduce(*folders: str) -> None:
     """Write Δx of each cell of each group, and how much further its walks go than the same with stiff joints."""
-    today, without = (at_rest(next(iter(warpchain.load(folder).blocks.values()))) for folder in folders)
-    stiff = today.sel(soften_pile=False)
+    sweeps = [at_rest(next(iter(warpchain.load(folder).blocks.values()))) for folder in folders]
+    stiff = sweeps[0].sel(soften_pile=False)
     rows = []
-    for group, dx in zip(GROUPS, (today.sel(soften_pile=True), without.sel(soften_pile=True), stiff), strict=True):
+    for group, dx in zip(GROUPS, [*(sweep.sel(soften_pile=True) for sweep in sweeps), stiff], strict=True):
         for i, links in enumerate(dx.links.values.tolist()):
             for j, frequency in enumerate(dx.frequency.values.tolist()):
                 row = {"group": group, "links": links, "frequency": frequency}
@@ -78,10 +83,11 @@ def table() -> str:
     for group, title in GROUPS.items():
         beside = "" if group == "stiff" else further(cells_of(own, group, "more", "more_se"), stiff)
         rows.append([title, over(cells_of(own, group, "dx", "dx_se"), million), beside])
-    more = cells_of(own, "today", "more", "more_se")
-    for name, fewest, most in BANDS:
-        band = {key: value for key, value in more.items() if fewest <= int(key[0]) <= most}
-        rows.append([f"today, {name}", "", further(band, stiff)])
+    for group in ("today", "fast"):
+        more = cells_of(own, group, "more", "more_se")
+        for name, fewest, most in BANDS:
+            band = {key: value for key, value in more.items() if fewest <= int(key[0]) <= most}
+            rows.append([f"{GROUPS[group]}, {name}", "", further(band, stiff)])
     return markdown("walks | over the million | over the same walks with joints of their own", rows)
 
 

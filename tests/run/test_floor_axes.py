@@ -109,3 +109,10 @@ def test_refusals(grid: dict[str, Any], message: str) -> None:
     """The message names the value on the axis, by its name if it has one, and says what to do."""
     with pytest.raises(InputError, match=rf"^sweep\.grid\.{message}"):
         load_sweep(content(samples=1, scene={"start": "ellipse"}, grid=grid))
+
+
+@pytest.mark.parametrize("floors", [["flat", STEP], [STEP, STEP[:2]]])
+def test_several_values_by_keyword_need_names(floors: list[Any]) -> None:
+    """As an axis of a file does."""
+    with pytest.raises(InputError, match=r"^sweep\.grid\.floor: no names; give each value one, .*"):
+        sweep_of_keywords({"links": 36, "frequency": 20, "floor": floors}, None)

@@ -88,10 +88,14 @@ def named_axis(kind: Any) -> Any:
 
 def is_axis(name: str, given: object) -> bool:
     """Whether a list or mapping that is given for a field by its name is an axis, and no value of the field."""
-    if not isinstance(given, dict):
-        return isinstance(given, list) and name not in COMPOUND
-    try:
-        checked(given, name, Annotated[FIELDS[name].annotation, Field(), *FIELDS[name].metadata])
-    except InputError:
+
+    def is_value(value: object) -> bool:
+        try:
+            checked(value, name, Annotated[FIELDS[name].annotation, Field(), *FIELDS[name].metadata])
+        except InputError:
+            return False
         return True
-    return False
+
+    if isinstance(given, list) and name in COMPOUND:  # of values without names, which an axis refuses
+        return not is_value(given) and bool(given) and all(map(is_value, given))
+    return isinstance(given, list) or (isinstance(given, dict) and not is_value(given))
