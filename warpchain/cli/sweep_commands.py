@@ -56,6 +56,10 @@ def sweep(
         raise InputError("FILE.yaml: missing; give a sweep file, or --new FILE.yaml to have one written")
     if folder is None:
         raise InputError("--output: missing; give a folder for the results with -o DIR")
+    if device is not None and device.startswith("cuda") and gpus is None:
+        from warpchain.engine.devices import start_early
+
+        start_early(device)
     from warpchain.cli.terminal import print_sweep
     from warpchain.run.gpu_workers import gpu_workers
     from warpchain.run.sweep_run import sweep as run

@@ -166,6 +166,19 @@ def _started(device: str) -> Device:
     return Gpu(found) if found.is_cuda else Device(found)
 
 
+def start_early(device: str) -> None:
+    """Begin to start a GPU in a thread: that takes half a second, in which the caller may import, and read files.
+
+    What goes wrong is told to who asks for the device, for whom :func:`start_device` tries again.
+    """
+
+    def start() -> None:
+        with gpu_turn([device]):
+            start_device(device).prepare()
+
+    concurrent.futures.ThreadPoolExecutor(1).submit(start)
+
+
 def gpu_count() -> int:
     """Number of GPUs that this process may use, from 1 on.
 
