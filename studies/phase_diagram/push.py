@@ -3,8 +3,8 @@
     python -m studies.phase_diagram.push                    # prints the table of the page
     python -m studies.phase_diagram.push FOLDER FAST WITHOUT    # first reduces sweeps of sweeps/push.yaml
 
-FAST is of an engine that pushes ten times as fast, WITHOUT of one that does not push. Walks are compared one by one with
-those of joints that do not soften.
+FAST is of an engine that pushes ten times as fast, WITHOUT of one that does not push. Walks are compared one by one
+with those of joints that do not soften.
 """
 
 import csv
