@@ -73,6 +73,18 @@ def test_the_release_is_at_its_clearance_from_the_profile():
         assert first == pytest.approx(0.02, abs=1e-4)
 
 
+@pytest.mark.parametrize("x", [0.0, 0.004, 0.008])
+def test_a_spike_below_the_side_of_a_link_is_cleared_as_well(x: float) -> None:
+    """The nearest place of a link, between its circles, too, is at the clearance, to 3 % of a link's length."""
+    spike = [[-1, -0.3], [x - 1e-3, -0.3], [x, 0], [x + 1e-3, -0.3], [1, -0.3]]
+    scene = {"start": "ellipse", "clearance": 2e-3, "floor": spike, "walk_until": 1e-4}
+    joints = warpchain.walk(links=24, preset="soft", method="explicit", **scene).frame_joints[0]
+    places = np.concatenate(
+        [joints + share * (np.roll(joints, -1, axis=0) - joints) for share in np.linspace(0, 1, 99)]
+    )
+    assert np.hypot(*(places - (x, 0)).T).min() - SOFT.circle_radius == pytest.approx(2e-3, abs=4e-4)
+
+
 def test_a_profile_survives_files_and_is_drawn(tmp_path: Path) -> None:
     """A saved walk has its floor; film strip and player draw the profile, the player in tenths of a millimetre."""
     walk = warpchain.walk(links=24, start="ellipse", preset="soft", method="explicit", floor=STEP)

@@ -153,7 +153,16 @@ class Floor:
             )
 
     def raised_by(self, circles: Array, radius: Array, clearance: float) -> float:
-        """How far circles (p, 2) of these radii must be raised for the nearest to be so far from the floor [m]."""
+        """How far links must be raised for the nearest to be so far from the floor [m]: a clearance.
+
+        Args:
+            circles: Their left circles, then their right ones, (2 n, 2); between them they are as broad.
+            radius: Of these, (2 n,).
+            clearance: Of the nearest place of a link [m]; above a corner it may be less by 3 % of a link's length.
+        """
+        begin, end = np.split(circles, 2)
+        circles = np.concatenate([circles, *(begin + share * (end - begin) for share in (0.25, 0.5, 0.75))])
+        radius = np.tile(radius[: len(begin)], 5)
         wanted, (left, bottom), (right, _) = clearance + radius.max(), circles.min(axis=0), circles.max(axis=0)
         high = self.line(left - wanted, right + wanted)[:, 1].max() + wanted - bottom
         while (excess := (self.distances(circles + np.array([0.0, high])) - (clearance + radius)).min()) > EXACT:
