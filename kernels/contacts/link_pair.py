@@ -53,12 +53,7 @@ def effective_masses(mass: wp.float64, inertia_a: wp.float64, inertia_b: wp.floa
 
 @wp.func
 def circles_of_links(
-    radius_a: wp.float64,
-    radius_b: wp.float64,
-    end_a: wp.vec2d,
-    end_b: wp.vec2d,
-    center_a: wp.vec2d,
-    center_b: wp.vec2d,
+    radius_a: wp.float64, radius_b: wp.float64, end_a: wp.vec2d, end_b: wp.vec2d, center_a: wp.vec2d, center_b: wp.vec2d
 ) -> Contact:
     """Geometry of the contact of a circle of link A and one of link B, without branches.
 
@@ -91,8 +86,7 @@ def divisors(K: Rows, link_a: int, link_b: int, contact: Contact):
     """1/W_nn [kg] and 1/det W [kg²] of a contact of two links."""
     mass = K[INVERSE_MASS, link_a] + K[INVERSE_MASS, link_b]
     w_nn, w_nt, w_tt = effective_masses(mass, K[INVERSE_INERTIA, link_a], K[INVERSE_INERTIA, link_b], contact)
-    inverse_nn, inverse_determinant = inverse_masses(w_nn, w_nt, w_tt)
-    return inverse_nn, inverse_determinant
+    return inverse_masses(w_nn, w_nt, w_tt)
 
 
 @wp.func
@@ -163,17 +157,10 @@ def collide(
         inertia_a = K[INVERSE_INERTIA, link_a]
         inertia_b = K[INVERSE_INERTIA, link_b]
         w_nn, w_nt, w_tt = effective_masses(mass_a + mass_b, inertia_a, inertia_b, contact)
+        e = chain.chain_restitution
+        mu = chain.chain_friction
         jn, jt = collision_impulse(
-            normal_speed,
-            tangential_speed,
-            w_nn,
-            w_nt,
-            w_tt,
-            inverse_nn,
-            inverse_determinant,
-            chain.chain_restitution,
-            chain.chain_friction,
-            chain.tangential_restitution,
+            chain, normal_speed, tangential_speed, w_nn, w_nt, w_tt, inverse_nn, inverse_determinant, e, mu
         )
         jx = jn * nx - jt * ny
         jy = jn * ny + jt * nx
