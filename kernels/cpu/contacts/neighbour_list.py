@@ -12,23 +12,16 @@ import warp as wp
 
 from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.contacts.pair_list import bucket_of, listing_reach
+from warpchain.kernels.cpu.contacts.proximity import greatest_distance
 from warpchain.kernels.layout import LISTED_X, LISTED_Y, RIGHT_X, RIGHT_Y
-from warpchain.kernels.physics.elementary import HALF, order_bits
-from warpchain.kernels.physics.geometry import whole_lanes
+from warpchain.kernels.physics.elementary import HALF
 from warpchain.kernels.types import Chain, Integers, Rows
 
 
 @wp.func
 def greatest_displacement(K: Rows, chain: Chain):
     """Greatest displacement [m] of a joint since the list was built."""
-    greatest = wp.int64(0)
-    i = int(0)
-    while i < whole_lanes(chain.link_count):
-        dx = K[RIGHT_X, i] - K[LISTED_X, i]
-        dy = K[RIGHT_Y, i] - K[LISTED_Y, i]
-        greatest = wp.max(greatest, wp.where(i < chain.link_count, order_bits(dx * dx + dy * dy), wp.int64(0)))
-        i += 1
-    return wp.sqrt(wp.cast(greatest, wp.float64))
+    return greatest_distance(K, chain, RIGHT_X, 0, LISTED_X)
 
 
 @functools.cache

@@ -25,16 +25,22 @@ GAP = layout.ERROR
 
 
 @wp.func
-def greatest_opening(K: Rows, chain: Chain):
-    """Greatest joint opening |C| [m] of the placed links."""
+def greatest_distance(K: Rows, chain: Chain, a: int, shift: int, b: int):
+    """Greatest distance [m] of two points of a link: rows a and a + 1 at i + shift, rows b and b + 1 at i."""
     greatest = wp.int64(0)
     i = int(0)
     while i < whole_lanes(chain.link_count):
-        cx = K[LEFT_X, i + 1] - K[RIGHT_X, i]
-        cy = K[LEFT_Y, i + 1] - K[RIGHT_Y, i]
-        greatest = wp.max(greatest, wp.where(i < chain.link_count, order_bits(cx * cx + cy * cy), wp.int64(0)))
+        dx = K[a, i + shift] - K[b, i]
+        dy = K[a + 1, i + shift] - K[b + 1, i]
+        greatest = wp.max(greatest, wp.where(i < chain.link_count, order_bits(dx * dx + dy * dy), wp.int64(0)))
         i += 1
     return wp.sqrt(wp.cast(greatest, wp.float64))
+
+
+@wp.func
+def greatest_opening(K: Rows, chain: Chain):
+    """Greatest joint opening |C| [m] of the placed links."""
+    return greatest_distance(K, chain, LEFT_X, 1, RIGHT_X)
 
 
 @wp.func

@@ -198,16 +198,22 @@ def opening_rates(S: Rows, chain: Chain):
 
 
 @wp.func
-def stretching(S: Rows, chain: Chain):
-    """Energy [J] of springs that are open by the right-hand side."""
+def sum_of_squares(S: Rows, row: int, chain: Chain):
+    """Σ (x² + y²) over the joints, of vectors in this row and the next."""
     total = ZERO
     c = int(8)
     while c < end_column(chain):
-        cx = S[RIGHT, c]
-        cy = S[RIGHT + 1, c]
-        total += S[at.COUNTED, c] * (cx * cx + cy * cy)
+        x = S[row, c]
+        y = S[row + 1, c]
+        total += S[at.COUNTED, c] * (x * x + y * y)
         c += 1
-    return HALF * chain.joint_stiffness * total
+    return total
+
+
+@wp.func
+def stretching(S: Rows, chain: Chain):
+    """Energy [J] of springs that are open by the right-hand side."""
+    return HALF * chain.joint_stiffness * sum_of_squares(S, RIGHT, chain)
 
 
 @wp.func
@@ -242,14 +248,7 @@ def kinetic_energy(S: Rows, chain: Chain):
 @wp.func
 def are_stiff(S: Rows, chain: Chain):
     """Whether springs would hold so little energy with the state's joint forces that they count as rigid."""
-    square = ZERO
-    c = int(8)
-    while c < end_column(chain):
-        fx = S[at.FORCE, c]
-        fy = S[at.FORCE + 1, c]
-        square += S[at.COUNTED, c] * (fx * fx + fy * fy)
-        c += 1
-    held = HALF * square / chain.joint_stiffness
+    held = HALF * sum_of_squares(S, at.FORCE, chain) / chain.joint_stiffness
     return held <= GREATEST_STRETCHING * kinetic_energy(S, chain)
 
 
