@@ -219,7 +219,7 @@ def link_touches(chain: Chain, slope: wp.float64, link: Touching):
 
 
 @wp.func
-def meet_tilting_floor(chain: Chain, slope: wp.float64, B: wp.mat33d, link: Touching) -> TiltingLink:
+def meet_floor(chain: Chain, slope: wp.float64, B: wp.mat33d, link: Touching) -> TiltingLink:
     """One link against the floor, its left roller first, together with its copy of the plane."""
     met = meet_roller(chain, slope, B, link, with_copy(chain, link), link.left_x, link.left_y)
     met = meet_roller(chain, slope, B, link, met, link.right_x, link.right_y)

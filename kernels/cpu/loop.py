@@ -122,10 +122,7 @@ def make_advance(features: Features):
             state.status[world] = STEP_TOO_SMALL
 
     @wp.kernel(
-        name="advance",
-        module="unique",
-        enable_backward=False,
-        module_options={"cpu_compiler_flags": COMPILER_FLAGS},
+        name="advance", module="unique", enable_backward=False, module_options={"cpu_compiler_flags": COMPILER_FLAGS}
     )
     def advance(
         worlds: Integers,

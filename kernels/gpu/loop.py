@@ -25,16 +25,7 @@ from warpchain.kernels.gpu.contacts.self_contacts import touch_layout
 from warpchain.kernels.gpu.explicit import explicit_attempt
 from warpchain.kernels.gpu.functions import board_size, shares_board
 from warpchain.kernels.gpu.run import block_run, block_sample
-from warpchain.kernels.gpu.stage import (
-    Attempt,
-    Run,
-    block_stage,
-    error_of,
-    read_link,
-    vec3d,
-    vec5d,
-    write_first_stage,
-)
+from warpchain.kernels.gpu.stage import Attempt, Run, block_stage, error_of, read_link, vec3d, vec5d, write_first_stage
 from warpchain.kernels.gpu.threads import barrier, block_maxima, tile_address, vec4i
 from warpchain.kernels.gpu.tilting import block_tilting
 from warpchain.kernels.gpu.upright import block_upright

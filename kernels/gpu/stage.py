@@ -213,16 +213,7 @@ def block_stage(features: Features, block_dim: int):
         forces[run.lane] = vec3d(force_x, force_y, torque)
         left = forces[run.before]
         ax, ay, at = link_acceleration(
-            inverse_mass,
-            inverse_inertia,
-            link.arm_x,
-            link.arm_y,
-            left[0],
-            left[1],
-            force_x,
-            force_y,
-            left[2],
-            torque,
+            inverse_mass, inverse_inertia, link.arm_x, link.arm_y, left[0], left[1], force_x, force_y, left[2], torque
         )
         felt = constants(K)
         if wp.static(features.tilts):

@@ -117,7 +117,7 @@ def motion_terms(K: Rows, i: int):
 
 
 @wp.func
-def invert_plane_mass(P: Row):
+def invert_mass(P: Row):
     """Writes the inverse of the plane's mass matrix, from the sums."""
     a00 = P[layout.SUM_MASS]
     a01 = P[SUM_MY]
@@ -258,7 +258,7 @@ def straightened(plane: Plane) -> Plane:
 
 
 @wp.func
-def begin_plane_step(P: Row, gravity: wp.float64, h: wp.float64):
+def begin_step(P: Row, gravity: wp.float64, h: wp.float64):
     """Writes the mean of the plane over a step, and its momenta after the first half."""
     half = HALF * h
     plane = read_plane(P, 0)
@@ -274,7 +274,7 @@ def begin_plane_step(P: Row, gravity: wp.float64, h: wp.float64):
 
 
 @wp.func
-def end_plane_step(P: Row, gravity: wp.float64, h: wp.float64):
+def end_step(P: Row, gravity: wp.float64, h: wp.float64):
     """Carries the plane to the end of the step that has begun; the sums must be those of the links there."""
     half = HALF * h
     inverse = ONE / h

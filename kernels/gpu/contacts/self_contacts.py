@@ -16,16 +16,8 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from warpchain.kernels.contacts.link_pair import (
-    B_T,
-    DEPTH,
-    Contact,
-    are_strands,
-    collide,
-    links_of,
-    natural,
-    touching_circles,
-)
+from warpchain.kernels.contacts import link_pair
+from warpchain.kernels.contacts.link_pair import B_T, DEPTH, Contact, natural
 from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.gpu.stage import Run
 from warpchain.kernels.gpu.threads import barrier, barrier_count
@@ -93,14 +85,14 @@ def joints_of(key: int):
 def links_at(key: int, n: int):
     """The two links of a contact."""
     p, q, half = joints_of(key)
-    return links_of(p, q, half & 1, key & 1, n)
+    return link_pair.links_of(p, q, half & 1, key & 1, n)
 
 
 @wp.func
 def circles_at(K: Rows, chain: Chain, key: int):
     """The geometry of a contact, see :func:`contacts.link_pair.touching_circles`."""
     p, q, half = joints_of(key)
-    return touching_circles(K, chain, p, q, half, key & 1)
+    return link_pair.touching_circles(K, chain, p, q, half, key & 1)
 
 
 @wp.func
@@ -195,11 +187,6 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         wp.atomic_max(T, wp.static(touch.deepest), wp.cast(wp.float32(depth), wp.int32))
 
     @wp.func
-    def count_strands(T: Integers, chain: Chain, link_a: int, link_b: int, hits: wp.int64):
-        if are_strands(link_a, link_b, chain.link_count):
-            wp.atomic_add(T, wp.static(touch.strand_hits), int(hits))
-
-    @wp.func
     def prepare(run: Run, chain: Chain, key: int):
         """Stores the geometry of a thread's first contact.
 
@@ -223,18 +210,24 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         return own, depth
 
     @wp.func
+    def hit(run: Run, chain: Chain, a: int, b: int, contact: Contact, inverse_nn: wp.float64, inverse_det: wp.float64):
+        """Resolves a contact of links A and B; returns the number of impulses."""
+        K = run.K
+        lost_before = K[BOARD_LOST_SELF, a]
+        lost, hits = link_pair.collide(K, chain, a, b, contact, inverse_nn, inverse_det)
+        K[BOARD_LOST_SELF, a] = lost_before + lost
+        if link_pair.are_strands(a, b, chain.link_count):
+            wp.atomic_add(run.T, wp.static(touch.strand_hits), int(hits))
+        return int(hits)
+
+    @wp.func
     def resolve_prepared(run: Run, chain: Chain, link_a: int, link_b: int, depth: wp.float64):
         """Resolves a thread's first contact; returns the number of impulses."""
-        K = run.K
         E = run.E
         F = run.F
         lane = run.lane
-        lost_before = K[BOARD_LOST_SELF, link_a]
         contact = Contact(depth, E[0, lane], E[1, lane], E[2, lane], E[3, lane], E[4, lane], F[0, lane])
-        lost, hits = collide(K, chain, link_a, link_b, contact, F[1, lane], F[2, lane])
-        K[BOARD_LOST_SELF, link_a] = lost_before + lost
-        count_strands(run.T, chain, link_a, link_b, hits)
-        return int(hits)
+        return hit(run, chain, link_a, link_b, contact, F[1, lane], F[2, lane])
 
     @wp.func
     def overlaps(run: Run, chain: Chain, key: int):
@@ -246,12 +239,8 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
     @wp.func
     def resolve_further(run: Run, chain: Chain, key: int, link_a: int, link_b: int):
         """Resolves a further contact; returns the number of impulses."""
-        K = run.K
-        contact, inverse_nn, inverse_determinant = circles_at(K, chain, key)
-        lost, hits = collide(K, chain, link_a, link_b, contact, inverse_nn, inverse_determinant)
-        K[BOARD_LOST_SELF, link_a] = K[BOARD_LOST_SELF, link_a] + lost
-        count_strands(run.T, chain, link_a, link_b, hits)
-        return int(hits)
+        contact, inverse_nn, inverse_determinant = circles_at(run.K, chain, key)
+        return hit(run, chain, link_a, link_b, contact, inverse_nn, inverse_determinant)
 
     @wp.func
     def resolve(run: Run, chain: Chain, touching: int):
