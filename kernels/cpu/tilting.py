@@ -30,16 +30,12 @@ TOUCHES = SUMS + SUMMED_IN_CONTACT
 @wp.func_native("""
     const ::wp::float64* values = &K.data[row * (K.strides[0] / sizeof(::wp::float64))];
     ::wp::float64 sums[8] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
-    for (int i = 0; i < count; i += 8) {
-        for (int lane = 0; lane < 8; ++lane) {
-            sums[lane] += values[i + lane];
-        }
-    }
+    for (int i = 0; i < count; i += 8)
+        for (int lane = 0; lane < 8; ++lane) sums[lane] += values[i + lane];
     return ((sums[0] + sums[1]) + (sums[2] + sums[3])) + ((sums[4] + sums[5]) + (sums[6] + sums[7]));
 """)
 def row_sum(K: Rows, row: int, count: int) -> wp.float64:
     """Sum of the first ``count`` columns of a row, a multiple of 8; in pure Warp clang adds one after the other."""
-    ...
 
 
 @wp.func

@@ -14,9 +14,10 @@ from warpchain.kernels.gpu.contacts.proximity import touching_link
 from warpchain.kernels.gpu.stage import Run, constants, felt_plane
 from warpchain.kernels.gpu.threads import barrier, barrier_count, warp_width
 from warpchain.kernels.gpu.upright import BlockPlane
-from warpchain.kernels.layout import BOARD_VALUES, OMEGA, PLANE_MID, U, V
+from warpchain.kernels.layout import BOARD_VALUES, PLANE_MID, U
 from warpchain.kernels.physics import plane
 from warpchain.kernels.physics.elementary import ZERO
+from warpchain.kernels.physics.geometry import put
 from warpchain.kernels.types import Drive, Row, with_circles
 
 SUMS = layout.SUMS_OF_PLACES + layout.SUMS_OF_MOTION
@@ -67,7 +68,6 @@ def add_up(memory: Row, lane: int, block_dim: int, x: vec8d):
 
     After a barrier :func:`added_up` reads the sums over the block.
     """
-    ...
 
 
 @wp.func
@@ -166,9 +166,7 @@ def block_tilting(block_dim: int, votes: int) -> BlockPlane:
             if touches > wp.int64(0):
                 inverse = tilting_floor.copy_inverse(P, wp.float64(touching))
                 met = tilting_floor.meet_floor(chain, slope, inverse, link)
-                K[U, lane] = met.u
-                K[V, lane] = met.v
-                K[OMEGA, lane] = met.omega
+                put(K, U, lane, wp.vec3d(met.u, met.v, met.omega))
                 K[layout.BOARD_LOST_FIXED, lane] = K[layout.BOARD_LOST_FIXED, lane] + met.lost
                 summed[0] = met.push
                 summed[1] = met.moment_x

@@ -11,10 +11,11 @@ import functools
 import warp as wp
 
 from warpchain.kernels.contacts.list_layout import list_layout
-from warpchain.kernels.contacts.pair_list import bucket_of, listing_reach
+from warpchain.kernels.contacts.pair_list import bucket_of, listing_reach, square_distance
 from warpchain.kernels.cpu.contacts.proximity import greatest_distance
-from warpchain.kernels.layout import LISTED_X, LISTED_Y, RIGHT_X, RIGHT_Y
+from warpchain.kernels.layout import LISTED_X, RIGHT_X, RIGHT_Y
 from warpchain.kernels.physics.elementary import HALF
+from warpchain.kernels.physics.geometry import put, two
 from warpchain.kernels.types import Chain, Integers, Rows
 
 
@@ -65,8 +66,7 @@ def neighbour_list(columns: int):
             L[wp.static(lists.cell_y) + i] = cell_y
             L[wp.static(lists.next_joint) + i] = L[wp.static(lists.bucket) + bucket]
             L[wp.static(lists.bucket) + bucket] = i
-            K[LISTED_X, i] = K[RIGHT_X, i]
-            K[LISTED_Y, i] = K[RIGHT_Y, i]
+            put(K, LISTED_X, i, two(K, RIGHT_X, i))
             i += 1
         total = int(0)
         fits = bool(True)
@@ -81,9 +81,7 @@ def neighbour_list(columns: int):
                 # joints were put in ascending order, so a bucket is read in descending order
                 while q > p:
                     if L[wp.static(lists.cell_x) + q] == cell_x and L[wp.static(lists.cell_y) + q] == cell_y:
-                        dx = K[RIGHT_X, q] - K[RIGHT_X, p]
-                        dy = K[RIGHT_Y, q] - K[RIGHT_Y, p]
-                        if dx * dx + dy * dy < square:
+                        if square_distance(K, p, q) < square:
                             if total < wp.static(lists.capacity):
                                 # insertion keeps this joint's partners in ascending order
                                 k = total

@@ -16,7 +16,7 @@ from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.contacts.tilting_floor import greatest_across_speed
 from warpchain.kernels.layout import LEFT_X, LEFT_Y, LOST_FIXED, OMEGA, RADIUS, RIGHT_X, RIGHT_Y, SINE, U, V, X, Y
 from warpchain.kernels.physics.elementary import ONE, TWO, ZERO, from_order_key, order_bits, order_key
-from warpchain.kernels.physics.geometry import LANES, whole_lanes
+from warpchain.kernels.physics.geometry import LANES, put, whole_lanes
 from warpchain.kernels.types import Chain, Ground, Row, Rows, with_circles
 
 FURTHEST = wp.constant(wp.int64(2**63 - 1))
@@ -142,9 +142,7 @@ def fixed_contacts(fixed_body: str):
                         if K[GAP, i] >= ZERO:
                             continue
                     link = meet(with_circles(chain, K[RADIUS, i]), ground, face, placed_link(K, i))
-                    K[U, i] = link.u
-                    K[V, i] = link.v
-                    K[OMEGA, i] = link.omega
+                    put(K, U, i, wp.vec3d(link.u, link.v, link.omega))
                     K[LOST_FIXED, i] = link.lost
                     impulses += wp.where(i < chain.link_count, link.hits, wp.int64(0))
             first += LANES

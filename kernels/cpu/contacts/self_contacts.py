@@ -19,6 +19,7 @@ import warp as wp
 from warpchain.kernels.contacts import link_pair
 from warpchain.kernels.contacts.link_pair import B_T, DEPTH, Contact, are_neighbours, collide, natural
 from warpchain.kernels.contacts.list_layout import GEOMETRY_COLUMNS, GEOMETRY_ROWS, list_layout
+from warpchain.kernels.contacts.pair_list import square_distance
 from warpchain.kernels.layout import LEFT_X, LEFT_Y, RADIUS, RIGHT_X, RIGHT_Y, X, Y
 from warpchain.kernels.physics.elementary import TWO, ZERO, order_bits
 from warpchain.kernels.physics.geometry import two
@@ -58,11 +59,9 @@ def self_contacts(columns: int):
         while k < total:
             p = natural(L[wp.static(lists.first) + k])
             q = natural(L[wp.static(lists.second) + k])
-            dx = K[RIGHT_X, q] - K[RIGHT_X, p]
-            dy = K[RIGHT_Y, q] - K[RIGHT_Y, p]
             L[wp.static(lists.found_first) + touching] = p
             L[wp.static(lists.found_second) + touching] = q
-            touching += wp.where(dx * dx + dy * dy < square, 1, 0)
+            touching += wp.where(square_distance(K, p, q) < square, 1, 0)
             k += 1
         return touching
 

@@ -27,7 +27,7 @@ from warpchain.kernels.methods.controller import classical_controller
 from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.methods.w_tableaus import ERROR_ORDER
 from warpchain.kernels.physics.elementary import ONE, TWO, ZERO
-from warpchain.kernels.physics.geometry import put
+from warpchain.kernels.physics.geometry import put, two
 from warpchain.kernels.physics.load import weight
 from warpchain.kernels.types import Chain, Control, Rows, State
 
@@ -82,9 +82,7 @@ def joint_switch(columns: int, first_row: int):
         give = ONE / chain.joint_stiffness
         c = int(8)
         while c < end_column(chain):
-            cx = S[RIGHT, c] - give * S[FORCE, c]
-            cy = S[RIGHT + 1, c] - give * S[FORCE + 1, c]
-            put(S, RIGHT, c, wp.vec2d(cx, cy))
+            put(S, RIGHT, c, two(S, RIGHT, c) - give * two(S, FORCE, c))
             c += 1
         rigid.solve_joints(S, chain)
         rigid.push(S, BASE, chain)

@@ -24,7 +24,7 @@ from warpchain.kernels.cpu.implicit.rigid_layout import BASE, COSINE, FREE, INVE
 from warpchain.kernels.cpu.implicit.solver import cyclic_solver, end_column, link_at, segment_places
 from warpchain.kernels.layout import STAGES, X
 from warpchain.kernels.physics.elementary import HALF, ONE, ZERO, cos_sin, order_bits
-from warpchain.kernels.physics.geometry import Link, put, three
+from warpchain.kernels.physics.geometry import Link, put, three, two
 from warpchain.kernels.physics.joint import friction_torque
 from warpchain.kernels.physics.load import weight
 from warpchain.kernels.physics.rigid_joint import inward_pull, turning_share
@@ -226,7 +226,7 @@ def begin(S: Rows, chain: Chain):
     solve_forces(S, chain)
     c = int(8)
     while c < end_column(chain):
-        put(S, at.FORCE, c, wp.vec2d(S[RIGHT, c], S[RIGHT + 1, c]))
+        put(S, at.FORCE, c, two(S, RIGHT, c))
         put(S, at.BASE_RATE, c, three(S, at.RATE, c))
         c += 1
 

@@ -19,10 +19,12 @@ import warp as wp
 from warpchain.kernels.contacts import link_pair
 from warpchain.kernels.contacts.link_pair import B_T, DEPTH, Contact, natural
 from warpchain.kernels.contacts.list_layout import list_layout
+from warpchain.kernels.contacts.pair_list import square_distance
 from warpchain.kernels.gpu.stage import Run
 from warpchain.kernels.gpu.threads import barrier, barrier_count
-from warpchain.kernels.layout import BOARD_LOST_SELF, RIGHT_X, RIGHT_Y, consecutive_offsets
+from warpchain.kernels.layout import BOARD_LOST_SELF, consecutive_offsets
 from warpchain.kernels.physics.elementary import TWO, ZERO
+from warpchain.kernels.physics.geometry import put
 from warpchain.kernels.types import Chain, Integers, Rows
 
 JOINT_BITS = 11
@@ -127,12 +129,9 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
 
     @wp.func
     def pair_at(L: Integers, T: Integers, k: int):
-        pair = int(0)
         if k < wp.static(touch.shared_pairs):
-            pair = T[wp.static(touch.pairs) + k]
-        else:
-            pair = L[wp.static(lists.touching) + k]
-        return pair
+            return T[wp.static(touch.pairs) + k]
+        return L[wp.static(lists.touching) + k]
 
     @wp.func
     def order(L: Integers, T: Integers, lane: int, touching: int):
@@ -168,9 +167,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         for k in range(lane, pairs, wp.static(block_dim)):
             p = L[wp.static(lists.first) + k]
             q = L[wp.static(lists.second) + k]
-            dx = K[RIGHT_X, q] - K[RIGHT_X, p]
-            dy = K[RIGHT_Y, q] - K[RIGHT_Y, p]
-            if dx * dx + dy * dy < square:
+            if square_distance(K, p, q) < square:
                 slot = wp.atomic_add(T, wp.static(touch.touching), 1)
                 if slot < wp.static(touch.shared_pairs):
                     T[wp.static(touch.pairs) + slot] = pair_key(p, q)
@@ -193,8 +190,6 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         Returns:
             Its key, or DONE if the circles do not overlap, and its depth [m].
         """
-        E = run.E
-        F = run.F
         lane = run.lane
         contact, inverse_nn, inverse_determinant = circles_at(run.K, chain, key)
         depth = contact[DEPTH]
@@ -202,10 +197,8 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         if depth > ZERO:
             own = key
             for k in range(5):
-                E[k, lane] = contact[1 + k]
-            F[0, lane] = contact[B_T]
-            F[1, lane] = inverse_nn
-            F[2, lane] = inverse_determinant
+                run.E[k, lane] = contact[1 + k]
+            put(run.F, 0, lane, wp.vec3d(contact[B_T], inverse_nn, inverse_determinant))
             raise_depth(run.T, depth)
         return own, depth
 
