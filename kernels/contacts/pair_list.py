@@ -2,8 +2,9 @@
 
 import warp as wp
 
-from warpchain.kernels.layout import RIGHT_X, RIGHT_Y
+from warpchain.kernels.layout import RIGHT_X
 from warpchain.kernels.physics.elementary import TWO
+from warpchain.kernels.physics.geometry import two
 from warpchain.kernels.types import Chain, Rows
 
 
@@ -16,9 +17,8 @@ def listing_reach(chain: Chain, skin: wp.float64, opening: wp.float64):
 @wp.func
 def square_distance(K: Rows, p: int, q: int):
     """Square of the distance [m²] of two joints."""
-    dx = K[RIGHT_X, q] - K[RIGHT_X, p]
-    dy = K[RIGHT_Y, q] - K[RIGHT_Y, p]
-    return dx * dx + dy * dy
+    between = two(K, RIGHT_X, q) - two(K, RIGHT_X, p)
+    return between[0] * between[0] + between[1] * between[1]
 
 
 @wp.func

@@ -116,15 +116,13 @@ def meet_roller(
     """One roller against the floor, without branches."""
     inverse_mass = link.inverse_mass
     inverse_inertia = link.inverse_inertia
-    arm_x = circle_x - link.x
-    arm_y = circle_y - link.y
     inverse = ONE / wp.max(slope, SMALLEST)
     to_point_x = -chain.circle_radius * chain.up_x * inverse
     to_point_y = -chain.circle_radius * chain.up_y * inverse
     x = circle_x + to_point_x
     y = circle_y + to_point_y
-    lever_x = arm_x + to_point_x
-    lever_y = arm_y + to_point_y
+    lever_x = circle_x - link.x + to_point_x
+    lever_y = circle_y - link.y + to_point_y
     front, back = approaches(chain, slope, before, link, circle_x, circle_y)
     total = front + back
     hit = total > ZERO

@@ -47,8 +47,7 @@ def place_ends(K: Rows, chain: Chain):
         put(K, layout.COSINE, i, wp.vec2d(c, s))
         write_ends(K, i, K[X, i], K[Y, i], a * c, a * s)
         i += 1
-    K[layout.LEFT_X, n] = K[layout.LEFT_X, 0]
-    K[layout.LEFT_Y, n] = K[layout.LEFT_Y, 0]
+    put(K, layout.LEFT_X, n, two(K, layout.LEFT_X, 0))
 
 
 @wp.func
@@ -61,8 +60,7 @@ def begin_stages(K: Rows, chain: Chain):
     while i < lanes:
         write_motion(K, i, three(K, U, i), a * K[layout.COSINE, i], a * K[layout.SINE, i])
         i += 1
-    K[layout.LEFT_U, n] = K[layout.LEFT_U, 0]
-    K[layout.LEFT_V, n] = K[layout.LEFT_V, 0]
+    put(K, layout.LEFT_U, n, two(K, layout.LEFT_U, 0))
     K[layout.STAGE_SPIN, n] = K[layout.STAGE_SPIN, 0]
 
 
@@ -125,15 +123,16 @@ def explicit_method(tableau: Tableau, acceleration: Any):
         lanes = whole_lanes(n)
         i = int(0)
         while i < lanes:
-            cx = K[layout.LEFT_X, i + 1] - K[layout.RIGHT_X, i]
-            cy = K[layout.LEFT_Y, i + 1] - K[layout.RIGHT_Y, i]
-            cu = K[layout.LEFT_U, i + 1] - K[layout.RIGHT_U, i]
-            cv = K[layout.LEFT_V, i + 1] - K[layout.RIGHT_V, i]
+            opening = two(K, layout.LEFT_X, i + 1) - two(K, layout.RIGHT_X, i)
+            rate = two(K, layout.LEFT_U, i + 1) - two(K, layout.RIGHT_U, i)
             spin = K[layout.STAGE_SPIN, i] - K[layout.STAGE_SPIN, i + 1]
             torque = friction_torque(K[layout.VISCOUS, i], K[layout.COULOMB, i], spin, chain.inverse_smoothing)
-            put(K, layout.FORCE_X, i + 1, wp.vec3d(joint_force(chain, cx, cu), joint_force(chain, cy, cv), torque))
+            force_x = joint_force(chain, opening[0], rate[0])
+            force_y = joint_force(chain, opening[1], rate[1])
+            put(K, layout.FORCE_X, i + 1, wp.vec3d(force_x, force_y, torque))
             if needs_power:
-                put(K, row + 3, i, wp.vec2d(torque * spin, chain.joint_damping * (cu * cu + cv * cv)))
+                damping = chain.joint_damping * (rate[0] * rate[0] + rate[1] * rate[1])
+                put(K, row + 3, i, wp.vec2d(torque * spin, damping))
             i += 1
         put(K, layout.FORCE_X, 0, three(K, layout.FORCE_X, n))
         i = int(0)
@@ -177,10 +176,8 @@ def explicit_method(tableau: Tableau, acceleration: Any):
                 write_ends(K, i, K[X, i] + moved[0], K[Y, i] + moved[1], arm_x, arm_y)
                 write_motion(K, i, three(K, U, i) + h * change, arm_x, arm_y)
                 i += 1
-            K[layout.LEFT_X, n] = K[layout.LEFT_X, 0]
-            K[layout.LEFT_Y, n] = K[layout.LEFT_Y, 0]
-            K[layout.LEFT_U, n] = K[layout.LEFT_U, 0]
-            K[layout.LEFT_V, n] = K[layout.LEFT_V, 0]
+            put(K, layout.LEFT_X, n, two(K, layout.LEFT_X, 0))
+            put(K, layout.LEFT_U, n, two(K, layout.LEFT_U, 0))
             K[layout.STAGE_SPIN, n] = K[layout.STAGE_SPIN, 0]
             derivatives(K, chain, wp.static(STAGES + STAGE_ROWS * s), wp.static(power_needed[s]))
         # new state and error ratio
@@ -216,8 +213,7 @@ def explicit_method(tableau: Tableau, acceleration: Any):
 
     @wp.func
     def commit(K: Rows, chain: Chain, h: wp.float64):
-        n = chain.link_count
-        lanes = whole_lanes(n)
+        lanes = whole_lanes(chain.link_count)
         i = int(0)
         while i < lanes:
             power = wp.vec2d()

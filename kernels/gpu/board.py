@@ -34,7 +34,8 @@ def load_link(run: Run, state: State):
     if run.lane < run.links:
         for k in range(6):
             run.K[X + k, run.lane] = state.links[run.world, X + k, run.lane]
-    point(run.K, run.lane)
+    cosine, sine = cos_sin(run.K[THETA, run.lane])
+    put(run.K, COSINE, run.lane, wp.vec2d(cosine, sine))
 
 
 @wp.func
@@ -55,13 +56,6 @@ def write_attempt(run: Run, result: Attempt, h: wp.float64):
 def raise_value(K: Rows, value: int, x: wp.float32):
     """Raises one of the chain's values on the board to x; for one thread."""
     K[BOARD_VALUES, value] = wp.max(K[BOARD_VALUES, value], wp.float64(x))
-
-
-@wp.func
-def point(K: Rows, lane: int):
-    """Writes a link's direction, exactly, from its angle on the board."""
-    cosine, sine = cos_sin(K[THETA, lane])
-    put(K, COSINE, lane, wp.vec2d(cosine, sine))
 
 
 @wp.func

@@ -111,12 +111,6 @@ def read_link(K: Rows, column: int) -> Link:
 
 
 @wp.func
-def write_first_stage(K: Rows, column: int, first: vec5d):
-    """Writes a link's first stage of the next step on the board."""
-    geometry.put(K, layout.BOARD_FIRST, column, first)
-
-
-@wp.func
 def read_first_stage(K: Rows, column: int) -> vec5d:
     """A link's first stage, from the board."""
     first = vec5d()

@@ -16,7 +16,7 @@ from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.contacts.tilting_floor import greatest_across_speed
 from warpchain.kernels.layout import LEFT_X, LEFT_Y, LOST_FIXED, OMEGA, RADIUS, RIGHT_X, RIGHT_Y, SINE, U, V, X, Y
 from warpchain.kernels.physics.elementary import ONE, TWO, ZERO, from_order_key, order_bits, order_key
-from warpchain.kernels.physics.geometry import LANES, put, whole_lanes
+from warpchain.kernels.physics.geometry import LANES, put, two, whole_lanes
 from warpchain.kernels.types import Chain, Ground, Row, Rows, with_circles
 
 FURTHEST = wp.constant(wp.int64(2**63 - 1))
@@ -30,9 +30,9 @@ def greatest_distance(K: Rows, chain: Chain, a: int, shift: int, b: int):
     greatest = wp.int64(0)
     i = int(0)
     while i < whole_lanes(chain.link_count):
-        dx = K[a, i + shift] - K[b, i]
-        dy = K[a + 1, i + shift] - K[b + 1, i]
-        greatest = wp.max(greatest, wp.where(i < chain.link_count, order_bits(dx * dx + dy * dy), wp.int64(0)))
+        between = two(K, a, i + shift) - two(K, b, i)
+        square = between[0] * between[0] + between[1] * between[1]
+        greatest = wp.max(greatest, wp.where(i < chain.link_count, order_bits(square), wp.int64(0)))
         i += 1
     return wp.sqrt(wp.cast(greatest, wp.float64))
 

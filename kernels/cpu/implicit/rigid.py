@@ -112,13 +112,12 @@ def solve_joints(S: Rows, chain: Chain):
 @wp.func
 def pushed_at(S: Rows, a: wp.float64, c: int):
     """M⁻¹ Gᵀ P of a link: how the last solution P (forces, impulses or displacements) changes x, y and θ."""
-    left_x = S[RIGHT, c - 8]
-    left_y = S[RIGHT + 1, c - 8]
-    right_x = S[RIGHT, c]
-    right_y = S[RIGHT + 1, c]
-    lever = a * (S[COSINE, c] * (right_y + left_y) - S[SINE, c] * (right_x + left_x))
-    inverse_mass = S[INVERSE_MASS, c]
-    return wp.vec3d((right_x - left_x) * inverse_mass, (right_y - left_y) * inverse_mass, lever * S[INVERSE_INERTIA, c])
+    left = two(S, RIGHT, c - 8)
+    right = two(S, RIGHT, c)
+    both = right + left
+    lever = a * (S[COSINE, c] * both[1] - S[SINE, c] * both[0])
+    pushed = (right - left) * S[INVERSE_MASS, c]
+    return wp.vec3d(pushed[0], pushed[1], lever * S[INVERSE_INERTIA, c])
 
 
 @wp.func
@@ -174,10 +173,9 @@ def openings(S: Rows, chain: Chain):
     greatest = wp.int64(0)
     c = int(8)
     while c < end_column(chain):
-        cx = (S[BASE, c + 8] - S[BASE, c]) - a * (S[COSINE, c + 8] + S[COSINE, c])
-        cy = (S[BASE + 1, c + 8] - S[BASE + 1, c]) - a * (S[SINE, c + 8] + S[SINE, c])
-        put(S, RIGHT, c, wp.vec2d(cx, cy))
-        greatest = wp.max(greatest, order_bits(cx * cx + cy * cy))
+        opening = (two(S, BASE, c + 8) - two(S, BASE, c)) - a * (two(S, COSINE, c + 8) + two(S, COSINE, c))
+        put(S, RIGHT, c, opening)
+        greatest = wp.max(greatest, order_bits(opening[0] * opening[0] + opening[1] * opening[1]))
         c += 1
     return wp.sqrt(wp.cast(greatest, wp.float64))
 
@@ -203,9 +201,8 @@ def sum_of_squares(S: Rows, row: int, chain: Chain):
     total = ZERO
     c = int(8)
     while c < end_column(chain):
-        x = S[row, c]
-        y = S[row + 1, c]
-        total += S[at.COUNTED, c] * (x * x + y * y)
+        vector = two(S, row, c)
+        total += S[at.COUNTED, c] * (vector[0] * vector[0] + vector[1] * vector[1])
         c += 1
     return total
 

@@ -45,7 +45,6 @@ def block_list(columns: int, block_dim: int):
         K = run.K
         L = run.L
         lane = run.lane
-        n = run.links
         reach = listing_reach(constants(K), skin, opening)
         square = reach * reach
         if lane == 0:
@@ -53,7 +52,7 @@ def block_list(columns: int, block_dim: int):
         for i in range(lane, wp.static(lists.table), wp.static(block_dim)):
             L[wp.static(lists.bucket) + i] = -1
         barrier()
-        if lane < n:
+        if lane < run.links:
             put(K, BOARD_LISTED_X, lane, two(K, RIGHT_X, lane))
             cell_x = int(wp.floor(K[RIGHT_X, lane] / reach))
             cell_y = int(wp.floor(K[RIGHT_Y, lane] / reach))
@@ -62,7 +61,7 @@ def block_list(columns: int, block_dim: int):
             L[wp.static(lists.cell_y) + lane] = cell_y
             L[wp.static(lists.next_joint) + lane] = wp.atomic_exch(L, wp.static(lists.bucket) + bucket, lane)
         barrier()
-        if lane < n:
+        if lane < run.links:
             search_cells(K, L, lane, square)
         barrier()
         return L[wp.static(lists.count)]

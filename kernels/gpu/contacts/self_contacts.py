@@ -158,7 +158,6 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
     @wp.func
     def find(run: Run, chain: Chain, pairs: int, opening: wp.float64):
         """Number of pairs of joints that may touch now; the board is written. ``opening``: greatest |C| [m]."""
-        K = run.K
         L = run.L
         T = run.T
         lane = run.lane
@@ -167,7 +166,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         for k in range(lane, pairs, wp.static(block_dim)):
             p = L[wp.static(lists.first) + k]
             q = L[wp.static(lists.second) + k]
-            if square_distance(K, p, q) < square:
+            if square_distance(run.K, p, q) < square:
                 slot = wp.atomic_add(T, wp.static(touch.touching), 1)
                 if slot < wp.static(touch.shared_pairs):
                     T[wp.static(touch.pairs) + slot] = pair_key(p, q)
