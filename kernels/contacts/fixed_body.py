@@ -13,17 +13,9 @@ from typing import Any
 import warp as wp
 
 from warpchain.kernels import layout
+from warpchain.kernels.contacts import terrain
 from warpchain.kernels.contacts.impulse import Touching, struck
-from warpchain.kernels.contacts.terrain import (
-    SMALLEST,
-    Face,
-    cell_at,
-    corner_and_side,
-    first_face,
-    read_face,
-    slope_surface,
-    terrain_surface,
-)
+from warpchain.kernels.contacts.terrain import SMALLEST, Face, read_face
 from warpchain.kernels.physics.elementary import ONE, TWO, ZERO, quotient
 from warpchain.kernels.types import Chain, Drive, Ground
 
@@ -146,8 +138,8 @@ BODIES = {
     "floor": Body(floor_surface),
     "sprocket": Body(sprocket_surface, motion=turning_sprocket, is_driven=True, lesser_gap=lesser_sprocket_gap),
     "moving sprocket": Body(moving_sprocket_surface, motion=moved_sprocket),
-    "slope": Body(slope_surface, first_face),
-    "terrain": Body(terrain_surface, in_cells=True),
+    "slope": Body(terrain.slope_surface, terrain.first_face),
+    "terrain": Body(terrain.terrain_surface, in_cells=True),
 }
 """Every body by its name."""
 
@@ -172,7 +164,7 @@ def link_and_body(name: str):
             right, _nx, _ny, _u, _v, _e, _mu = surface(chain, face, link.right_x, link.right_y)
             least = wp.min(left, right)
         if wp.static(in_cells):
-            side, _nx, _ny = corner_and_side(chain, face, link.x, link.y, link.cosine, link.sine)
+            side, _nx, _ny = terrain.corner_and_side(chain, face, link.x, link.y, link.cosine, link.sine)
             least = wp.min(least, side)
         return least
 
@@ -187,7 +179,7 @@ def link_and_body(name: str):
         link = meet_circle(chain, face, before, before.left_x, before.left_y)
         link = meet_circle(chain, face, link, link.right_x, link.right_y)
         if wp.static(in_cells):
-            gap, nx, ny = corner_and_side(chain, face, link.x, link.y, link.cosine, link.sine)
+            gap, nx, ny = terrain.corner_and_side(chain, face, link.x, link.y, link.cosine, link.sine)
             push = chain.push_rate * wp.max(ZERO, -gap)
             lever_x = face.x - link.x
             lever_y = face.y - link.y
@@ -202,7 +194,7 @@ def link_and_body(name: str):
     @wp.func
     def gap(chain: Chain, ground: Ground, _face: Face, link: Touching):
         least = ground.cells[layout.GROUND_CELLS, layout.GROUND_MARGIN]
-        cell = cell_at(ground, link.x)
+        cell = terrain.cell_at(ground, link.x)
         height = wp.min(link.left_y, link.right_y) - chain.circle_radius - ground.cells[cell, layout.TOP]
         if height < least:
             last = int(ground.cells[cell, layout.LAST_FACE])
@@ -215,7 +207,7 @@ def link_and_body(name: str):
     @wp.func
     def meet(chain: Chain, ground: Ground, _face: Face, before: Touching) -> Touching:
         link = before
-        cell = cell_at(ground, link.x)
+        cell = terrain.cell_at(ground, link.x)
         last = int(ground.cells[cell, layout.LAST_FACE])
         k = int(ground.cells[cell, layout.FIRST_FACE])
         while k <= last:

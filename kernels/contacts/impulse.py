@@ -66,6 +66,7 @@ def inverse_masses(w_nn: wp.float64, w_nt: wp.float64, w_tt: wp.float64):
 
 @wp.func
 def collision_impulse(
+    chain: Chain,
     normal_speed: wp.float64,
     tangential_speed: wp.float64,
     w_nn: wp.float64,
@@ -75,20 +76,20 @@ def collision_impulse(
     inverse_determinant: wp.float64,
     restitution: wp.float64,
     friction: wp.float64,
-    tangential_restitution: wp.float64,
 ):
     """Impulse (J_n, J_t) [N s] on body B from v = (normal_speed, tangential_speed) [m/s] and W [1/kg], see above.
 
-    ``inverse_nn`` and ``inverse_determinant`` are those of :func:`inverse_masses`; ``restitution`` is e,
-    ``tangential_restitution`` e_t and ``friction`` μ. The caller makes sure that the bodies approach (v·n̂ > 0).
+    ``inverse_nn`` and ``inverse_determinant`` are those of :func:`inverse_masses`; ``restitution`` is e and
+    ``friction`` μ. The caller makes sure that the bodies approach (v·n̂ > 0).
     """
+    stick = ONE + chain.tangential_restitution
     first = normal_speed * inverse_nn
     second_n = (w_tt * normal_speed - w_nt * tangential_speed) * inverse_determinant
     second_t = (w_nn * tangential_speed - w_nt * normal_speed) * inverse_determinant
     bounce = (ONE + restitution) * first
     excess = second_n - first
-    stick_n = bounce + (ONE + tangential_restitution) * excess
-    stick_t = (ONE + tangential_restitution) * second_t
+    stick_n = bounce + stick * excess
+    stick_t = stick * second_t
     sticks = wp.abs(stick_t) <= friction * stick_n
     kappa = quotient(friction * bounce, wp.abs(second_t) - friction * excess)
     impulse_n = wp.where(sticks, stick_n, bounce + kappa * excess)
@@ -129,16 +130,7 @@ def struck(
     w_tt = link.inverse_mass + cross_t * cross_t * link.inverse_inertia
     inverse_nn, inverse_determinant = inverse_masses(w_nn, w_nt, w_tt)
     impulse_n, impulse_t = collision_impulse(
-        normal_speed,
-        tangential_speed,
-        w_nn,
-        w_nt,
-        w_tt,
-        inverse_nn,
-        inverse_determinant,
-        restitution,
-        friction,
-        chain.tangential_restitution,
+        chain, normal_speed, tangential_speed, w_nn, w_nt, w_tt, inverse_nn, inverse_determinant, restitution, friction
     )
     hit = (gap < ZERO) and (normal_speed > ZERO)
     impulse_n = wp.where(hit, impulse_n, ZERO)

@@ -4,9 +4,9 @@ import warp as wp
 
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.impulse import collision_impulse, inverse_masses
-from warpchain.kernels.layout import INVERSE_INERTIA, INVERSE_MASS, LEFT_X, OMEGA, RIGHT_X, STRANDS_APART, U, V, X
+from warpchain.kernels.layout import INVERSE_INERTIA, INVERSE_MASS, LEFT_X, RIGHT_X, STRANDS_APART, U, X
 from warpchain.kernels.physics.elementary import HALF, ZERO, quotient
-from warpchain.kernels.physics.geometry import two
+from warpchain.kernels.physics.geometry import put, three, two
 from warpchain.kernels.types import Chain, Rows
 
 Contact = wp.types.vector(length=7, dtype=wp.float64)
@@ -53,12 +53,7 @@ def effective_masses(mass: wp.float64, inertia_a: wp.float64, inertia_b: wp.floa
 
 @wp.func
 def circles_of_links(
-    radius_a: wp.float64,
-    radius_b: wp.float64,
-    end_a: wp.vec2d,
-    end_b: wp.vec2d,
-    center_a: wp.vec2d,
-    center_b: wp.vec2d,
+    radius_a: wp.float64, radius_b: wp.float64, end_a: wp.vec2d, end_b: wp.vec2d, center_a: wp.vec2d, center_b: wp.vec2d
 ) -> Contact:
     """Geometry of the contact of a circle of link A and one of link B, without branches.
 
@@ -91,8 +86,7 @@ def divisors(K: Rows, link_a: int, link_b: int, contact: Contact):
     """1/W_nn [kg] and 1/det W [kg²] of a contact of two links."""
     mass = K[INVERSE_MASS, link_a] + K[INVERSE_MASS, link_b]
     w_nn, w_nt, w_tt = effective_masses(mass, K[INVERSE_INERTIA, link_a], K[INVERSE_INERTIA, link_b], contact)
-    inverse_nn, inverse_determinant = inverse_masses(w_nn, w_nt, w_tt)
-    return inverse_nn, inverse_determinant
+    return inverse_masses(w_nn, w_nt, w_tt)
 
 
 @wp.func
@@ -143,46 +137,31 @@ def collide(
     b_n = contact[B_N]
     b_t = contact[B_T]
     # all is read before anything is written: the compiler does not know that A is not B, and would read again
-    u_a = K[U, link_a]
-    v_a = K[V, link_a]
-    omega_a = K[OMEGA, link_a]
-    u_b = K[U, link_b]
-    v_b = K[V, link_b]
-    omega_b = K[OMEGA, link_b]
-    u = u_a - u_b
-    v = v_a - v_b
+    motion_a = three(K, U, link_a)
+    motion_b = three(K, U, link_b)
+    u = motion_a[0] - motion_b[0]
+    v = motion_a[1] - motion_b[1]
     normal_speed = u * nx + v * ny
-    normal_speed += omega_a * a_n - omega_b * b_n + push
+    normal_speed += motion_a[2] * a_n - motion_b[2] * b_n + push
     lost = ZERO
     hits = wp.int64(0)
     if normal_speed > ZERO:
         tangential_speed = v * nx - u * ny
-        tangential_speed += omega_a * a_t - omega_b * b_t
+        tangential_speed += motion_a[2] * a_t - motion_b[2] * b_t
         mass_a = K[INVERSE_MASS, link_a]
         mass_b = K[INVERSE_MASS, link_b]
         inertia_a = K[INVERSE_INERTIA, link_a]
         inertia_b = K[INVERSE_INERTIA, link_b]
         w_nn, w_nt, w_tt = effective_masses(mass_a + mass_b, inertia_a, inertia_b, contact)
+        e = chain.chain_restitution
+        mu = chain.chain_friction
         jn, jt = collision_impulse(
-            normal_speed,
-            tangential_speed,
-            w_nn,
-            w_nt,
-            w_tt,
-            inverse_nn,
-            inverse_determinant,
-            chain.chain_restitution,
-            chain.chain_friction,
-            chain.tangential_restitution,
+            chain, normal_speed, tangential_speed, w_nn, w_nt, w_tt, inverse_nn, inverse_determinant, e, mu
         )
         jx = jn * nx - jt * ny
         jy = jn * ny + jt * nx
-        K[U, link_a] = u_a - jx * mass_a
-        K[V, link_a] = v_a - jy * mass_a
-        K[OMEGA, link_a] = omega_a - (a_n * jn + a_t * jt) * inertia_a
-        K[U, link_b] = u_b + jx * mass_b
-        K[V, link_b] = v_b + jy * mass_b
-        K[OMEGA, link_b] = omega_b + (b_n * jn + b_t * jt) * inertia_b
+        put(K, U, link_a, motion_a - wp.vec3d(jx * mass_a, jy * mass_a, (a_n * jn + a_t * jt) * inertia_a))
+        put(K, U, link_b, motion_b + wp.vec3d(jx * mass_b, jy * mass_b, (b_n * jn + b_t * jt) * inertia_b))
         changed_n = w_nn * jn + w_nt * jt
         changed_t = w_nt * jn + w_tt * jt
         lost = jn * (normal_speed - push - HALF * changed_n) + jt * (tangential_speed - HALF * changed_t)

@@ -116,15 +116,13 @@ def meet_roller(
     """One roller against the floor, without branches."""
     inverse_mass = link.inverse_mass
     inverse_inertia = link.inverse_inertia
-    arm_x = circle_x - link.x
-    arm_y = circle_y - link.y
     inverse = ONE / wp.max(slope, SMALLEST)
     to_point_x = -chain.circle_radius * chain.up_x * inverse
     to_point_y = -chain.circle_radius * chain.up_y * inverse
     x = circle_x + to_point_x
     y = circle_y + to_point_y
-    lever_x = arm_x + to_point_x
-    lever_y = arm_y + to_point_y
+    lever_x = circle_x - link.x + to_point_x
+    lever_y = circle_y - link.y + to_point_y
     front, back = approaches(chain, slope, before, link, circle_x, circle_y)
     total = front + back
     hit = total > ZERO
@@ -219,7 +217,7 @@ def link_touches(chain: Chain, slope: wp.float64, link: Touching):
 
 
 @wp.func
-def meet_tilting_floor(chain: Chain, slope: wp.float64, B: wp.mat33d, link: Touching) -> TiltingLink:
+def meet_floor(chain: Chain, slope: wp.float64, B: wp.mat33d, link: Touching) -> TiltingLink:
     """One link against the floor, its left roller first, together with its copy of the plane."""
     met = meet_roller(chain, slope, B, link, with_copy(chain, link), link.left_x, link.left_y)
     met = meet_roller(chain, slope, B, link, met, link.right_x, link.right_y)

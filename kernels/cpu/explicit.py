@@ -11,11 +11,11 @@ from typing import Any
 import warp as wp
 
 from warpchain.kernels import layout
-from warpchain.kernels.layout import STAGE_ROWS, STAGES, U, V, X, Y
+from warpchain.kernels.layout import STAGE_ROWS, STAGES, U, X, Y
 from warpchain.kernels.methods.controller import error_bits
 from warpchain.kernels.methods.explicit_tableaus import Tableau
-from warpchain.kernels.physics.elementary import LARGEST_TURN, TWO, ZERO, cos_sin, order_bits
-from warpchain.kernels.physics.geometry import Link, end_positions, end_velocities, turned, whole_lanes
+from warpchain.kernels.physics.elementary import LARGEST_TURN, TWO, cos_sin, order_bits
+from warpchain.kernels.physics.geometry import Link, end_positions, end_velocities, put, three, turned, two, whole_lanes
 from warpchain.kernels.physics.joint import friction_torque, joint_force, link_acceleration
 from warpchain.kernels.types import Chain, Rows
 
@@ -24,23 +24,15 @@ from warpchain.kernels.types import Chain, Rows
 def write_ends(K: Rows, i: int, x: wp.float64, y: wp.float64, arm_x: wp.float64, arm_y: wp.float64):
     """End positions of link i."""
     left_x, left_y, right_x, right_y = end_positions(x, y, arm_x, arm_y)
-    K[layout.LEFT_X, i] = left_x
-    K[layout.LEFT_Y, i] = left_y
-    K[layout.RIGHT_X, i] = right_x
-    K[layout.RIGHT_Y, i] = right_y
+    put(K, layout.LEFT_X, i, wp.vec4d(left_x, left_y, right_x, right_y))
 
 
 @wp.func
-def write_motion(K: Rows, i: int, u: wp.float64, v: wp.float64, w: wp.float64, arm_x: wp.float64, arm_y: wp.float64):
+def write_motion(K: Rows, i: int, motion: wp.vec3d, arm_x: wp.float64, arm_y: wp.float64):
     """Arm, spin and end velocities of link i in a stage."""
-    K[layout.STAGE_ARM_X, i] = arm_x
-    K[layout.STAGE_ARM_Y, i] = arm_y
-    K[layout.STAGE_SPIN, i] = w
-    left_u, left_v, right_u, right_v = end_velocities(u, v, w, arm_x, arm_y)
-    K[layout.LEFT_U, i] = left_u
-    K[layout.LEFT_V, i] = left_v
-    K[layout.RIGHT_U, i] = right_u
-    K[layout.RIGHT_V, i] = right_v
+    put(K, layout.STAGE_ARM_X, i, wp.vec3d(arm_x, arm_y, motion[2]))
+    left_u, left_v, right_u, right_v = end_velocities(motion[0], motion[1], motion[2], arm_x, arm_y)
+    put(K, layout.LEFT_U, i, wp.vec4d(left_u, left_v, right_u, right_v))
 
 
 @wp.func
@@ -52,12 +44,10 @@ def place_ends(K: Rows, chain: Chain):
     i = int(0)
     while i < lanes:
         c, s = cos_sin(K[layout.THETA, i])
-        K[layout.COSINE, i] = c
-        K[layout.SINE, i] = s
+        put(K, layout.COSINE, i, wp.vec2d(c, s))
         write_ends(K, i, K[X, i], K[Y, i], a * c, a * s)
         i += 1
-    K[layout.LEFT_X, n] = K[layout.LEFT_X, 0]
-    K[layout.LEFT_Y, n] = K[layout.LEFT_Y, 0]
+    put(K, layout.LEFT_X, n, two(K, layout.LEFT_X, 0))
 
 
 @wp.func
@@ -68,10 +58,9 @@ def begin_stages(K: Rows, chain: Chain):
     a = chain.half_length
     i = int(0)
     while i < lanes:
-        write_motion(K, i, K[U, i], K[V, i], K[layout.OMEGA, i], a * K[layout.COSINE, i], a * K[layout.SINE, i])
+        write_motion(K, i, three(K, U, i), a * K[layout.COSINE, i], a * K[layout.SINE, i])
         i += 1
-    K[layout.LEFT_U, n] = K[layout.LEFT_U, 0]
-    K[layout.LEFT_V, n] = K[layout.LEFT_V, 0]
+    put(K, layout.LEFT_U, n, two(K, layout.LEFT_U, 0))
     K[layout.STAGE_SPIN, n] = K[layout.STAGE_SPIN, 0]
 
 
@@ -90,29 +79,21 @@ def link_in_stage(K: Rows, i: int) -> Link:
 
 
 def sums_over_stages(velocity: tuple[float, ...], position: tuple[float, ...]):
-    """Warp function ``sums(K, i)``: Σ w_j (ẍ, ÿ, θ̈)_j of link i over the stages, for either row of weights w.
+    """Warp function ``sums(K, i)``: Σ w_j (ẍ, ÿ, θ̈)_j of link i over the stages, for both rows of weights w.
 
     One function of three sums for each row instead made clang fuse other products with sums: walks rounded otherwise.
     """
 
     @wp.func
     def sums(K: Rows, i: int):
-        du = ZERO
-        dv = ZERO
-        dw = ZERO
-        dx = ZERO
-        dy = ZERO
-        turn = ZERO
+        change = wp.vec3d()
+        shift = wp.vec3d()
         for j in range(wp.static(len(velocity))):
             if wp.static(velocity[j] != 0.0):
-                du += wp.static(wp.float64(velocity[j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
-                dv += wp.static(wp.float64(velocity[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
-                dw += wp.static(wp.float64(velocity[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+                change += wp.static(wp.float64(velocity[j])) * three(K, wp.static(STAGES + STAGE_ROWS * j), i)
             if wp.static(position[j] != 0.0):
-                dx += wp.static(wp.float64(position[j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
-                dy += wp.static(wp.float64(position[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
-                turn += wp.static(wp.float64(position[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
-        return du, dv, dw, dx, dy, turn
+                shift += wp.static(wp.float64(position[j])) * three(K, wp.static(STAGES + STAGE_ROWS * j), i)
+        return change, shift
 
     return sums
 
@@ -142,22 +123,18 @@ def explicit_method(tableau: Tableau, acceleration: Any):
         lanes = whole_lanes(n)
         i = int(0)
         while i < lanes:
-            cx = K[layout.LEFT_X, i + 1] - K[layout.RIGHT_X, i]
-            cy = K[layout.LEFT_Y, i + 1] - K[layout.RIGHT_Y, i]
-            cu = K[layout.LEFT_U, i + 1] - K[layout.RIGHT_U, i]
-            cv = K[layout.LEFT_V, i + 1] - K[layout.RIGHT_V, i]
+            opening = two(K, layout.LEFT_X, i + 1) - two(K, layout.RIGHT_X, i)
+            rate = two(K, layout.LEFT_U, i + 1) - two(K, layout.RIGHT_U, i)
             spin = K[layout.STAGE_SPIN, i] - K[layout.STAGE_SPIN, i + 1]
             torque = friction_torque(K[layout.VISCOUS, i], K[layout.COULOMB, i], spin, chain.inverse_smoothing)
-            K[layout.FORCE_X, i + 1] = joint_force(chain, cx, cu)
-            K[layout.FORCE_Y, i + 1] = joint_force(chain, cy, cv)
-            K[layout.TORQUE, i + 1] = torque
+            force_x = joint_force(chain, opening[0], rate[0])
+            force_y = joint_force(chain, opening[1], rate[1])
+            put(K, layout.FORCE_X, i + 1, wp.vec3d(force_x, force_y, torque))
             if needs_power:
-                K[row + 3, i] = torque * spin
-                K[row + 4, i] = chain.joint_damping * (cu * cu + cv * cv)
+                damping = chain.joint_damping * (rate[0] * rate[0] + rate[1] * rate[1])
+                put(K, row + 3, i, wp.vec2d(torque * spin, damping))
             i += 1
-        K[layout.FORCE_X, 0] = K[layout.FORCE_X, n]
-        K[layout.FORCE_Y, 0] = K[layout.FORCE_Y, n]
-        K[layout.TORQUE, 0] = K[layout.TORQUE, n]
+        put(K, layout.FORCE_X, 0, three(K, layout.FORCE_X, n))
         i = int(0)
         while i < lanes:
             ax, ay, spin_rate = link_acceleration(
@@ -175,9 +152,7 @@ def explicit_method(tableau: Tableau, acceleration: Any):
             load_x, load_y, load_turn = acceleration(
                 chain, i, link_in_stage(K, i), K[layout.INVERSE_MASS, i], K[layout.INVERSE_INERTIA, i]
             )
-            K[row, i] = ax + load_x
-            K[row + 1, i] = ay + load_y
-            K[row + 2, i] = spin_rate + load_turn
+            put(K, row, i, wp.vec3d(ax + load_x, ay + load_y, spin_rate + load_turn))
             i += 1
 
     @wp.func
@@ -195,38 +170,31 @@ def explicit_method(tableau: Tableau, acceleration: Any):
             ch = wp.static(wp.float64(nodes[s])) * h
             i = int(0)
             while i < lanes:
-                du, dv, dw, dx, dy, turn = wp.static(stage_sums[s])(K, i)
-                turn = ch * K[layout.OMEGA, i] + hh * turn
-                arm_x, arm_y = turned(a * K[layout.COSINE, i], a * K[layout.SINE, i], turn)
-                x = K[X, i] + (ch * K[U, i] + hh * dx)
-                y = K[Y, i] + (ch * K[V, i] + hh * dy)
-                u = K[U, i] + h * du
-                v = K[V, i] + h * dv
-                w = K[layout.OMEGA, i] + h * dw
-                write_ends(K, i, x, y, arm_x, arm_y)
-                write_motion(K, i, u, v, w, arm_x, arm_y)
+                change, shift = wp.static(stage_sums[s])(K, i)
+                moved = ch * three(K, U, i) + hh * shift
+                arm_x, arm_y = turned(a * K[layout.COSINE, i], a * K[layout.SINE, i], moved[2])
+                write_ends(K, i, K[X, i] + moved[0], K[Y, i] + moved[1], arm_x, arm_y)
+                write_motion(K, i, three(K, U, i) + h * change, arm_x, arm_y)
                 i += 1
-            K[layout.LEFT_X, n] = K[layout.LEFT_X, 0]
-            K[layout.LEFT_Y, n] = K[layout.LEFT_Y, 0]
-            K[layout.LEFT_U, n] = K[layout.LEFT_U, 0]
-            K[layout.LEFT_V, n] = K[layout.LEFT_V, 0]
+            put(K, layout.LEFT_X, n, two(K, layout.LEFT_X, 0))
+            put(K, layout.LEFT_U, n, two(K, layout.LEFT_U, 0))
             K[layout.STAGE_SPIN, n] = K[layout.STAGE_SPIN, 0]
             derivatives(K, chain, wp.static(STAGES + STAGE_ROWS * s), wp.static(power_needed[s]))
         # new state and error ratio
         i = int(0)
         while i < lanes:
-            change = new_state(K, i)
-            error = errors(K, i)
+            change, shift = new_state(K, i)
+            velocity_error, place_error = errors(K, i)
             # Take the maximum over components, not the sum. Compare the floats' bits as integers, where NaN is
             # greatest.
             worst = wp.int64(0)
             for k in range(3):
                 place = K[X + k, i]
                 rate = K[U + k, i]
-                K[layout.NEW_X + k, i] = place + (h * rate + hh * change[wp.static(3 + k)])
+                K[layout.NEW_X + k, i] = place + (h * rate + hh * shift[k])
                 K[layout.NEW_U + k, i] = rate + h * change[k]
-                worst = wp.max(worst, error_bits(hh * error[wp.static(3 + k)], place, rate, h))
-                worst = wp.max(worst, error_bits(h * error[k], rate, K[STAGES + k, i], h))
+                worst = wp.max(worst, error_bits(hh * place_error[k], place, rate, h))
+                worst = wp.max(worst, error_bits(h * velocity_error[k], rate, K[STAGES + k, i], h))
             worst = wp.where(i < n, worst, wp.int64(0))
             K[layout.ERROR, i] = wp.cast(worst, wp.float64) / tolerance  # wp.cast reads the bits back as a float
             i += 1
@@ -245,20 +213,15 @@ def explicit_method(tableau: Tableau, acceleration: Any):
 
     @wp.func
     def commit(K: Rows, chain: Chain, h: wp.float64):
-        n = chain.link_count
-        lanes = whole_lanes(n)
+        lanes = whole_lanes(chain.link_count)
         i = int(0)
         while i < lanes:
-            friction = ZERO
-            damping = ZERO
+            power = wp.vec2d()
             for j in range(wp.static(stages)):
                 if wp.static(velocity_weights[j] != 0.0):
-                    friction += (
-                        wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 3), i]
-                    )
-                    damping += wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 4), i]
-            K[layout.LOST_FRICTION, i] = K[layout.LOST_FRICTION, i] + h * friction
-            K[layout.LOST_DAMPING, i] = K[layout.LOST_DAMPING, i] + h * damping
+                    weight = wp.static(wp.float64(velocity_weights[j]))
+                    power += weight * two(K, wp.static(STAGES + STAGE_ROWS * j + 3), i)
+            put(K, layout.LOST_FRICTION, i, two(K, layout.LOST_FRICTION, i) + h * power)
             for row in range(6):
                 K[wp.static(X + row), i] = K[wp.static(layout.NEW_X + row), i]
             if wp.static(reuses_last):

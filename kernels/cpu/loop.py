@@ -48,15 +48,6 @@ def load_state(K: Rows, model: Model, state: State, chain: Chain, world: int):
 
 
 @wp.func
-def store_state(K: Rows, state: State, chain: Chain, world: int, fixed_loss: int):
-    """Writes the state and the losses since loading."""
-    for i in range(chain.link_count):
-        for row in range(6):
-            state.links[world, row, i] = K[row, i]
-    store_losses(K, layout.LOST_FRICTION, state, world, chain.link_count, fixed_loss)
-
-
-@wp.func
 def state_is_finite(K: Rows, chain: Chain):
     """False if the state or its first derivative holds an infinity or a NaN."""
     finite = bool(True)
@@ -122,10 +113,7 @@ def make_advance(features: Features):
             state.status[world] = STEP_TOO_SMALL
 
     @wp.kernel(
-        name="advance",
-        module="unique",
-        enable_backward=False,
-        module_options={"cpu_compiler_flags": COMPILER_FLAGS},
+        name="advance", module="unique", enable_backward=False, module_options={"cpu_compiler_flags": COMPILER_FLAGS}
     )
     def advance(
         worlds: Integers,
@@ -200,6 +188,9 @@ def make_advance(features: Features):
         if lacks_last_sample(state, world, state.time[world], state.status[world]):
             place_ends(K, chain)
             write_sample(K, chain, state, record, world, state.time[world])
-        store_state(K, state, chain, world, wp.static(fixed_loss))
+        for i in range(chain.link_count):
+            for row in range(6):
+                state.links[world, row, i] = K[row, i]
+        store_losses(K, layout.LOST_FRICTION, state, world, chain.link_count, wp.static(fixed_loss))
 
     return advance

@@ -8,30 +8,15 @@ import functools
 import warp as wp
 
 from warpchain.kernels import layout
+from warpchain.kernels.contacts import tilting_floor
 from warpchain.kernels.contacts.terrain import Face
-from warpchain.kernels.contacts.tilting_floor import (
-    copy_inverse,
-    link_touches,
-    meet_tilting_floor,
-    middle_height,
-    push_plane_by,
-    steepness,
-)
 from warpchain.kernels.cpu.contacts.proximity import FURTHEST, any_negative, placed_link
 from warpchain.kernels.cpu.joints import Joints
 from warpchain.kernels.cpu.upright import Plane
 from warpchain.kernels.layout import LEFT_X, LOST_FIXED, OMEGA, STAGES, SUMS_OF_MOTION, U, V
+from warpchain.kernels.physics import plane
 from warpchain.kernels.physics.elementary import ZERO, from_order_key, order_key
 from warpchain.kernels.physics.geometry import LANES, whole_lanes
-from warpchain.kernels.physics.plane import (
-    begin_plane_step,
-    end_plane_step,
-    invert_plane_mass,
-    motion_terms,
-    on_plane,
-    place_terms,
-    shift_stage,
-)
 from warpchain.kernels.types import Chain, Ground, Row, Rows, State, with_circles
 
 SUMS = STAGES + layout.STAGE_ROWS
@@ -45,16 +30,12 @@ TOUCHES = SUMS + SUMMED_IN_CONTACT
 @wp.func_native("""
     const ::wp::float64* values = &K.data[row * (K.strides[0] / sizeof(::wp::float64))];
     ::wp::float64 sums[8] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
-    for (int i = 0; i < count; i += 8) {
-        for (int lane = 0; lane < 8; ++lane) {
-            sums[lane] += values[i + lane];
-        }
-    }
+    for (int i = 0; i < count; i += 8)
+        for (int lane = 0; lane < 8; ++lane) sums[lane] += values[i + lane];
     return ((sums[0] + sums[1]) + (sums[2] + sums[3])) + ((sums[4] + sums[5]) + (sums[6] + sums[7]));
 """)
 def row_sum(K: Rows, row: int, count: int) -> wp.float64:
     """Sum of the first ``count`` columns of a row, a multiple of 8; in pure Warp clang adds one after the other."""
-    ...
 
 
 @wp.func
@@ -63,7 +44,7 @@ def write_sums_of_motion(K: Rows, P: Row, chain: Chain):
     count = whole_lanes(chain.link_count)
     i = int(0)
     while i < count:
-        motion = motion_terms(K, i)
+        motion = plane.motion_terms(K, i)
         for k in range(wp.static(SUMS_OF_MOTION)):
             K[wp.static(SUMS + k), i] = wp.where(i < chain.link_count, motion[k], ZERO)
         i += 1
@@ -77,7 +58,7 @@ def write_plane_sums(K: Rows, P: Row, chain: Chain):
     count = whole_lanes(chain.link_count)
     i = int(0)
     while i < count:
-        places = place_terms(K, chain, i)
+        places = plane.place_terms(K, chain, i)
         for k in range(wp.static(layout.SUMS_OF_PLACES)):
             K[wp.static(SUMS + k), i] = wp.where(i < chain.link_count, places[k], ZERO)
         i += 1
@@ -85,7 +66,7 @@ def write_plane_sums(K: Rows, P: Row, chain: Chain):
         P[wp.static(layout.PLANE_SUMS + k)] = row_sum(K, wp.static(SUMS + k), count)
     write_sums_of_motion(K, P, chain)
     P[layout.SUM_MASS] = chain.mass
-    invert_plane_mass(P)
+    plane.invert_mass(P)
 
 
 @wp.func
@@ -93,20 +74,20 @@ def shift_first_stage(K: Rows, before: Chain, now: Chain):
     """Changes the stored first stage from one plane to another; links are the same."""
     i = int(0)
     while i < whole_lanes(now.link_count):
-        shift_stage(K, STAGES, i, before, now)
+        plane.shift_stage(K, STAGES, i, before, now)
         i += 1
 
 
 @wp.func
 def tilting_gap(K: Rows, chain: Chain, _ground: Ground, _face: Face):
     """Height [m] of the lowest rim of a roller above the floor; negative when it is below."""
-    slope = steepness(chain)
+    slope = tilting_floor.steepness(chain)
     lowest = FURTHEST
     i = int(0)
     while i < whole_lanes(chain.link_count):
         own = with_circles(chain, K[layout.RADIUS, i])
-        left = order_key(middle_height(own, slope, K[LEFT_X, i], K[layout.LEFT_Y, i]))
-        right = order_key(middle_height(own, slope, K[layout.RIGHT_X, i], K[layout.RIGHT_Y, i]))
+        left = order_key(tilting_floor.middle_height(own, slope, K[LEFT_X, i], K[layout.LEFT_Y, i]))
+        right = order_key(tilting_floor.middle_height(own, slope, K[layout.RIGHT_X, i], K[layout.RIGHT_Y, i]))
         lowest = wp.min(lowest, wp.where(i < chain.link_count, wp.min(left, right), FURTHEST))
         i += 1
     return from_order_key(lowest) - chain.half_width * wp.abs(chain.up_z)
@@ -118,7 +99,7 @@ def write_touches(K: Rows, chain: Chain, slope: wp.float64):
     touching = wp.int64(0)
     i = int(0)
     while i < whole_lanes(chain.link_count):
-        touches = link_touches(with_circles(chain, K[layout.RADIUS, i]), slope, placed_link(K, i))
+        touches = tilting_floor.link_touches(with_circles(chain, K[layout.RADIUS, i]), slope, placed_link(K, i))
         touches = wp.where(i < chain.link_count, touches, wp.int64(0))
         K[wp.static(TOUCHES), i] = -wp.float64(touches)
         touching += touches
@@ -132,12 +113,12 @@ def resolve_tilting_floor(K: Rows, P: Row, own: Chain, _ground: Ground, _face: F
 
     The sums must be those of the present places. Lanes of links of which none touches are passed over.
     """
-    chain = on_plane(own, P, 0)
-    slope = steepness(chain)
+    chain = plane.on_plane(own, P, 0)
+    slope = tilting_floor.steepness(chain)
     touching = write_touches(K, chain, slope)
     if touching == wp.int64(0):
         return touching
-    B = copy_inverse(P, wp.float64(touching))
+    B = tilting_floor.copy_inverse(P, wp.float64(touching))
     impulses = wp.int64(0)
     count = whole_lanes(chain.link_count)
     first = int(0)
@@ -150,7 +131,7 @@ def resolve_tilting_floor(K: Rows, P: Row, own: Chain, _ground: Ground, _face: F
             while lane < wp.static(LANES):
                 i = first + lane
                 own = with_circles(chain, K[layout.RADIUS, i])
-                link = meet_tilting_floor(own, slope, B, placed_link(K, i))
+                link = tilting_floor.meet_floor(own, slope, B, placed_link(K, i))
                 touches = K[wp.static(TOUCHES), i] < ZERO
                 K[U, i] = wp.where(touches, link.u, K[U, i])
                 K[V, i] = wp.where(touches, link.v, K[V, i])
@@ -165,7 +146,7 @@ def resolve_tilting_floor(K: Rows, P: Row, own: Chain, _ground: Ground, _face: F
     push = row_sum(K, wp.static(SUMS), count)
     moment_x = row_sum(K, wp.static(SUMS + 1), count)
     moment_y = row_sum(K, wp.static(SUMS + 2), count)
-    K[LOST_FIXED, 0] = K[LOST_FIXED, 0] + push_plane_by(P, push, moment_x, moment_y)
+    K[LOST_FIXED, 0] = K[LOST_FIXED, 0] + tilting_floor.push_plane_by(P, push, moment_x, moment_y)
     write_sums_of_motion(K, P, chain)
     return impulses
 
@@ -176,13 +157,13 @@ def tilting_plane(joints: Joints) -> Plane:
 
     @wp.func
     def at_start(P: Row, chain: Chain) -> Chain:
-        return on_plane(chain, P, 0)
+        return plane.on_plane(chain, P, 0)
 
     @wp.func
     def begin_step(K: Rows, P: Row, chain: Chain, state: State, world: int, h: wp.float64) -> Chain:
-        before = on_plane(chain, P, wp.static(layout.PLANE_MID))
-        begin_plane_step(P, chain.gravity, h)
-        felt = on_plane(chain, P, wp.static(layout.PLANE_MID))
+        before = plane.on_plane(chain, P, wp.static(layout.PLANE_MID))
+        plane.begin_step(P, chain.gravity, h)
+        felt = plane.on_plane(chain, P, wp.static(layout.PLANE_MID))
         if state.has_first_stage[world] != 0:
             shift_first_stage(K, before, felt)
         joints.first_stage(K, felt, state, world)
@@ -191,6 +172,6 @@ def tilting_plane(joints: Joints) -> Plane:
     @wp.func
     def end_step(K: Rows, P: Row, chain: Chain, h: wp.float64):
         write_plane_sums(K, P, chain)
-        end_plane_step(P, chain.gravity, h)
+        plane.end_step(P, chain.gravity, h)
 
     return Plane(write_plane_sums, at_start, begin_step, end_step, tilting_gap, resolve_tilting_floor)

@@ -5,6 +5,7 @@ import warp as wp
 from warpchain.kernels import layout
 from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, MASS, OMEGA, RADIUS, RIGHT_X, RIGHT_Y, SINE, U, V, X, Y
 from warpchain.kernels.physics.elementary import HALF, ZERO, from_order_key, order_key
+from warpchain.kernels.physics.geometry import two
 from warpchain.kernels.types import Chain, Row, Rows
 
 
@@ -43,9 +44,8 @@ def summarise(K: Rows, chain: Chain, sample: Row):
         kinetic += HALF * (m * speed + K[layout.INERTIA, i] * K[OMEGA, i] * K[OMEGA, i])
         square += speed
         along += K[U, i] * K[COSINE, i] + K[V, i] * K[SINE, i]
-        cx = K[LEFT_X, i + 1] - K[RIGHT_X, i]
-        cy = K[LEFT_Y, i + 1] - K[RIGHT_Y, i]
-        spring += HALF * chain.joint_stiffness * (cx * cx + cy * cy)
+        opening = two(K, LEFT_X, i + 1) - two(K, RIGHT_X, i)
+        spring += HALF * chain.joint_stiffness * (opening[0] * opening[0] + opening[1] * opening[1])
         area += K[LEFT_X, i] * K[RIGHT_Y, i] - K[RIGHT_X, i] * K[LEFT_Y, i]
         left = wp.min(left, order_key(K[RIGHT_X, i]))
         right = wp.max(right, order_key(K[RIGHT_X, i]))

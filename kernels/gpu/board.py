@@ -4,9 +4,9 @@ import warp as wp
 
 from warpchain.kernels import layout
 from warpchain.kernels.gpu.stage import Attempt, Run, constants, read_link
-from warpchain.kernels.layout import BOARD_VALUES, COSINE, LEFT_X, LEFT_Y, RIGHT_X, RIGHT_Y, SINE, THETA, U, X
+from warpchain.kernels.layout import BOARD_VALUES, COSINE, LEFT_X, SINE, THETA, U, X
 from warpchain.kernels.physics.elementary import ZERO, cos_sin
-from warpchain.kernels.physics.geometry import Link, end_positions
+from warpchain.kernels.physics.geometry import Link, end_positions, put
 from warpchain.kernels.types import Chain, Rows, State
 
 
@@ -34,7 +34,8 @@ def load_link(run: Run, state: State):
     if run.lane < run.links:
         for k in range(6):
             run.K[X + k, run.lane] = state.links[run.world, X + k, run.lane]
-    point(run.K, run.lane)
+    cosine, sine = cos_sin(run.K[THETA, run.lane])
+    put(run.K, COSINE, run.lane, wp.vec2d(cosine, sine))
 
 
 @wp.func
@@ -46,25 +47,15 @@ def write_attempt(run: Run, result: Attempt, h: wp.float64):
         K[layout.BOARD_LOST_FRICTION, lane] = K[layout.BOARD_LOST_FRICTION, lane] + h * result.friction
         dissipation = constants(K).joint_damping * result.damping
         K[layout.BOARD_LOST_DAMPING, lane] = K[layout.BOARD_LOST_DAMPING, lane] + h * dissipation
-        for k in range(3):
-            K[X + k, lane] = result.place[k]
-            K[U + k, lane] = result.velocity[k]
-        K[COSINE, lane] = result.cosine
-        K[SINE, lane] = result.sine
+        put(K, X, lane, result.place)
+        put(K, U, lane, result.velocity)
+        put(K, COSINE, lane, wp.vec2d(result.cosine, result.sine))
 
 
 @wp.func
 def raise_value(K: Rows, value: int, x: wp.float32):
     """Raises one of the chain's values on the board to x; for one thread."""
     K[BOARD_VALUES, value] = wp.max(K[BOARD_VALUES, value], wp.float64(x))
-
-
-@wp.func
-def point(K: Rows, lane: int):
-    """Writes a link's direction, exactly, from its angle on the board."""
-    cosine, sine = cos_sin(K[THETA, lane])
-    K[COSINE, lane] = cosine
-    K[SINE, lane] = sine
 
 
 @wp.func
@@ -81,10 +72,6 @@ def publish(run: Run):
     n = run.links
     if lane < n:
         left_x, left_y, right_x, right_y = ends_of(read_link(K, lane))
-        K[LEFT_X, lane] = left_x
-        K[LEFT_Y, lane] = left_y
-        K[RIGHT_X, lane] = right_x
-        K[RIGHT_Y, lane] = right_y
+        put(K, LEFT_X, lane, wp.vec4d(left_x, left_y, right_x, right_y))
         if lane == 0:
-            K[LEFT_X, n] = left_x
-            K[LEFT_Y, n] = left_y
+            put(K, LEFT_X, n, wp.vec2d(left_x, left_y))

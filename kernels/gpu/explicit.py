@@ -126,9 +126,8 @@ def explicit_attempt(features: Features, block_dim: int, write_proximity: Any, r
                     if wp.static(position_errors[j] != 0.0):
                         position_error += wp.static(wp.float64(position_errors[j])) * rates[j]
                 theta = K[THETA, lane]
-                error, scale = greatest_of_three(
-                    h * h * position_error, vec3d(link.x, link.y, theta), velocity_of(link), h
-                )
+                place = vec3d(link.x, link.y, theta)
+                error, scale = greatest_of_three(h * h * position_error, place, velocity_of(link), h)
                 result.place = vec3d(row.x, row.y, theta + row.turn)
                 result.turns_far = wp.abs(row.turn) > LARGEST_TURN
                 new_cosine, new_sine = cos_sin(theta + row.turn)
@@ -154,9 +153,8 @@ def explicit_attempt(features: Features, block_dim: int, write_proximity: Any, r
         if wp.static(velocity_errors[last] != 0.0):
             velocity_error += wp.static(wp.float64(velocity_errors[last])) * rates[wp.static(last)]
         first = read_first_stage(K, lane)
-        error_v, scale_v = greatest_of_three(
-            h * velocity_error, velocity_of(link), vec3d(first[0], first[1], first[2]), h
-        )
+        rate = vec3d(first[0], first[1], first[2])
+        error_v, scale_v = greatest_of_three(h * velocity_error, velocity_of(link), rate, h)
         error, scale = greater(error, scale, error_v, scale_v)
         result.error = error
         result.scale = scale

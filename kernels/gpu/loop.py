@@ -25,22 +25,13 @@ from warpchain.kernels.gpu.contacts.self_contacts import touch_layout
 from warpchain.kernels.gpu.explicit import explicit_attempt
 from warpchain.kernels.gpu.functions import board_size, shares_board
 from warpchain.kernels.gpu.run import block_run, block_sample
-from warpchain.kernels.gpu.stage import (
-    Attempt,
-    Run,
-    block_stage,
-    error_of,
-    read_link,
-    vec3d,
-    vec5d,
-    write_first_stage,
-)
+from warpchain.kernels.gpu.stage import Attempt, Run, block_stage, error_of, read_link, vec3d, vec5d
 from warpchain.kernels.gpu.threads import barrier, block_maxima, tile_address, vec4i
 from warpchain.kernels.gpu.tilting import block_tilting
 from warpchain.kernels.gpu.upright import block_upright
 from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step, step_controller
 from warpchain.kernels.methods.method import find_method
-from warpchain.kernels.physics.geometry import link_is_finite
+from warpchain.kernels.physics.geometry import link_is_finite, put
 from warpchain.kernels.types import Control, Drive, Integers, Model, Record, State, read_ground
 
 REGISTERS_OF_MULTIPROCESSOR = 65536
@@ -95,7 +86,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         inverse_mass = run.K[layout.INVERSE_MASS, run.column]
         inverse_inertia = run.K[layout.INVERSE_INERTIA, run.column]
         first = stage(forces, run, next_end, read_link(run.K, run.lane), inverse_mass, inverse_inertia)
-        write_first_stage(run.K, run.lane, first)
+        put(run.K, layout.BOARD_FIRST, run.lane, first)
         plane.after_first_stage(run)
 
     @wp.func
@@ -229,7 +220,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 write_attempt(run, result, h)
                 if wp.static(reuses_last):
                     if lane < run.links:
-                        write_first_stage(K, lane, result.last)
+                        put(K, layout.BOARD_FIRST, lane, result.last)
                 time = wp.where(reaches_stop, stop_time, time + h)
                 step = next_step(step, h, wp.float64(growth(error, last_error, control.proportional)))
                 last_error = wp.max(error, wp.float32(1e-4))

@@ -101,7 +101,6 @@ def block_run(features: Features, touch: TouchLayout, plane: BlockPlane):
         attempts: int,
     ):
         K = run.K
-        T = run.T
         lane = run.lane
         world = run.world
         is_last = lacks_last_sample(state, world, time, status)
@@ -120,10 +119,10 @@ def block_run(features: Features, touch: TouchLayout, plane: BlockPlane):
             state.losses[world, layout.LOSS_SELF] = row_total(K, BOARD_LOST_SELF, run.links)
             add_count(state, world, layout.ACCEPTED, wp.int64(accepted))
             add_count(state, world, layout.REJECTED, wp.int64(attempts - accepted))
-            book_hits(T, state, world)
+            book_hits(run.T, state, world)
             state.extremes[world, layout.OPENING] = K[BOARD_VALUES, layout.VALUE_OPENING]
             state.extremes[world, fixed_depth] = K[BOARD_VALUES, layout.VALUE_FIXED_DEPTH]
-            deepest = wp.cast(T[wp.static(touch.deepest)], wp.float32)
+            deepest = wp.cast(run.T[wp.static(touch.deepest)], wp.float32)
             raise_extreme(state, world, layout.SELF_DEPTH, wp.float64(deepest))
             state.is_fresh[world] = 0
             state.has_first_stage[world] = 1

@@ -82,7 +82,6 @@ class Attempt:
 @wp.func_native("return reinterpret_cast<::wp::uint64>(K.data + offset);")
 def address_on_board(K: Rows, offset: int) -> wp.uint64:
     """Where a number on the board lies; with ``K.ptr`` the compiler would not know that it is shared memory."""
-    ...
 
 
 @wp.func
@@ -109,13 +108,6 @@ def write_constants(K: Rows, chain: Chain):
 def read_link(K: Rows, column: int) -> Link:
     """A link, from the board."""
     return geometry.read_link(K, constants(K), column)
-
-
-@wp.func
-def write_first_stage(K: Rows, column: int, first: vec5d):
-    """Writes a link's first stage of the next step on the board."""
-    for k in range(wp.static(layout.STAGE_ROWS)):
-        K[layout.BOARD_FIRST + k, column] = first[k]
 
 
 @wp.func
@@ -205,24 +197,14 @@ def block_stage(features: Features, block_dim: int):
         spin = link.omega - next_end[4]
         force_x = joint_force(chain, next_end[0] - right_x, cu)
         force_y = joint_force(chain, next_end[1] - right_y, cv)
-        torque = friction_torque(
-            K[layout.VISCOUS, run.column], K[layout.COULOMB, run.column], spin, chain.inverse_smoothing
-        )
+        column = run.column
+        torque = friction_torque(K[layout.VISCOUS, column], K[layout.COULOMB, column], spin, chain.inverse_smoothing)
         friction = torque * spin
         damping = cu * cu + cv * cv
         forces[run.lane] = vec3d(force_x, force_y, torque)
         left = forces[run.before]
         ax, ay, at = link_acceleration(
-            inverse_mass,
-            inverse_inertia,
-            link.arm_x,
-            link.arm_y,
-            left[0],
-            left[1],
-            force_x,
-            force_y,
-            left[2],
-            torque,
+            inverse_mass, inverse_inertia, link.arm_x, link.arm_y, left[0], left[1], force_x, force_y, left[2], torque
         )
         felt = constants(K)
         if wp.static(features.tilts):

@@ -17,7 +17,6 @@ from warpchain.kernels.types import Integers
 @wp.func_native("WP_TILE_SYNC();")
 def barrier():
     """Waits until all threads of the block are here; then all see what each wrote before."""
-    ...
 
 
 @wp.func_native("""
@@ -39,7 +38,6 @@ def barrier_count(flags: Integers, slot: int, x: bool) -> int:
 
     Fibers use ``flags[slot]`` instead, which is 0 before and after.
     """
-    ...
 
 
 @wp.func_native("""
@@ -54,7 +52,6 @@ def warp_greatest(x: wp.int32) -> wp.int32:
 
     ``wp.tile_max`` uses shuffles and four barriers instead.
     """
-    ...
 
 
 @wp.func_native("""
@@ -66,7 +63,6 @@ def warp_greatest(x: wp.int32) -> wp.int32:
 """)
 def warp_width() -> int:
     """Number of threads in a hardware warp; 1 for fibers."""
-    ...
 
 
 @wp.func_native("""
@@ -80,7 +76,6 @@ def warp_width() -> int:
 """)
 def clock() -> wp.float64:
     """Time [s] to a fraction of a microsecond; without a GPU in 10⁹ cycles of the processor."""
-    ...
 
 
 @functools.cache
@@ -108,7 +103,6 @@ vec4i = wp.types.vector(length=4, dtype=wp.int32)
 """)
 def write_four(memory: wp.uint64, index: int, value: vec4i):
     """Writes four integers at an index into memory whose address is a multiple of 16."""
-    ...
 
 
 @wp.func_native("""
@@ -121,7 +115,6 @@ def write_four(memory: wp.uint64, index: int, value: vec4i):
 """)
 def read_four(memory: wp.uint64, index: int) -> vec4i:
     """Reads four integers that :func:`write_four` wrote."""
-    ...
 
 
 @functools.cache
@@ -153,8 +146,7 @@ def block_maxima(block_dim: int):
     def read_maxima(memory: wp.uint64):
         top = read_four(memory, 0)
         for i in range(1, wp.static(block_dim) // warp_width()):
-            other = read_four(memory, i)
-            top = wp.max(top, other)
+            top = wp.max(top, read_four(memory, i))
         return top
 
     return greatest, write_maxima, read_maxima

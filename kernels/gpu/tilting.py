@@ -9,28 +9,15 @@ import functools
 import warp as wp
 
 from warpchain.kernels import layout
-from warpchain.kernels.contacts.tilting_floor import (
-    copy_inverse,
-    link_touches,
-    meet_tilting_floor,
-    push_plane_by,
-    steepness,
-)
+from warpchain.kernels.contacts import tilting_floor
 from warpchain.kernels.gpu.contacts.proximity import touching_link
 from warpchain.kernels.gpu.stage import Run, constants, felt_plane
 from warpchain.kernels.gpu.threads import barrier, barrier_count, warp_width
 from warpchain.kernels.gpu.upright import BlockPlane
-from warpchain.kernels.layout import BOARD_VALUES, OMEGA, PLANE_MID, U, V
+from warpchain.kernels.layout import BOARD_VALUES, PLANE_MID, U
+from warpchain.kernels.physics import plane
 from warpchain.kernels.physics.elementary import ZERO
-from warpchain.kernels.physics.plane import (
-    begin_plane_step,
-    end_plane_step,
-    invert_plane_mass,
-    motion_terms,
-    on_plane,
-    place_terms,
-    shift_stage,
-)
+from warpchain.kernels.physics.geometry import put
 from warpchain.kernels.types import Drive, Row, with_circles
 
 SUMS = layout.SUMS_OF_PLACES + layout.SUMS_OF_MOTION
@@ -81,7 +68,6 @@ def add_up(memory: Row, lane: int, block_dim: int, x: vec8d):
 
     After a barrier :func:`added_up` reads the sums over the block.
     """
-    ...
 
 
 @wp.func
@@ -125,16 +111,16 @@ def block_tilting(block_dim: int, votes: int) -> BlockPlane:
         if run.lane == 0:
             for k in range(wp.static(layout.PLANE_VALUES)):
                 run.K[BOARD_VALUES, layout.VALUE_PLANE_BEFORE + k] = run.P[PLANE_MID + k]
-            begin_plane_step(run.P, constants(run.K).gravity, h)
+            plane.begin_step(run.P, constants(run.K).gravity, h)
         barrier()
         if run.lane < run.links:
-            before = on_plane(constants(run.K), run.K[BOARD_VALUES], layout.VALUE_PLANE_BEFORE)
-            shift_stage(run.K, layout.BOARD_FIRST, run.lane, before, felt_plane(run))
+            before = plane.on_plane(constants(run.K), run.K[BOARD_VALUES], layout.VALUE_PLANE_BEFORE)
+            plane.shift_stage(run.K, layout.BOARD_FIRST, run.lane, before, felt_plane(run))
 
     @wp.func
     def sum_up(run: Run):
-        places = place_terms(run.K, constants(run.K), run.column)
-        motion = motion_terms(run.K, run.column)
+        places = plane.place_terms(run.K, constants(run.K), run.column)
+        motion = plane.motion_terms(run.K, run.column)
         terms = vec8d()
         if run.lane < run.links:
             for k in range(wp.static(layout.SUMS_OF_PLACES)):
@@ -146,7 +132,7 @@ def block_tilting(block_dim: int, votes: int) -> BlockPlane:
         if run.lane == 0:
             for k in range(wp.static(SUMS)):
                 run.P[wp.static(layout.PLANE_SUMS + k)] = added_up(run.M, wp.static(k), wp.static(block_dim))
-            invert_plane_mass(run.P)
+            plane.invert_mass(run.P)
 
     @wp.func
     def begin_run(run: Run):
@@ -159,7 +145,7 @@ def block_tilting(block_dim: int, votes: int) -> BlockPlane:
     def end_step(run: Run, h: wp.float64):
         sum_up(run)
         if run.lane == 0:
-            end_plane_step(run.P, constants(run.K).gravity, h)
+            plane.end_step(run.P, constants(run.K).gravity, h)
 
     @wp.func
     def meet(run: Run, _drive: Drive, _time: wp.float64):
@@ -167,27 +153,26 @@ def block_tilting(block_dim: int, votes: int) -> BlockPlane:
         P = run.P
         lane = run.lane
         barrier()  # the plane and its mass are those of the new state
-        chain = with_circles(on_plane(constants(K), P, 0), K[layout.RADIUS, run.column])
-        slope = steepness(chain)
+        chain = with_circles(plane.on_plane(constants(K), P, 0), K[layout.RADIUS, run.column])
+        slope = tilting_floor.steepness(chain)
         link = touching_link(run, chain)
         touches = wp.int64(0)
         if lane < run.links:
-            touches = link_touches(chain, slope, link)
+            touches = tilting_floor.link_touches(chain, slope, link)
         touching = barrier_count(run.T, wp.static(votes), touches > wp.int64(0))
         hits = int(0)
         if touching > 0:
             summed = vec8d()
             if touches > wp.int64(0):
-                met = meet_tilting_floor(chain, slope, copy_inverse(P, wp.float64(touching)), link)
-                K[U, lane] = met.u
-                K[V, lane] = met.v
-                K[OMEGA, lane] = met.omega
+                inverse = tilting_floor.copy_inverse(P, wp.float64(touching))
+                met = tilting_floor.meet_floor(chain, slope, inverse, link)
+                put(K, U, lane, wp.vec3d(met.u, met.v, met.omega))
                 K[layout.BOARD_LOST_FIXED, lane] = K[layout.BOARD_LOST_FIXED, lane] + met.lost
                 summed[0] = met.push
                 summed[1] = met.moment_x
                 summed[2] = met.moment_y
                 hits = int(met.hits)
-            motion = motion_terms(K, run.column)
+            motion = plane.motion_terms(K, run.column)
             if lane < run.links:
                 for k in range(wp.static(layout.SUMS_OF_MOTION)):
                     summed[3 + k] = motion[k]
@@ -196,12 +181,10 @@ def block_tilting(block_dim: int, votes: int) -> BlockPlane:
             if lane == 0:
                 for k in range(wp.static(layout.SUMS_OF_MOTION)):
                     P[wp.static(layout.MOTION_SUMS + k)] = added_up(run.M, wp.static(3 + k), wp.static(block_dim))
-                lost = push_plane_by(
-                    P,
-                    added_up(run.M, 0, wp.static(block_dim)),
-                    added_up(run.M, 1, wp.static(block_dim)),
-                    added_up(run.M, 2, wp.static(block_dim)),
-                )
+                push = added_up(run.M, 0, wp.static(block_dim))
+                moment_x = added_up(run.M, 1, wp.static(block_dim))
+                moment_y = added_up(run.M, 2, wp.static(block_dim))
+                lost = tilting_floor.push_plane_by(P, push, moment_x, moment_y)
                 K[layout.BOARD_LOST_FIXED, 0] = K[layout.BOARD_LOST_FIXED, 0] + lost
         return hits
 

@@ -7,6 +7,8 @@ polynomials with selections, the same source for both devices.
 Coefficients of sine and cosine on [-π/4, π/4]: FreeBSD msun ``k_sin.c``, ``k_cos.c`` (Sun Microsystems, 1993).
 """
 
+import math
+
 import warp as wp
 
 # A Python float inside a wp.func would be rounded to float32 first; wp.constant keeps all 53 bits.
@@ -41,14 +43,8 @@ C4 = wp.constant(wp.float64(-2.75573143513906633035e-07))
 C5 = wp.constant(wp.float64(2.08757232129817482790e-09))
 C6 = wp.constant(wp.float64(-1.13596475577881948265e-11))
 
-# Taylor coefficients, for the small turns within a step.
-T2 = wp.constant(wp.float64(1.0 / 2.0))
-T3 = wp.constant(wp.float64(1.0 / 6.0))
-T4 = wp.constant(wp.float64(1.0 / 24.0))
-T5 = wp.constant(wp.float64(1.0 / 120.0))
-T6 = wp.constant(wp.float64(1.0 / 720.0))
-T7 = wp.constant(wp.float64(1.0 / 5040.0))
-T8 = wp.constant(wp.float64(1.0 / 40320.0))
+# Taylor coefficients 1/k!, for the small turns within a step.
+T2, T3, T4, T5, T6, T7, T8 = (wp.constant(wp.float64(1.0 / math.factorial(k))) for k in range(2, 9))
 
 # Polynomial P with exp(2 r) = 1 + 2 r + r² P(r) for |r| ≤ ln2/4 to a relative error of 3e-16, by Remez's algorithm.
 P0 = wp.constant(wp.float64(1.999999999999933))
@@ -85,7 +81,6 @@ def quotient(a: wp.float64, b: wp.float64) -> wp.float64:
 
     On a GPU the compiler's division takes 128 cycles and branches, so that several do not overlap; this takes 81.
     """
-    ...
 
 
 @wp.func
@@ -127,7 +122,6 @@ def small_turn(turn: wp.float64):
 """)
 def reciprocal(b: wp.float64) -> wp.float64:
     """1 / b as for :func:`quotient`, to two units in the last place; three dependent operations instead of seven."""
-    ...
 
 
 @wp.func_native("""
@@ -140,7 +134,6 @@ def reciprocal(b: wp.float64) -> wp.float64:
 """)
 def capped(x: wp.float64) -> wp.float64:
     """|x|, at most 20, where tanh is 1; a GPU compares upper halves of doubles only."""
-    ...
 
 
 @wp.func_native("""
@@ -152,7 +145,6 @@ def capped(x: wp.float64) -> wp.float64:
 """)
 def with_sign(value: wp.float64, x: wp.float64) -> wp.float64:
     """A positive number with the sign of x."""
-    ...
 
 
 @wp.func

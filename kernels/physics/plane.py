@@ -43,7 +43,7 @@ import warp as wp
 from warpchain.kernels import layout
 from warpchain.kernels.layout import AHEAD, MOMENTUM, ORIGIN, RATE_XX, SUM_MU, SUM_MV, SUM_MX, SUM_MY, SUM_XX, UP
 from warpchain.kernels.physics.elementary import HALF, ONE, ZERO, quotient
-from warpchain.kernels.physics.geometry import Link, read_link
+from warpchain.kernels.physics.geometry import Link, put, read_link, three
 from warpchain.kernels.types import Chain, Row, Rows
 
 THIRD = wp.constant(wp.float64(1.0 / 3.0))
@@ -82,9 +82,7 @@ def shift_stage(K: Rows, row: int, i: int, before: Chain, now: Chain):
     link = read_link(K, now, i)
     ax, ay, turn = plane_load(now, i, link, ZERO, ZERO)
     old_ax, old_ay, old_turn = plane_load(before, i, link, ZERO, ZERO)
-    K[row, i] = K[row, i] + (ax - old_ax)
-    K[row + 1, i] = K[row + 1, i] + (ay - old_ay)
-    K[row + 2, i] = K[row + 2, i] + (turn - old_turn)
+    put(K, row, i, three(K, row, i) + wp.vec3d(ax - old_ax, ay - old_ay, turn - old_turn))
 
 
 @wp.func
@@ -117,7 +115,7 @@ def motion_terms(K: Rows, i: int):
 
 
 @wp.func
-def invert_plane_mass(P: Row):
+def invert_mass(P: Row):
     """Writes the inverse of the plane's mass matrix, from the sums."""
     a00 = P[layout.SUM_MASS]
     a01 = P[SUM_MY]
@@ -258,7 +256,7 @@ def straightened(plane: Plane) -> Plane:
 
 
 @wp.func
-def begin_plane_step(P: Row, gravity: wp.float64, h: wp.float64):
+def begin_step(P: Row, gravity: wp.float64, h: wp.float64):
     """Writes the mean of the plane over a step, and its momenta after the first half."""
     half = HALF * h
     plane = read_plane(P, 0)
@@ -274,7 +272,7 @@ def begin_plane_step(P: Row, gravity: wp.float64, h: wp.float64):
 
 
 @wp.func
-def end_plane_step(P: Row, gravity: wp.float64, h: wp.float64):
+def end_step(P: Row, gravity: wp.float64, h: wp.float64):
     """Carries the plane to the end of the step that has begun; the sums must be those of the links there."""
     half = HALF * h
     inverse = ONE / h

@@ -29,7 +29,6 @@ def body_pass(features: Features, plane: Plane):
     """
     face_at = BODIES[features.fixed_body].motion
     _, depth, count = of_fixed_body(features.is_driven)
-    has_floor = features.has_floor
     moves = features.moving_sprocket
     if moves:
         sprocket_gap, resolve_sprocket = fixed_contacts("moving sprocket")
@@ -46,7 +45,7 @@ def body_pass(features: Features, plane: Plane):
             raise_extreme(state, world, depth, -gap)
             impulses = plane.meet(K, P, chain, ground, face_at(still, drive, world, time))
             add_count(state, world, count, impulses)
-            if wp.static(has_floor):
+            if wp.static(features.has_floor):
                 if impulses > wp.int64(0):
                     note_floor_impulse(state, world, time)
         if wp.static(moves):

@@ -11,24 +11,18 @@ import functools
 import warp as wp
 
 from warpchain.kernels.contacts.list_layout import list_layout
-from warpchain.kernels.contacts.pair_list import bucket_of, listing_reach
-from warpchain.kernels.layout import LISTED_X, LISTED_Y, RIGHT_X, RIGHT_Y
-from warpchain.kernels.physics.elementary import HALF, order_bits
-from warpchain.kernels.physics.geometry import whole_lanes
+from warpchain.kernels.contacts.pair_list import bucket_of, listing_reach, square_distance
+from warpchain.kernels.cpu.contacts.proximity import greatest_distance
+from warpchain.kernels.layout import LISTED_X, RIGHT_X, RIGHT_Y
+from warpchain.kernels.physics.elementary import HALF
+from warpchain.kernels.physics.geometry import put, two
 from warpchain.kernels.types import Chain, Integers, Rows
 
 
 @wp.func
 def greatest_displacement(K: Rows, chain: Chain):
     """Greatest displacement [m] of a joint since the list was built."""
-    greatest = wp.int64(0)
-    i = int(0)
-    while i < whole_lanes(chain.link_count):
-        dx = K[RIGHT_X, i] - K[LISTED_X, i]
-        dy = K[RIGHT_Y, i] - K[LISTED_Y, i]
-        greatest = wp.max(greatest, wp.where(i < chain.link_count, order_bits(dx * dx + dy * dy), wp.int64(0)))
-        i += 1
-    return wp.sqrt(wp.cast(greatest, wp.float64))
+    return greatest_distance(K, chain, RIGHT_X, 0, LISTED_X)
 
 
 @functools.cache
@@ -72,8 +66,7 @@ def neighbour_list(columns: int):
             L[wp.static(lists.cell_y) + i] = cell_y
             L[wp.static(lists.next_joint) + i] = L[wp.static(lists.bucket) + bucket]
             L[wp.static(lists.bucket) + bucket] = i
-            K[LISTED_X, i] = K[RIGHT_X, i]
-            K[LISTED_Y, i] = K[RIGHT_Y, i]
+            put(K, LISTED_X, i, two(K, RIGHT_X, i))
             i += 1
         total = int(0)
         fits = bool(True)
@@ -88,9 +81,7 @@ def neighbour_list(columns: int):
                 # joints were put in ascending order, so a bucket is read in descending order
                 while q > p:
                     if L[wp.static(lists.cell_x) + q] == cell_x and L[wp.static(lists.cell_y) + q] == cell_y:
-                        dx = K[RIGHT_X, q] - K[RIGHT_X, p]
-                        dy = K[RIGHT_Y, q] - K[RIGHT_Y, p]
-                        if dx * dx + dy * dy < square:
+                        if square_distance(K, p, q) < square:
                             if total < wp.static(lists.capacity):
                                 # insertion keeps this joint's partners in ascending order
                                 k = total

@@ -16,7 +16,7 @@ from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.contacts.tilting_floor import greatest_across_speed
 from warpchain.kernels.layout import LEFT_X, LEFT_Y, LOST_FIXED, OMEGA, RADIUS, RIGHT_X, RIGHT_Y, SINE, U, V, X, Y
 from warpchain.kernels.physics.elementary import ONE, TWO, ZERO, from_order_key, order_bits, order_key
-from warpchain.kernels.physics.geometry import LANES, whole_lanes
+from warpchain.kernels.physics.geometry import LANES, put, two, whole_lanes
 from warpchain.kernels.types import Chain, Ground, Row, Rows, with_circles
 
 FURTHEST = wp.constant(wp.int64(2**63 - 1))
@@ -25,16 +25,22 @@ GAP = layout.ERROR
 
 
 @wp.func
-def greatest_opening(K: Rows, chain: Chain):
-    """Greatest joint opening |C| [m] of the placed links."""
+def greatest_distance(K: Rows, chain: Chain, a: int, shift: int, b: int):
+    """Greatest distance [m] of two points of a link: rows a and a + 1 at i + shift, rows b and b + 1 at i."""
     greatest = wp.int64(0)
     i = int(0)
     while i < whole_lanes(chain.link_count):
-        cx = K[LEFT_X, i + 1] - K[RIGHT_X, i]
-        cy = K[LEFT_Y, i + 1] - K[RIGHT_Y, i]
-        greatest = wp.max(greatest, wp.where(i < chain.link_count, order_bits(cx * cx + cy * cy), wp.int64(0)))
+        between = two(K, a, i + shift) - two(K, b, i)
+        square = between[0] * between[0] + between[1] * between[1]
+        greatest = wp.max(greatest, wp.where(i < chain.link_count, order_bits(square), wp.int64(0)))
         i += 1
     return wp.sqrt(wp.cast(greatest, wp.float64))
+
+
+@wp.func
+def greatest_opening(K: Rows, chain: Chain):
+    """Greatest joint opening |C| [m] of the placed links."""
+    return greatest_distance(K, chain, LEFT_X, 1, RIGHT_X)
 
 
 @wp.func
@@ -136,9 +142,7 @@ def fixed_contacts(fixed_body: str):
                         if K[GAP, i] >= ZERO:
                             continue
                     link = meet(with_circles(chain, K[RADIUS, i]), ground, face, placed_link(K, i))
-                    K[U, i] = link.u
-                    K[V, i] = link.v
-                    K[OMEGA, i] = link.omega
+                    put(K, U, i, wp.vec3d(link.u, link.v, link.omega))
                     K[LOST_FIXED, i] = link.lost
                     impulses += wp.where(i < chain.link_count, link.hits, wp.int64(0))
             first += LANES

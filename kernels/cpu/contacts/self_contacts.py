@@ -16,19 +16,10 @@ import functools
 
 import warp as wp
 
-from warpchain.kernels.contacts.link_pair import (
-    B_T,
-    DEPTH,
-    Contact,
-    are_neighbours,
-    are_strands,
-    circles_of_links,
-    collide,
-    divisors,
-    links_of,
-    natural,
-)
+from warpchain.kernels.contacts import link_pair
+from warpchain.kernels.contacts.link_pair import B_T, DEPTH, Contact, are_neighbours, collide, natural
 from warpchain.kernels.contacts.list_layout import GEOMETRY_COLUMNS, GEOMETRY_ROWS, list_layout
+from warpchain.kernels.contacts.pair_list import square_distance
 from warpchain.kernels.layout import LEFT_X, LEFT_Y, RADIUS, RIGHT_X, RIGHT_Y, X, Y
 from warpchain.kernels.physics.elementary import TWO, ZERO, order_bits
 from warpchain.kernels.physics.geometry import two
@@ -68,11 +59,9 @@ def self_contacts(columns: int):
         while k < total:
             p = natural(L[wp.static(lists.first) + k])
             q = natural(L[wp.static(lists.second) + k])
-            dx = K[RIGHT_X, q] - K[RIGHT_X, p]
-            dy = K[RIGHT_Y, q] - K[RIGHT_Y, p]
             L[wp.static(lists.found_first) + touching] = p
             L[wp.static(lists.found_second) + touching] = q
-            touching += wp.where(dx * dx + dy * dy < square, 1, 0)
+            touching += wp.where(square_distance(K, p, q) < square, 1, 0)
             k += 1
         return touching
 
@@ -100,8 +89,8 @@ def self_contacts(columns: int):
         while k < count:
             p = L[wp.static(lists.found_first) + first + k]
             q = L[wp.static(lists.found_second) + first + k]
-            link_a, link_b = links_of(p, q, half, second, chain.link_count)
-            contact = circles_of_links(
+            link_a, link_b = link_pair.links_of(p, q, half, second, chain.link_count)
+            contact = link_pair.circles_of_links(
                 G[a + END_RADIUS, k],
                 G[b + END_RADIUS, k],
                 two(G, a + END_X, k),
@@ -152,15 +141,15 @@ def self_contacts(columns: int):
                         depth = G[row + DEPTH, k]
                         if depth > ZERO:
                             deepest = wp.max(deepest, order_bits(depth))
-                            link_a, link_b = links_of(p, q, half, second, chain.link_count)
+                            link_a, link_b = link_pair.links_of(p, q, half, second, chain.link_count)
                             contact = Contact()
                             for number in range(wp.static(B_T + 1)):
                                 contact[number] = G[row + number, k]
-                            inverse_nn, inverse_determinant = divisors(K, link_a, link_b, contact)
+                            inverse_nn, inverse_determinant = link_pair.divisors(K, link_a, link_b, contact)
                             energy, hits = collide(K, chain, link_a, link_b, contact, inverse_nn, inverse_determinant)
                             lost += energy
                             impulses += hits
-                            if are_strands(link_a, link_b, chain.link_count):
+                            if link_pair.are_strands(link_a, link_b, chain.link_count):
                                 strands += hits
                         second += 1
                     k += 1

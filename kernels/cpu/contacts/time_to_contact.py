@@ -11,6 +11,7 @@ import warp as wp
 
 from warpchain.kernels.contacts.fixed_body import BODIES
 from warpchain.kernels.contacts.list_layout import list_layout
+from warpchain.kernels.contacts.pair_list import square_distance
 from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.cpu.contacts.proximity import greatest_speed
 from warpchain.kernels.features import Features
@@ -32,13 +33,11 @@ SMALLEST_GAP = wp.constant(wp.float64(1e-9))
 def meeting_of(K: Rows, chain: Chain, p: int, q: int):
     """(Relative speed) / (distance) [1/s] of the circles of two joints."""
     a = chain.half_length
-    dx = K[RIGHT_X, q] - K[RIGHT_X, p]
-    dy = K[RIGHT_Y, q] - K[RIGHT_Y, p]
     turn_p = a * K[OMEGA, p]
     turn_q = a * K[OMEGA, q]
     du = K[U, q] - turn_q * K[SINE, q] - K[U, p] + turn_p * K[SINE, p]
     dv = K[V, q] + turn_q * K[COSINE, q] - K[V, p] - turn_p * K[COSINE, p]
-    gap = wp.max(wp.sqrt(dx * dx + dy * dy) - TWO * chain.circle_radius, SMALLEST_GAP)
+    gap = wp.max(wp.sqrt(square_distance(K, p, q)) - TWO * chain.circle_radius, SMALLEST_GAP)
     return wp.sqrt(du * du + dv * dv) / gap
 
 

@@ -27,7 +27,7 @@ from warpchain.kernels.methods.controller import classical_controller
 from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.methods.w_tableaus import ERROR_ORDER
 from warpchain.kernels.physics.elementary import ONE, TWO, ZERO
-from warpchain.kernels.physics.geometry import put
+from warpchain.kernels.physics.geometry import put, two
 from warpchain.kernels.physics.load import weight
 from warpchain.kernels.types import Chain, Control, Rows, State
 
@@ -82,9 +82,7 @@ def joint_switch(columns: int, first_row: int):
         give = ONE / chain.joint_stiffness
         c = int(8)
         while c < end_column(chain):
-            cx = S[RIGHT, c] - give * S[FORCE, c]
-            cy = S[RIGHT + 1, c] - give * S[FORCE + 1, c]
-            put(S, RIGHT, c, wp.vec2d(cx, cy))
+            put(S, RIGHT, c, two(S, RIGHT, c) - give * two(S, FORCE, c))
             c += 1
         rigid.solve_joints(S, chain)
         rigid.push(S, BASE, chain)
@@ -144,12 +142,9 @@ def rigid_in_flight(name: str, columns: int) -> Joints:
     def attempt(
         K: Rows, chain: Chain, state: State, control: Control, world: int, h: wp.float64, tolerance: wp.float64
     ):
-        bits = wp.int64(0)
         if state.is_rigid[world] == 0:
-            bits = on_springs.attempt(K, chain, state, control, world, h, tolerance)
-        else:
-            bits = attempt_flight(K, chain, h, control.flight_tolerance)
-        return bits
+            return on_springs.attempt(K, chain, state, control, world, h, tolerance)
+        return attempt_flight(K, chain, h, control.flight_tolerance)
 
     @wp.func
     def shrinkage(state: State, world: int, error: wp.float64):
@@ -159,23 +154,17 @@ def rigid_in_flight(name: str, columns: int) -> Joints:
 
     @wp.func
     def accept(K: Rows, chain: Chain, state: State, control: Control, world: int, h: wp.float64, error: wp.float64):
-        may_stay = bool(True)
-        factor = ONE
         if state.is_rigid[world] == 0:
-            factor, may_stay = on_springs.accept(K, chain, state, control, world, h, error)
-        else:
-            may_stay = commit_flight(K, chain, h)
-            factor = growth(error, state.last_error[world], control.proportional)
-        return factor, may_stay
+            return on_springs.accept(K, chain, state, control, world, h, error)
+        may_stay = commit_flight(K, chain, h)
+        return growth(error, state.last_error[world], control.proportional), may_stay
 
     @wp.func
     def margins(state: State, control: Control, world: int):
-        skin = control.skin
-        least_slack = ZERO
-        if state.is_rigid[world] != 0:
-            skin = FLIGHT_SKIN * control.skin
-            least_slack = LEAST_SLACK * skin
-        return skin, least_slack
+        if state.is_rigid[world] == 0:
+            return on_springs.margins(state, control, world)
+        skin = FLIGHT_SKIN * control.skin
+        return skin, LEAST_SLACK * skin
 
     @wp.func
     def react(K: Rows, chain: Chain, state: State, world: int):

@@ -24,7 +24,7 @@ from warpchain.kernels.cpu.implicit.rigid_layout import BASE, COSINE, FREE, INVE
 from warpchain.kernels.cpu.implicit.solver import cyclic_solver, end_column, link_at, segment_places
 from warpchain.kernels.layout import STAGES, X
 from warpchain.kernels.physics.elementary import HALF, ONE, ZERO, cos_sin, order_bits
-from warpchain.kernels.physics.geometry import Link, put, three
+from warpchain.kernels.physics.geometry import Link, put, three, two
 from warpchain.kernels.physics.joint import friction_torque
 from warpchain.kernels.physics.load import weight
 from warpchain.kernels.physics.rigid_joint import inward_pull, turning_share
@@ -112,13 +112,12 @@ def solve_joints(S: Rows, chain: Chain):
 @wp.func
 def pushed_at(S: Rows, a: wp.float64, c: int):
     """M⁻¹ Gᵀ P of a link: how the last solution P (forces, impulses or displacements) changes x, y and θ."""
-    left_x = S[RIGHT, c - 8]
-    left_y = S[RIGHT + 1, c - 8]
-    right_x = S[RIGHT, c]
-    right_y = S[RIGHT + 1, c]
-    lever = a * (S[COSINE, c] * (right_y + left_y) - S[SINE, c] * (right_x + left_x))
-    inverse_mass = S[INVERSE_MASS, c]
-    return wp.vec3d((right_x - left_x) * inverse_mass, (right_y - left_y) * inverse_mass, lever * S[INVERSE_INERTIA, c])
+    left = two(S, RIGHT, c - 8)
+    right = two(S, RIGHT, c)
+    both = right + left
+    lever = a * (S[COSINE, c] * both[1] - S[SINE, c] * both[0])
+    pushed = (right - left) * S[INVERSE_MASS, c]
+    return wp.vec3d(pushed[0], pushed[1], lever * S[INVERSE_INERTIA, c])
 
 
 @wp.func
@@ -174,10 +173,9 @@ def openings(S: Rows, chain: Chain):
     greatest = wp.int64(0)
     c = int(8)
     while c < end_column(chain):
-        cx = (S[BASE, c + 8] - S[BASE, c]) - a * (S[COSINE, c + 8] + S[COSINE, c])
-        cy = (S[BASE + 1, c + 8] - S[BASE + 1, c]) - a * (S[SINE, c + 8] + S[SINE, c])
-        put(S, RIGHT, c, wp.vec2d(cx, cy))
-        greatest = wp.max(greatest, order_bits(cx * cx + cy * cy))
+        opening = (two(S, BASE, c + 8) - two(S, BASE, c)) - a * (two(S, COSINE, c + 8) + two(S, COSINE, c))
+        put(S, RIGHT, c, opening)
+        greatest = wp.max(greatest, order_bits(opening[0] * opening[0] + opening[1] * opening[1]))
         c += 1
     return wp.sqrt(wp.cast(greatest, wp.float64))
 
@@ -198,16 +196,21 @@ def opening_rates(S: Rows, chain: Chain):
 
 
 @wp.func
-def stretching(S: Rows, chain: Chain):
-    """Energy [J] of springs that are open by the right-hand side."""
+def sum_of_squares(S: Rows, row: int, chain: Chain):
+    """Σ (x² + y²) over the joints, of vectors in this row and the next."""
     total = ZERO
     c = int(8)
     while c < end_column(chain):
-        cx = S[RIGHT, c]
-        cy = S[RIGHT + 1, c]
-        total += S[at.COUNTED, c] * (cx * cx + cy * cy)
+        vector = two(S, row, c)
+        total += S[at.COUNTED, c] * (vector[0] * vector[0] + vector[1] * vector[1])
         c += 1
-    return HALF * chain.joint_stiffness * total
+    return total
+
+
+@wp.func
+def stretching(S: Rows, chain: Chain):
+    """Energy [J] of springs that are open by the right-hand side."""
+    return HALF * chain.joint_stiffness * sum_of_squares(S, RIGHT, chain)
 
 
 @wp.func
@@ -220,7 +223,7 @@ def begin(S: Rows, chain: Chain):
     solve_forces(S, chain)
     c = int(8)
     while c < end_column(chain):
-        put(S, at.FORCE, c, wp.vec2d(S[RIGHT, c], S[RIGHT + 1, c]))
+        put(S, at.FORCE, c, two(S, RIGHT, c))
         put(S, at.BASE_RATE, c, three(S, at.RATE, c))
         c += 1
 
@@ -242,14 +245,7 @@ def kinetic_energy(S: Rows, chain: Chain):
 @wp.func
 def are_stiff(S: Rows, chain: Chain):
     """Whether springs would hold so little energy with the state's joint forces that they count as rigid."""
-    square = ZERO
-    c = int(8)
-    while c < end_column(chain):
-        fx = S[at.FORCE, c]
-        fy = S[at.FORCE + 1, c]
-        square += S[at.COUNTED, c] * (fx * fx + fy * fy)
-        c += 1
-    held = HALF * square / chain.joint_stiffness
+    held = HALF * sum_of_squares(S, at.FORCE, chain) / chain.joint_stiffness
     return held <= GREATEST_STRETCHING * kinetic_energy(S, chain)
 
 

@@ -136,9 +136,7 @@ def _vectors(layout: SegmentLayout) -> str:
         lanes* const first = reinterpret_cast<lanes*>(S.data);
         const long next_row = S.shape[1] / {LANES};
         const auto at_place = [=](int row, int p) {{ return first + next_row * row + p; }};
-        const auto at_separators = [=](int number) {{
-            return at_place({layout.separators}, number);
-        }};
+        const auto at_separators = [=](int number) {{ return at_place({layout.separators}, number); }};
         const auto load = [](auto& to, const lanes* from, long stride) {{
             for (auto& number : to.m) {{
                 number = *from;
@@ -158,6 +156,12 @@ def _vectors(layout: SegmentLayout) -> str:
                 for (int j = 0; j < width; j++)
                     for (int k = 0; k < {size}; k++)
                         to.m[width * i + j] += sign * a(i, k) * b.m[width * k + j];
+        }};
+        // to += sign a b for the a that is stored from this number on
+        const auto add_stored = [=](auto& to, const lanes* stored, long stride, const auto& b, double sign) {{
+            submatrix a;
+            load(a, stored, stride);
+            add(to, a, b, sign);
         }};
         const auto invert = [](const submatrix& m) {{
             submatrix to;
@@ -269,46 +273,35 @@ def cyclic_solver(layout: SegmentLayout):
 
     @wp.func_native(f"""
         {vectors}
-        submatrix factor;
         column value = {{}}, own = {{}}, next;
         for (int p = 1; p < places; p++) {{
             load(next, at_place({layout.right}, p), next_row);
             if (p == 1)
                 for (auto& number : next.m) number = where_repeated(lanes{{}}, number);
-            load(factor, at_place({lower}, p), next_row);
-            add(next, factor, value, -1.0);
+            add_stored(next, at_place({lower}, p), next_row, value, -1.0);
             value = column{{}};
-            load(factor, at_place({diagonal}, p), next_row);
-            add(value, factor, next, 1.0);
-            load(factor, at_place({head}, p), next_row);
-            add(own, factor, value, 1.0);
+            add_stored(value, at_place({diagonal}, p), next_row, next, 1.0);
+            add_stored(own, at_place({head}, p), next_row, value, 1.0);
             store(value, at_place({layout.right}, p), next_row);
         }}
         load(next, at_place({layout.right}, places), next_row);
-        load(factor, at_place({lower}, places), next_row);
-        add(next, factor, value, -1.0);
+        add_stored(next, at_place({lower}, places), next_row, value, -1.0);
         value = next;
-        load(factor, at_separators({coupling}), 1);
-        add(value, factor, turned(own, 1), -1.0);
+        add_stored(value, at_separators({coupling}), 1, turned(own, 1), -1.0);
         #pragma unroll
         for (int r = 0; r < {ROUNDS}; r++) {{
             const column from_before = turned(value, {LANES} - (1 << r)), from_after = turned(value, 1 << r);
-            load(factor, at_separators({rounds} + {2 * square} * r), 1);
-            add(value, factor, from_before, -1.0);
-            load(factor, at_separators({rounds + square} + {2 * square} * r), 1);
-            add(value, factor, from_after, -1.0);
+            add_stored(value, at_separators({rounds} + {2 * square} * r), 1, from_before, -1.0);
+            add_stored(value, at_separators({rounds + square} + {2 * square} * r), 1, from_after, -1.0);
         }}
         next = column{{}};
-        load(factor, at_separators({last_pivot}), 1);
-        add(next, factor, value, 1.0);
+        add_stored(next, at_separators({last_pivot}), 1, value, 1.0);
         store(next, at_place({layout.right}, places), next_row);
         const column before = turned(next, {LANES - 1});
         for (int p = places - 1; p > 0; p--) {{
             load(value, at_place({layout.right}, p), next_row);
-            load(factor, at_place({fill}, p), next_row);
-            add(value, factor, before, 1.0);
-            load(factor, at_place({upper}, p), next_row);
-            add(value, factor, next, -1.0);
+            add_stored(value, at_place({fill}, p), next_row, before, 1.0);
+            add_stored(value, at_place({upper}, p), next_row, next, -1.0);
             store(value, at_place({layout.right}, p), next_row);
             next = value;
         }}

@@ -32,10 +32,8 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
         after the step.
     """
     lists = list_layout(features.columns)
-    has_floor = features.has_floor
     has_fixed = features.fixed_body != "none"
     has_self = features.self_contact
-    moves = features.moving_sprocket
     _, _, time_to_contact = block_proximity(features, block_dim)
     build_list = block_list(features.columns, block_dim)
     clear_contacts, find_contacts, resolve_contacts = block_self_contacts(features.columns, block_dim, touch)
@@ -92,7 +90,7 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
                 hits = plane.meet(run, drive, time)
                 if hits > 0:
                     wp.atomic_add(T, wp.static(touch.fixed_hits), hits)
-        if wp.static(moves):
+        if wp.static(features.moving_sprocket):
             is_near = bool(True)
             if lane < run.links:
                 struck = meet_sprocket(run, drive, time)
@@ -110,7 +108,7 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
         if wp.static(has_fixed):
             if gap < wp.float32(0.0) and lane == 0:
                 raise_value(run.K, layout.VALUE_FIXED_DEPTH, -gap)
-                if wp.static(has_floor):
+                if wp.static(features.has_floor):
                     if is_hit:
                         note_floor_impulse(state, run.world, time)
         if wp.static(has_self):

@@ -8,10 +8,11 @@ import functools
 import warp as wp
 
 from warpchain.kernels.contacts.list_layout import list_layout
-from warpchain.kernels.contacts.pair_list import bucket_of, listing_reach
+from warpchain.kernels.contacts.pair_list import bucket_of, listing_reach, square_distance
 from warpchain.kernels.gpu.stage import Run, constants
 from warpchain.kernels.gpu.threads import barrier
-from warpchain.kernels.layout import BOARD_LISTED_X, BOARD_LISTED_Y, RIGHT_X, RIGHT_Y
+from warpchain.kernels.layout import BOARD_LISTED_X, RIGHT_X, RIGHT_Y
+from warpchain.kernels.physics.geometry import put, two
 from warpchain.kernels.types import Integers, Rows
 
 
@@ -30,9 +31,7 @@ def block_list(columns: int, block_dim: int):
             while q >= 0:
                 # a bucket may serve several cells
                 if q > p and L[wp.static(lists.cell_x) + q] == cell_x and L[wp.static(lists.cell_y) + q] == cell_y:
-                    dx = K[RIGHT_X, q] - K[RIGHT_X, p]
-                    dy = K[RIGHT_Y, q] - K[RIGHT_Y, p]
-                    if dx * dx + dy * dy < square:
+                    if square_distance(K, p, q) < square:
                         slot = wp.atomic_add(L, wp.static(lists.count), 1)
                         if slot < wp.static(lists.capacity):
                             L[wp.static(lists.first) + slot] = p
@@ -46,7 +45,6 @@ def block_list(columns: int, block_dim: int):
         K = run.K
         L = run.L
         lane = run.lane
-        n = run.links
         reach = listing_reach(constants(K), skin, opening)
         square = reach * reach
         if lane == 0:
@@ -54,9 +52,8 @@ def block_list(columns: int, block_dim: int):
         for i in range(lane, wp.static(lists.table), wp.static(block_dim)):
             L[wp.static(lists.bucket) + i] = -1
         barrier()
-        if lane < n:
-            K[BOARD_LISTED_X, lane] = K[RIGHT_X, lane]
-            K[BOARD_LISTED_Y, lane] = K[RIGHT_Y, lane]
+        if lane < run.links:
+            put(K, BOARD_LISTED_X, lane, two(K, RIGHT_X, lane))
             cell_x = int(wp.floor(K[RIGHT_X, lane] / reach))
             cell_y = int(wp.floor(K[RIGHT_Y, lane] / reach))
             bucket = bucket_of(cell_x, cell_y, wp.static(lists.table))
@@ -64,7 +61,7 @@ def block_list(columns: int, block_dim: int):
             L[wp.static(lists.cell_y) + lane] = cell_y
             L[wp.static(lists.next_joint) + lane] = wp.atomic_exch(L, wp.static(lists.bucket) + bucket, lane)
         barrier()
-        if lane < n:
+        if lane < run.links:
             search_cells(K, L, lane, square)
         barrier()
         return L[wp.static(lists.count)]

@@ -12,10 +12,10 @@ from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.board import ends_of
 from warpchain.kernels.gpu.stage import Proximity, Run, constants, felt_plane, read_link, vec5d
 from warpchain.kernels.gpu.threads import block_maxima, vec4i
-from warpchain.kernels.layout import COSINE, INVERSE_INERTIA, INVERSE_MASS, OMEGA, RADIUS, SINE, U, V
+from warpchain.kernels.layout import COSINE, INVERSE_INERTIA, INVERSE_MASS, RADIUS, SINE, U
 from warpchain.kernels.methods.controller import quick_quotient, quick_root
 from warpchain.kernels.physics.elementary import TWO, from_order_key_single, order_bits_single, order_key_single
-from warpchain.kernels.physics.geometry import Link
+from warpchain.kernels.physics.geometry import Link, put
 from warpchain.kernels.types import Chain, Control, Drive, with_circles
 
 OPENING_MARGIN = wp.constant(wp.float64(1.0 + 1e-6))
@@ -88,10 +88,9 @@ def block_proximity(features: Features, block_dim: int):
                 felt = with_circles(felt_plane(run), K[RADIUS, run.lane])
             if wp.static(has_floor and tilts):
                 slope = steepness(felt)
-                lowest = wp.min(
-                    middle_height(felt, slope, left_x, left_y), middle_height(felt, slope, right_x, right_y)
-                )
-                gap = lowest - felt.half_width * wp.abs(felt.up_z)
+                left = middle_height(felt, slope, left_x, left_y)
+                right = middle_height(felt, slope, right_x, right_y)
+                gap = wp.min(left, right) - felt.half_width * wp.abs(felt.up_z)
                 values[1] = order_key_single(wp.float32(-gap))
             elif wp.static(has_fixed):
                 own = with_circles(constants(K), K[RADIUS, run.lane])
@@ -148,9 +147,7 @@ def block_contact(fixed_body: str):
         chain = with_circles(constants(K), K[RADIUS, run.lane])
         face = face_at(face_of(run.ground), drive, run.world, time)
         link = meet(chain, run.ground, face, touching_link(run, chain))
-        K[U, run.lane] = link.u
-        K[V, run.lane] = link.v
-        K[OMEGA, run.lane] = link.omega
+        put(K, U, run.lane, wp.vec3d(link.u, link.v, link.omega))
         K[layout.BOARD_LOST_FIXED, run.lane] = link.lost
         return int(link.hits)
 

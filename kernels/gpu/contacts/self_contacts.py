@@ -16,21 +16,15 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from warpchain.kernels.contacts.link_pair import (
-    B_T,
-    DEPTH,
-    Contact,
-    are_strands,
-    collide,
-    links_of,
-    natural,
-    touching_circles,
-)
+from warpchain.kernels.contacts import link_pair
+from warpchain.kernels.contacts.link_pair import B_T, DEPTH, Contact, natural
 from warpchain.kernels.contacts.list_layout import list_layout
+from warpchain.kernels.contacts.pair_list import square_distance
 from warpchain.kernels.gpu.stage import Run
 from warpchain.kernels.gpu.threads import barrier, barrier_count
-from warpchain.kernels.layout import BOARD_LOST_SELF, RIGHT_X, RIGHT_Y, consecutive_offsets
+from warpchain.kernels.layout import BOARD_LOST_SELF, consecutive_offsets
 from warpchain.kernels.physics.elementary import TWO, ZERO
+from warpchain.kernels.physics.geometry import put
 from warpchain.kernels.types import Chain, Integers, Rows
 
 JOINT_BITS = 11
@@ -93,14 +87,14 @@ def joints_of(key: int):
 def links_at(key: int, n: int):
     """The two links of a contact."""
     p, q, half = joints_of(key)
-    return links_of(p, q, half & 1, key & 1, n)
+    return link_pair.links_of(p, q, half & 1, key & 1, n)
 
 
 @wp.func
 def circles_at(K: Rows, chain: Chain, key: int):
     """The geometry of a contact, see :func:`contacts.link_pair.touching_circles`."""
     p, q, half = joints_of(key)
-    return touching_circles(K, chain, p, q, half, key & 1)
+    return link_pair.touching_circles(K, chain, p, q, half, key & 1)
 
 
 @wp.func
@@ -135,12 +129,9 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
 
     @wp.func
     def pair_at(L: Integers, T: Integers, k: int):
-        pair = int(0)
         if k < wp.static(touch.shared_pairs):
-            pair = T[wp.static(touch.pairs) + k]
-        else:
-            pair = L[wp.static(lists.touching) + k]
-        return pair
+            return T[wp.static(touch.pairs) + k]
+        return L[wp.static(lists.touching) + k]
 
     @wp.func
     def order(L: Integers, T: Integers, lane: int, touching: int):
@@ -167,7 +158,6 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
     @wp.func
     def find(run: Run, chain: Chain, pairs: int, opening: wp.float64):
         """Number of pairs of joints that may touch now; the board is written. ``opening``: greatest |C| [m]."""
-        K = run.K
         L = run.L
         T = run.T
         lane = run.lane
@@ -176,9 +166,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         for k in range(lane, pairs, wp.static(block_dim)):
             p = L[wp.static(lists.first) + k]
             q = L[wp.static(lists.second) + k]
-            dx = K[RIGHT_X, q] - K[RIGHT_X, p]
-            dy = K[RIGHT_Y, q] - K[RIGHT_Y, p]
-            if dx * dx + dy * dy < square:
+            if square_distance(run.K, p, q) < square:
                 slot = wp.atomic_add(T, wp.static(touch.touching), 1)
                 if slot < wp.static(touch.shared_pairs):
                     T[wp.static(touch.pairs) + slot] = pair_key(p, q)
@@ -195,19 +183,12 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         wp.atomic_max(T, wp.static(touch.deepest), wp.cast(wp.float32(depth), wp.int32))
 
     @wp.func
-    def count_strands(T: Integers, chain: Chain, link_a: int, link_b: int, hits: wp.int64):
-        if are_strands(link_a, link_b, chain.link_count):
-            wp.atomic_add(T, wp.static(touch.strand_hits), int(hits))
-
-    @wp.func
     def prepare(run: Run, chain: Chain, key: int):
         """Stores the geometry of a thread's first contact.
 
         Returns:
             Its key, or DONE if the circles do not overlap, and its depth [m].
         """
-        E = run.E
-        F = run.F
         lane = run.lane
         contact, inverse_nn, inverse_determinant = circles_at(run.K, chain, key)
         depth = contact[DEPTH]
@@ -215,26 +196,30 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         if depth > ZERO:
             own = key
             for k in range(5):
-                E[k, lane] = contact[1 + k]
-            F[0, lane] = contact[B_T]
-            F[1, lane] = inverse_nn
-            F[2, lane] = inverse_determinant
+                run.E[k, lane] = contact[1 + k]
+            put(run.F, 0, lane, wp.vec3d(contact[B_T], inverse_nn, inverse_determinant))
             raise_depth(run.T, depth)
         return own, depth
 
     @wp.func
+    def hit(run: Run, chain: Chain, a: int, b: int, contact: Contact, inverse_nn: wp.float64, inverse_det: wp.float64):
+        """Resolves a contact of links A and B; returns the number of impulses."""
+        K = run.K
+        lost_before = K[BOARD_LOST_SELF, a]
+        lost, hits = link_pair.collide(K, chain, a, b, contact, inverse_nn, inverse_det)
+        K[BOARD_LOST_SELF, a] = lost_before + lost
+        if link_pair.are_strands(a, b, chain.link_count):
+            wp.atomic_add(run.T, wp.static(touch.strand_hits), int(hits))
+        return int(hits)
+
+    @wp.func
     def resolve_prepared(run: Run, chain: Chain, link_a: int, link_b: int, depth: wp.float64):
         """Resolves a thread's first contact; returns the number of impulses."""
-        K = run.K
         E = run.E
         F = run.F
         lane = run.lane
-        lost_before = K[BOARD_LOST_SELF, link_a]
         contact = Contact(depth, E[0, lane], E[1, lane], E[2, lane], E[3, lane], E[4, lane], F[0, lane])
-        lost, hits = collide(K, chain, link_a, link_b, contact, F[1, lane], F[2, lane])
-        K[BOARD_LOST_SELF, link_a] = lost_before + lost
-        count_strands(run.T, chain, link_a, link_b, hits)
-        return int(hits)
+        return hit(run, chain, link_a, link_b, contact, F[1, lane], F[2, lane])
 
     @wp.func
     def overlaps(run: Run, chain: Chain, key: int):
@@ -246,12 +231,8 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
     @wp.func
     def resolve_further(run: Run, chain: Chain, key: int, link_a: int, link_b: int):
         """Resolves a further contact; returns the number of impulses."""
-        K = run.K
-        contact, inverse_nn, inverse_determinant = circles_at(K, chain, key)
-        lost, hits = collide(K, chain, link_a, link_b, contact, inverse_nn, inverse_determinant)
-        K[BOARD_LOST_SELF, link_a] = K[BOARD_LOST_SELF, link_a] + lost
-        count_strands(run.T, chain, link_a, link_b, hits)
-        return int(hits)
+        contact, inverse_nn, inverse_determinant = circles_at(run.K, chain, key)
+        return hit(run, chain, link_a, link_b, contact, inverse_nn, inverse_determinant)
 
     @wp.func
     def resolve(run: Run, chain: Chain, touching: int):

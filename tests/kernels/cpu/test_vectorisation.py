@@ -18,7 +18,7 @@ features = loop.Features(method=sys.argv[2], columns=200, fixed_body=sys.argv[3]
 wp.load_module(loop.make_advance(features).module, device="cpu")
 """
 
-COMMON = {"place_ends", "attempt", "greatest_opening", "greatest_speed", "greatest_displacement", "evaluate"}
+COMMON = {"place_ends", "attempt", "greatest_distance", "greatest_speed", "evaluate"}
 EXPLICIT = COMMON | {"begin_stages", "derivatives", "commit"}
 RIGID = COMMON | {
     *("fastest", "meeting", "prepare", "place_stage", "factorise", "solve_forces", "damp", "keep_stage"),
