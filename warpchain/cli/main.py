@@ -111,8 +111,7 @@ def _print_version(wanted: bool) -> None:
 def _warpchain(
     context: typer.Context,
     version: Annotated[
-        bool,
-        typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit."),
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
     ] = False,
 ) -> None:
     """Walking roller chains: a loop of chain, spun up on a sprocket, is dropped and walks away."""

@@ -29,10 +29,7 @@ def sweep(
     gpus: Annotated[
         int | None, option("N", "Run on the first N GPUs of this machine, a process for each.", min=1)
     ] = None,
-    part: Annotated[
-        str | None,
-        option("K/N", "Run only the K-th of N parts; merge puts them together."),
-    ] = None,
+    part: Annotated[str | None, option("K/N", "Run only the K-th of N parts; merge puts them together.")] = None,
     seed: Annotated[int | None, option("S", "Seed instead of the file's.", min=0)] = None,
     samples: Annotated[int | None, option("N", "Samples of each cell instead of the file's.", min=1)] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Discard what another sweep left in the folder.")] = False,
@@ -108,8 +105,7 @@ def plot(
     path: Annotated[Path, argument("PATH", "Folder of a sweep or of a saved walk, or the file of either.")],
     folder: Annotated[Path | None, output("DIR", "Folder of the figures. Default: that of PATH.")] = None,
     quantity: Annotated[
-        str | None,
-        option("NAME", "Column of a sweep to draw: dx, walk_time, bounces, hold_time ... Default: dx."),
+        str | None, option("NAME", "Column of a sweep to draw: dx, walk_time, bounces, hold_time ... Default: dx.")
     ] = None,
     kind: Annotated[
         Literal["film_strip", "height_and_speed", "loop", "energy", "tilt"] | None,

@@ -55,12 +55,7 @@ _Point = Annotated[
     | Annotated[tuple[_Coordinate, _Coordinate, _Restitution, _Friction], Strict(False), Tag("(law)")],
     Discriminator(lambda given: "(law)" if isinstance(given, list | tuple) and len(given) > 2 else "(place)"),
 ]
-Points = Annotated[
-    tuple[_Point, ...],
-    Strict(False),
-    Field(max_length=MOST_POINTS),
-    AfterValidator(_without_overhang),
-]
+Points = Annotated[tuple[_Point, ...], Strict(False), Field(max_length=MOST_POINTS), AfterValidator(_without_overhang)]
 """A profile: points x, y [m], and e and μ of the line that begins there, if it has its own."""
 
 

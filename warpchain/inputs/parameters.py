@@ -13,16 +13,7 @@ from typing import Any, Final, Literal, Self
 
 from pydantic import model_validator
 
-from warpchain.inputs.validation import (
-    DIMENSIONLESS,
-    InputError,
-    Section,
-    by_name,
-    number_field,
-    short,
-    shown,
-    validated,
-)
+from warpchain.inputs.validation import InputError, Section, by_name, number_field, short, shown, validated
 
 Source = Literal["measured", "looked up", "adjusted", "chosen here"]
 
@@ -53,7 +44,7 @@ class Quantity:
 
     Attributes:
         symbol: symbol in the paper's equations.
-        unit: SI unit, `DIMENSIONLESS` for pure numbers.
+        unit: SI unit, "1" for pure numbers.
         value: value in Table 1, in `unit`.
         sigma: standard deviation in Table 1, in `unit`; 0 when the table gives none.
         source: how the value was obtained; "chosen here" when it is not in the paper.
@@ -99,23 +90,17 @@ class Parameters(Section):
     viscous_friction: float = _row("β", "N m s", 9e-5, 1e-5, TORQUE, "measured", "joint torque per angular velocity")
     coulomb_friction: float = _row("τ_c", "N m", 1.10e-4, 9e-6, TORQUE, "measured", "joint torque at speeds above ω_c")
     floor_restitution: float = _row(
-        "e_fc", DIMENSIONLESS, 0.018, 0.004, FRACTION, "measured", "normal restitution, floor and chain"
+        "e_fc", "1", 0.018, 0.004, FRACTION, "measured", "normal restitution, floor and chain"
     )
-    floor_friction: float = _row(
-        "μ_fc", DIMENSIONLESS, 0.27, 0.02, FRICTION, "measured", "friction coefficient, floor and chain"
-    )
+    floor_friction: float = _row("μ_fc", "1", 0.27, 0.02, FRICTION, "measured", "friction coefficient, floor and chain")
     gravity: float = _row("g", "m/s²", 9.809, 0.0, GRAVITY, "looked up", "gravitational acceleration, along −y")
-    chain_restitution: float = _row(
-        "e_cc", DIMENSIONLESS, 0.80, 0.0, FRACTION, "looked up", "normal restitution, two links"
-    )
-    chain_friction: float = _row(
-        "μ_cc", DIMENSIONLESS, 0.62, 0.0, FRACTION, "looked up", "friction coefficient, two links"
-    )
+    chain_restitution: float = _row("e_cc", "1", 0.80, 0.0, FRACTION, "looked up", "normal restitution, two links")
+    chain_friction: float = _row("μ_cc", "1", 0.62, 0.0, FRACTION, "looked up", "friction coefficient, two links")
     sprocket_restitution: float = _row(
-        "e_sc", DIMENSIONLESS, 0.01, 0.0, FRACTION, "adjusted", "normal restitution, sprocket and chain"
+        "e_sc", "1", 0.01, 0.0, FRACTION, "adjusted", "normal restitution, sprocket and chain"
     )
     sprocket_friction: float = _row(
-        "μ_sc", DIMENSIONLESS, 0.99, 0.0, FRACTION, "adjusted", "friction coefficient, sprocket and chain"
+        "μ_sc", "1", 0.99, 0.0, FRACTION, "adjusted", "friction coefficient, sprocket and chain"
     )
     joint_stiffness: float = _row("k", "N/m", 1e9, 0.0, STIFFNESS, "adjusted", "stiffness of a joint's spring")
     joint_damping: float = _row("b", "N s/m", 1e3, 0.0, DAMPING, "adjusted", "damping of a joint's spring")
@@ -123,7 +108,7 @@ class Parameters(Section):
         "ω_c", "rad/s", 1e-3, 0.0, TURNING, "adjusted", "width of Coulomb friction's sign change, tanh(ω/ω_c)"
     )
     tangential_restitution: float = _row(
-        "e_t", DIMENSIONLESS, 0.0, 0.0, SIGNED_FRACTION, "adjusted", "tangential restitution, all pairs"
+        "e_t", "1", 0.0, 0.0, SIGNED_FRACTION, "adjusted", "tangential restitution, all pairs"
     )
     circle_radius: float = _row("r", "m", 4.2e-3, 0.0, LENGTH, "chosen here", "radius of the circle at a link end")
     """Not in the paper: between the roller (3.9 mm) and the plates (about 5 mm) of a half-inch chain."""

@@ -4,20 +4,11 @@ import inspect
 from collections.abc import Callable, Container, Iterable, Mapping
 from typing import Any, Final, TypeVar
 
+from warpchain.inputs import validation
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene
-from warpchain.inputs.validation import (
-    NAME_OF_SYMBOL,
-    SECTION_OF,
-    SYMBOL_OF,
-    InputError,
-    Section,
-    by_name,
-    full_name,
-    shown,
-    suggested_name,
-)
+from warpchain.inputs.validation import NAME_OF_SYMBOL, SECTION_OF, SYMBOL_OF, InputError, Section, shown
 
 __all__ = ["NAME_OF_SYMBOL", "SECTIONS", "SECTION_OF", "SYMBOL_OF", "by_section", "dotted_name", "takes_fields"]
 
@@ -56,7 +47,7 @@ def takes_fields(*sections: str, without: Container[str] = (), beside: Iterable[
 def by_section(settings: Mapping[str, object]) -> dict[str, dict[str, object]]:
     """Values by name or symbol, sorted into `SECTIONS`, unchecked; an `InputError` if there is no such field."""
     sections: dict[str, dict[str, object]] = {section: {} for section in SECTIONS}
-    for name, value in by_name(settings).items():
+    for name, value in validation.by_name(settings).items():
         sections[SECTION_OF[dotted_name(name, shown(name))]][name] = value
     return sections
 
@@ -67,7 +58,7 @@ def dotted_name(written: str, path: str) -> str:
     An `InputError` that begins with `path` says that there is none.
     """
     section, _, last = written.rpartition(".")
-    name: str = full_name(last)
+    name: str = validation.full_name(last)
     if name not in SECTION_OF or section not in ("", SECTION_OF[name]):
-        raise InputError(f"{path}: unknown name; {suggested_name(last)}")
+        raise InputError(f"{path}: unknown name; {validation.suggested_name(last)}")
     return name

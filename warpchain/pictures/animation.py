@@ -21,20 +21,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpchain.files import checked_output, replacing, write_whole
-from warpchain.pictures.chain import (
-    SIDE,
-    circle_radii,
-    draw_chain,
-    draw_ground,
-    draw_release,
-    draw_sprocket,
-    floor_height,
-    floor_line,
-    sprocket_centers,
-    sprocket_circle,
-    stretches,
-    walk_box,
-)
+from warpchain.pictures import chain
 from warpchain.pictures.style import BLUE, GROUND, INK, tidy
 from warpchain.pictures.walk_shape import center_in_room, checked_joints, headline
 
@@ -169,19 +156,19 @@ def player(walk: "WalkResult", slow: float = 4.0) -> str:
     times, box = walk.frame_time[frames], side_box(walk, joints)
     marks = floor_marks(*box[0])
     center = np.stack([np.interp(times, walk.time, walk.center[:, axis]) for axis in (0, 1)], axis=1)
-    places, ends = sprocket_centers(walk, times), box[0] + np.array([-3, 3]) * np.ptp(box[0])
+    places, ends = chain.sprocket_centers(walk, times), box[0] + np.array([-3, 3]) * np.ptp(box[0])
     data = {
         "time": _whole(times, 1e6),
         "joints": _whole(joints[frames, :, :2].reshape(count, -1)),
         "center": _whole(center),
-        "radii": _whole(circle_radii(walk)),
+        "radii": _whole(chain.circle_radii(walk)),
         "sprocket": None if sprocket is None else _whole(np.array([*sprocket, walk.sprocket_radius])),
         "places": _whole(places[~np.isnan(places[:, 0])]),
         "view": _whole(box.ravel()),
         "marks": marks,
-        "heights": _whole(np.array(floor_height(walk, np.array(marks)))),
-        "floor": _whole(floor_line(walk, *ends)),
-        "stretches": [[color, label, _whole(faces)] for color, label, faces in stretches(walk, *ends)],
+        "heights": _whole(np.array(chain.floor_height(walk, np.array(marks)))),
+        "floor": _whole(chain.floor_line(walk, *ends)),
+        "stretches": [[color, label, _whole(faces)] for color, label, faces in chain.stretches(walk, *ends)],
         "slow": slow,
         "colors": {"inner": INNER, "outer": OUTER, "edge": EDGE},
     }
@@ -207,7 +194,7 @@ def side_box(walk: "WalkResult", joints: Array) -> Array:
 
     It is at least as broad as high, so that titles and marks have room.
     """
-    low, high = walk_box(walk, joints)
+    low, high = chain.walk_box(walk, joints)
     broad = max(0.0, (high[1] - low[1]) - (high[0] - low[0])) / 2
     low[0], high[0] = low[0] - broad, high[0] + broad
     return np.array([[low[0], low[1] - 0.045 * max(high[:2] - low[:2])], high[:2]]).T
@@ -227,17 +214,17 @@ class Film:
             ValueError: the walk has no frames or broken ones.
         """
         self._walk, self._joints, self._center = walk, checked_joints(walk), center_in_room(walk)
-        self._radii = circle_radii(walk)
+        self._radii = chain.circle_radii(walk)
         self._tilts = walk.joints_in_room is not None
-        self._view = Rotation.from_euler("yx", _CORNER, degrees=True).as_matrix() if self._tilts else SIDE
-        low, high = walk_box(walk, self._joints)
+        self._view = Rotation.from_euler("yx", _CORNER, degrees=True).as_matrix() if self._tilts else chain.SIDE
+        low, high = chain.walk_box(walk, self._joints)
         if not self._tilts:
             box = side_box(walk, self._joints)
         else:  # the floor at least as broad as the chain is high
             broad = max(0.0, high[1] - (high[2] - low[2])) / 2
             low[2], high[2] = low[2] - broad, high[2] + broad
             corners = np.array([[x, 0.0, z] for z in (low[2], high[2]) for x in (low[0], high[0])])
-            circle = sprocket_circle(walk)
+            circle = chain.sprocket_circle(walk)
             shown = [corners, self._joints.reshape(-1, 3), *([] if circle is None else [circle])]
             seen = np.concatenate(shown) @ self._view[:2].T
             box = np.array([seen.min(axis=0), seen.max(axis=0)]).T
@@ -248,9 +235,9 @@ class Film:
         self._canvas: Any = FigureCanvasAgg(self.figure)
         share = _PADDING / size
         self._axes = self.figure.add_axes((*share[0], *(1 - share.sum(axis=0))), xlim=box[0], ylim=box[1])
-        draw_release(self._axes, walk, self._view)
+        chain.draw_release(self._axes, walk, self._view)
         if not self._tilts:
-            draw_ground(self._axes, walk, floor_line(walk, *box[0]), box[1, 0])
+            chain.draw_ground(self._axes, walk, chain.floor_line(walk, *box[0]), box[1, 0])
             self._axes.set(yticks=[], xticks=floor_marks(*box[0]))
             self._axes.set_xlabel("$x$ / m", loc="right")
             labels = self._axes.get_legend_handles_labels()
@@ -272,8 +259,8 @@ class Film:
         path = self._project(self._center[: max(1, int(np.searchsorted(walk.time, moment, side="right")))])
         clock: dict[str, Any] = {"ha": "right", "va": "top", "fontsize": 11, "color": INK}
         self._moving = [
-            *draw_sprocket(axes, walk, moment),
-            draw_chain(axes, joints, self._radii, self._view, (INNER, OUTER, EDGE), edge=0.45, halo=False),
+            *chain.draw_sprocket(axes, walk, moment),
+            chain.draw_chain(axes, joints, self._radii, self._view, (INNER, OUTER, EDGE), edge=0.45, halo=False),
             *axes.plot(*path, color=INK, linewidth=0.8, zorder=4),
             *axes.plot(*path[:, -1:], "o", color=INK, markersize=5, zorder=4),
             self.figure.text(0.985, 0.975, f"{moment:.3f} s", **clock),

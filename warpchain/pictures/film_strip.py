@@ -14,19 +14,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from warpchain.pictures.chain import (
-    ABOVE,
-    SIDE,
-    circle_radii,
-    draw_chain,
-    draw_ground,
-    draw_release,
-    draw_sprocket,
-    floor_height,
-    floor_line,
-    from_floor,
-    walk_box,
-)
+from warpchain.pictures import chain
 from warpchain.pictures.inline import InlineFigure
 from warpchain.pictures.style import DOTS, GROUND, INK, tidy
 from warpchain.pictures.walk_shape import center_in_room, checked_joints, setting
@@ -70,7 +58,7 @@ def film_strip(walk: "WalkResult", figure: Figure | None = None) -> Figure:
     """
     joints = checked_joints(walk)
     tilts = walk.joints_in_room is not None
-    low, high = walk_box(walk, joints)
+    low, high = chain.walk_box(walk, joints)
     moments = [] if tilts else _moments(walk)
     size = high - low
     broad = max(size[2], 0.15 * size[0]) if tilts else 0.0
@@ -89,37 +77,37 @@ def film_strip(walk: "WalkResult", figure: Figure | None = None) -> Figure:
     bottom = _FOOT + lower + _BELOW
     side = panel(left, bottom, width, height)
     side.set(xlim=(low[0], high[0]), ylim=(low[1] - depth, high[1] + top), xlabel="x / m", ylabel="y / m")
-    views = [(setting(walk), side, SIDE)]
-    draw_ground(side, walk, floor_line(walk, low[0], high[0]), low[1] - depth)
+    views = [(setting(walk), side, chain.SIDE)]
+    chain.draw_ground(side, walk, chain.floor_line(walk, low[0], high[0]), low[1] - depth)
     _draw_distance(side, walk, low[1], 0.5 * depth)
     if tilts:
         z = (low[2] + high[2]) / 2 + np.array([0.5, -0.5]) * broad
         above = panel(left, _FOOT + 0.5, width, scale * broad)
         above.set(xlim=(low[0], high[0]), ylim=z, xlabel="x / m", ylabel="z / m", facecolor=GROUND)
         above.yaxis.set_major_locator(MaxNLocator(5))
-        views.append(("from above", above, ABOVE))
+        views.append(("from above", above, chain.ABOVE))
     # viridis without its palest end, which can hardly be seen on white paper
     colors = colormaps["viridis"](0.9 * walk.frame_time / (walk.frame_time[-1] or 1.0))[:, :3]
     center = center_in_room(walk)
     path = np.stack([np.interp(walk.frame_time, walk.time, row) for row in center.T], axis=1)
-    radius = circle_radii(walk)
+    radius = chain.circle_radii(walk)
     shown = _instants(path, float(np.ptp(joints[0, :, 0])))
     for title, axes, view in views:
         for frame in shown:
-            draw_chain(axes, joints[frame], radius, view, _link_colors(colors[frame]), edge=0.25)
-            draw_sprocket(axes, walk, walk.frame_time[frame], facecolor="none", edgecolor=colors[frame])
+            chain.draw_chain(axes, joints[frame], radius, view, _link_colors(colors[frame]), edge=0.25)
+            chain.draw_sprocket(axes, walk, walk.frame_time[frame], facecolor="none", edgecolor=colors[frame])
         _draw_way(axes, walk, center, view)
         tidy(axes)
         axes.set_title(title, fontsize="medium", loc="left")
     for number, (frame, title, spot) in enumerate(moments):
         axes = panel(_LEFT + number * close_up_width, _FOOT + 0.5, close_up_width - 0.1, lower - 0.5)
         half = 0.5 * _CLOSE_UP_LINKS * walk.setup.parameters.link_length
-        line = floor_line(walk, spot[0] - half, spot[0] + half)
+        line = chain.floor_line(walk, spot[0] - half, spot[0] + half)
         half_height = half / _CLOSE_UP_ASPECT
         bottom = max(spot[1] - half_height, line[:, 1].min() - 0.2 * half_height)
-        draw_chain(axes, joints[frame], radius, SIDE, _link_colors(colors[frame]), edge=0.6)
-        draw_sprocket(axes, walk, walk.frame_time[frame], facecolor="none", edgecolor=colors[frame])
-        draw_ground(axes, walk, line, min(bottom, line[:, 1].min()))
+        chain.draw_chain(axes, joints[frame], radius, chain.SIDE, _link_colors(colors[frame]), edge=0.6)
+        chain.draw_sprocket(axes, walk, walk.frame_time[frame], facecolor="none", edgecolor=colors[frame])
+        chain.draw_ground(axes, walk, line, min(bottom, line[:, 1].min()))
         axes.set(xlim=line[[0, -1], 0], ylim=(bottom, bottom + 2 * half_height), yticks=[], xlabel="x / m")
         axes.set_xticks([x for x in MaxNLocator(4).tick_values(*line[[0, -1], 0]) if abs(x - spot[0]) < 0.8 * half])
         axes.set_title(f"{title}, {walk.frame_time[frame]:.3f} s", fontsize="medium", loc="left")
@@ -148,8 +136,8 @@ def _instants(path: Array, width: float) -> list[int]:
 def _write_times(axes: Axes, times: Array, joints: Array, colors: Array, gap: float, inch: float) -> None:
     """Write times [s] above the highest joints of k chains, (k, n, 2), by a gap [m], higher where texts would touch."""
     taken = np.array([text.get_position() for text in axes.texts]).reshape(-1, 2)
-    for moment, chain, color in zip(times, joints, colors, strict=True):
-        place = chain[np.argmax(chain[:, 1])] + (0.0, gap)
+    for moment, its_joints, color in zip(times, joints, colors, strict=True):
+        place = its_joints[np.argmax(its_joints[:, 1])] + (0.0, gap)
         while np.any(np.all(np.abs(taken - place) < np.array([0.38, 0.13]) * inch, axis=1)):
             place[1] += 0.02 * inch
         taken = np.append(taken, [place], axis=0)
@@ -159,7 +147,7 @@ def _write_times(axes: Axes, times: Array, joints: Array, colors: Array, gap: fl
 
 def _draw_way(axes: Axes, walk: "WalkResult", center: Array, view: Array) -> None:
     """The sprocket, its height above the floor, and the path of the centre of mass."""
-    draw_release(axes, walk, view)
+    chain.draw_release(axes, walk, view)
     axes.plot(*(view @ center.T)[:2], color=INK, linewidth=1.4, linestyle=DOTS, label="centre of mass", zorder=4)
 
 
@@ -169,7 +157,7 @@ def _draw_distance(axes: Axes, walk: "WalkResult", low: float, depth: float) -> 
         return
     slope = walk.setup.scene.slope
     x = walk.center[-1, 0] - np.array([walk.dx * np.cos(np.radians(slope)), 0.0])
-    floor = floor_height(walk, x)
+    floor = chain.floor_height(walk, x)
     y = (floor if slope != 0 else low) - depth + 0 * x
     arrow = {"arrowstyle": "<|-|>", "color": INK, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", (x[1], y[1]), (x[0], y[0]), arrowprops=arrow, zorder=4)
@@ -181,8 +169,8 @@ def _draw_distance(axes: Axes, walk: "WalkResult", low: float, depth: float) -> 
 
 def _moments(walk: "WalkResult") -> list[tuple[int, str, Array]]:
     """At most four frames in order of time, no frame twice, with what happens there and where, (2,)."""
-    joints, radius = walk.frame_joints, circle_radii(walk).max()
-    above, last = from_floor(walk, joints), len(joints) - 1
+    joints, radius = walk.frame_joints, chain.circle_radii(walk).max()
+    above, last = chain.from_floor(walk, joints), len(joints) - 1
     found: dict[int, tuple[str, Array]] = {}
     touching = np.flatnonzero(above.min(axis=1) < 1.02 * radius)
     if touching.size:
@@ -197,7 +185,7 @@ def _moments(walk: "WalkResult") -> list[tuple[int, str, Array]]:
             found[frame] = title, spot_of(joints[frame])
     middle = np.median(joints[last, :, 0])
     title = "rest" if walk.status is Status.AT_REST else "end"
-    found[last] = title, np.array([middle, floor_height(walk, middle)])
+    found[last] = title, np.array([middle, chain.floor_height(walk, middle)])
     return [(frame, *found[frame]) for frame in sorted(found)]
 
 

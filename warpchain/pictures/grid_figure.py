@@ -20,17 +20,9 @@ from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
 from warpchain.inputs.validation import InputError, shown
+from warpchain.pictures import labels
 from warpchain.pictures.inline import InlineFigure
-from warpchain.pictures.labels import (
-    COUNTS,
-    lost_note,
-    math_symbol,
-    quantity_label,
-    quantity_text,
-    short_texts,
-    unit_text,
-    with_unit,
-)
+from warpchain.pictures.labels import math_symbol, short_texts, unit_text, with_unit
 from warpchain.pictures.style import BLUE, FAINT, GROUND, LINE_COLORS, RED, NothingToShow, panel_grid, tidy
 
 if TYPE_CHECKING:
@@ -98,7 +90,7 @@ def draw_grid(
         NothingToShow: no block has an axis of several values, or there is no mean.
     """
     panels, left_out = _all_panels(blocks, x)
-    label = with_unit(quantity_text(quantity), next(iter(blocks.values())).unit)
+    label = with_unit(labels.quantity_text(quantity), next(iter(blocks.values())).unit)
     are_lines = all(panel.kind == "lines" for panel in panels)
     alike = len({(panel.kind, panel.across, panel.along) for panel in panels}) == 1
     columns = len(panels) if len(panels) <= 3 else min(4, math.ceil(len(panels) ** 0.5))
@@ -113,11 +105,11 @@ def draw_grid(
         else:
             means = np.concatenate([each.cells.mean.ravel() for each in panels if each.kind == "map"])
             image = _draw_map(axes, panel, (np.nanmin(means), np.nanmax(means)))
-        note = lost_note([vars(panel.cells)])
-        name = quantity_label(panel.across.name) if not alike or axes in areas[-columns:] else ""
+        note = labels.lost_note([vars(panel.cells)])
+        name = labels.quantity_label(panel.across.name) if not alike or axes in areas[-columns:] else ""
         axes.set_xlabel(f"{name}\n{note}".strip())
         if not (alike or are_lines) or axes in areas[::columns]:
-            axes.set_ylabel(quantity_label(panel.along.name) if panel.kind == "map" and panel.along else label)
+            axes.set_ylabel(labels.quantity_label(panel.along.name) if panel.kind == "map" and panel.along else label)
     if left_out:
         owner.suptitle(f"{len(panels)} of {len(panels) + left_out} panels", fontsize="medium", color=RED)
     if image is not None:
@@ -170,7 +162,7 @@ def _panels(cells: "CellStatistics", x: str | None, block: str) -> Iterator[Pane
         table = table[np.ix_(*rising)].reshape([len(axis.values) for axis in several]).transpose(order)
         return table[..., np.newaxis, :] if along is None else table
 
-    tables = {name: arranged(getattr(cells, name)) for name in ("mean", "sd", *COUNTS)}
+    tables = {name: arranged(getattr(cells, name)) for name in ("mean", "sd", *labels.COUNTS)}
     texts = [
         [f"{math_symbol(axis.name)} = {text} {unit_text(axis.name)}".rstrip() for text in short_texts(axis.values)]
         for axis in others
@@ -283,10 +275,7 @@ def _draw_map(axes: Axes, panel: Panel, limits: tuple[float, float]) -> Any:
 
 
 def _draw_legends(
-    owner: Figure | SubFigure,
-    areas: Sequence[Axes],
-    panels: Sequence[Panel],
-    palettes: Mapping[str, Mapping[Any, str]],
+    owner: Figure | SubFigure, areas: Sequence[Axes], panels: Sequence[Panel], palettes: Mapping[str, Mapping[Any, str]]
 ) -> None:
     """One legend of all panels; if their lines are of several axes, each panel has one of its own, too."""
     style: dict[str, Any] = {"frameon": False, "fontsize": "small"}

@@ -17,18 +17,7 @@ from numpy.typing import NDArray
 
 from warpchain.pictures.grid_figure import draw_grid
 from warpchain.pictures.labels import COUNTS, DISTANCE, FREQUENCY, cell_values, lost_note, quantity_name
-from warpchain.pictures.style import (
-    BLUE,
-    FAINT,
-    GREEN,
-    INK,
-    LINE_COLORS,
-    RED,
-    NothingToShow,
-    Picture,
-    panel_grid,
-    tidy,
-)
+from warpchain.pictures.style import BLUE, FAINT, GREEN, INK, LINE_COLORS, RED, NothingToShow, Picture, panel_grid, tidy
 from warpchain.reports.sensitivity import sensitivity
 from warpchain.store.block_result import BlockResult
 from warpchain.store.sweep_result import SweepResult

@@ -17,17 +17,9 @@ from warpchain.status import Status
 from warpchain.store.cell_statistics import CellStatistics
 from warpchain.sweeps.block import POINT, Block
 from warpchain.sweeps.plan import Sweep
+from warpchain.walks import rows
 from warpchain.walks.faults import LENGTHS
-from warpchain.walks.rows import (
-    COLUMNS,
-    MISSING,
-    Column,
-    drawn_column,
-    faults_of_columns,
-    field_column,
-    numbers_of,
-    quantity_of,
-)
+from warpchain.walks.rows import COLUMNS, MISSING, Column, quantity_of
 from warpchain.walks.walk_result import WalkResult, read_motion
 
 if TYPE_CHECKING:
@@ -113,7 +105,7 @@ class BlockResult:
             return Column("<i8", "1", f"number of the {of}")
         if not any(name in known for known in (self.columns, self.axes, self.planned.points)):
             raise KeyError(f"{shown(name)}: {suggestion(name, (*self.columns, *self.axes))}")
-        return COLUMNS[name] if name in COLUMNS else field_column(name)
+        return COLUMNS[name] if name in COLUMNS else rows.field_column(name)
 
     @property
     def is_there(self) -> NDArray[np.bool_]:
@@ -242,7 +234,7 @@ class BlockResult:
         (motion,) = (read_motion(group, setup.scene.links) for _, group in self.kept_motions(at))
         return WalkResult(
             status=Status(int(values["status"])),
-            **numbers_of(values),
+            **rows.numbers_of(values),
             **motion,
             wall_time=math.nan,
             setup=setup,
@@ -257,7 +249,7 @@ class BlockResult:
     @cached_property
     def faults(self) -> dict[str, NDArray[np.bool_]]:
         """What makes walks inaccurate, a key of `warpchain.walks.faults.FAULTS` → whether each walk has it."""
-        return faults_of_columns(self.columns, {name: self.planned.parameter(name) for name in LENGTHS})
+        return rows.faults_of_columns(self.columns, {name: self.planned.parameter(name) for name in LENGTHS})
 
     @property
     def inaccurate(self) -> NDArray[np.bool_]:
@@ -282,7 +274,7 @@ class BlockResult:
         Values of parameter sets (`points`) and those that samples drew; NaN of a walk that is not there.
         """
         points = [*self.planned.points]
-        whole = self.to_xarray().reset_coords(points)[[*points, *map(drawn_column, self.drawn)]]
+        whole = self.to_xarray().reset_coords(points)[[*points, *map(rows.drawn_column, self.drawn)]]
         array = whole.to_dataarray("quantity").astype(float).assign_coords(quantity=[*points, *self.drawn])
         return array.transpose(*self.dims, "quantity")
 

@@ -152,10 +152,7 @@ class SweepResult:
         return located(list(self.blocks.values()), index)
 
     def plot(
-        self,
-        quantity: str = "dx",
-        x: str | None = None,
-        figure: "Figure | SubFigure | None" = None,
+        self, quantity: str = "dx", x: str | None = None, figure: "Figure | SubFigure | None" = None
     ) -> "Figure | SubFigure":
         """Draw the mean of a quantity over the grids of all blocks, with its standard error.
 
@@ -256,10 +253,7 @@ def _load_merged(path: Folder) -> SweepResult:
 
 
 def _result(
-    sweep: Sweep,
-    provenance: dict[str, Any],
-    column: Callable[[int, str], Array],
-    motions: Callable[[int], Array],
+    sweep: Sweep, provenance: dict[str, Any], column: Callable[[int, str], Array], motions: Callable[[int], Array]
 ) -> SweepResult:
     """A result, given what returns a stored column of a block by its number, and the motions of a block."""
     blocks = {}

@@ -77,8 +77,7 @@ class Frames(Series):
 
 
 _SWITCH: Final = BeforeValidator(
-    lambda given: ({} if given else None) if isinstance(given, bool) else given,
-    json_schema_input_type=bool | Frames,
+    lambda given: ({} if given else None) if isinstance(given, bool) else given, json_schema_input_type=bool | Frames
 )
 
 

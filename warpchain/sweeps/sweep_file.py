@@ -10,42 +10,15 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
-    Discriminator,
-    Field,
-    GetPydanticSchema,
-    Tag,
-    ValidationError,
-    ValidationInfo,
-    create_model,
-    model_validator,
-)
+import pydantic
+from pydantic import AfterValidator, BaseModel, Field, ValidationError, ValidationInfo, model_validator
 
+from warpchain.inputs import validation
 from warpchain.inputs.distributions import DRAWABLE, LARGEST_SEED, TABLE, Distribution, Gaussian, Uniform
 from warpchain.inputs.parameters import PRESETS
 from warpchain.inputs.scene import COMPOUND
 from warpchain.inputs.sections import SECTIONS
-from warpchain.inputs.validation import (
-    FIELDS,
-    LONGEST_NAME,
-    SECTION_OF,
-    STRICT,
-    SYMBOL_OF,
-    WHOLE,
-    InputError,
-    ModelT,
-    Whole,
-    by_name,
-    field_bounds,
-    full_name,
-    plain,
-    refusals,
-    shown,
-    suggestion,
-)
+from warpchain.inputs.validation import FIELDS, SECTION_OF, STRICT, SYMBOL_OF, InputError, ModelT, Whole, shown
 from warpchain.inputs.yaml_files import read_yaml
 from warpchain.sweeps.axes import CELL_LIMIT, Name, axis, list_of, named_axis
 from warpchain.sweeps.block import POINT, Block, Value
@@ -79,14 +52,14 @@ def _with_symbols(schema: dict[str, Any]) -> None:
 class _Given(BaseModel):
     """A mapping of names or symbols; what comes of it is a dict of what is given, by full names and in its order."""
 
-    model_config = STRICT | ConfigDict(json_schema_extra=_with_symbols)
+    model_config = STRICT | pydantic.ConfigDict(json_schema_extra=_with_symbols)
 
     @model_validator(mode="wrap")
     @classmethod
     def _in_its_order(cls, values: Any, check: Callable[[Any], Self]) -> Any:
         if not isinstance(values, Mapping):
             return check(values)
-        named = by_name(values)
+        named = validation.by_name(values)
         checked = check(named)
         return {name: getattr(checked, name) for name in named}
 
@@ -105,8 +78,8 @@ _AXES: Final = {name: (named_axis if name in COMPOUND else axis)(kind) for name,
 def _mapping_of(title: str, types: Mapping[str, Any]) -> Any:
     """Annotation of a mapping of names with values of these types."""
     fields: dict[str, Any] = {name: (kind, None) for name, kind in types.items()}
-    model = create_model(title, __base__=_Given, **fields)
-    return GetPydanticSchema(lambda _, handler: handler(model))
+    model = pydantic.create_model(title, __base__=_Given, **fields)
+    return pydantic.GetPydanticSchema(lambda _, handler: handler(model))
 
 
 def _section(name: str) -> Any:
@@ -140,7 +113,7 @@ def _distribution(given: Any, info: ValidationInfo) -> Distribution | None:
         return TABLE[name] if given == "table" else None
     if (given.uniform is None) == (given.gaussian is None):
         raise ValueError("no distribution; give {uniform: [lower, upper]} or {gaussian: {mean: …, sigma: …}}")
-    bounds = field_bounds(FIELDS[name])
+    bounds = validation.field_bounds(FIELDS[name])
     law: Distribution
     if given.gaussian is not None:
         law = Gaussian(given.gaussian.mean, given.gaussian.sigma, bounds)
@@ -159,8 +132,8 @@ def _distribution(given: Any, info: ValidationInfo) -> Distribution | None:
 
 _Word = Literal["table", "fixed"]
 _Drawn = Annotated[
-    Annotated[_Word, Tag("(word)")] | Annotated[_Law, Tag("(law)")],
-    Discriminator(lambda given: "(law)" if isinstance(given, Mapping) else "(word)"),
+    Annotated[_Word, pydantic.Tag("(word)")] | Annotated[_Law, pydantic.Tag("(law)")],
+    pydantic.Discriminator(lambda given: "(law)" if isinstance(given, Mapping) else "(word)"),
     AfterValidator(_distribution),
 ]
 
@@ -199,7 +172,7 @@ class WalkKeys(BaseModel):
 class BlockKeys(WalkKeys):
     """The keys that a block and the file itself may have."""
 
-    samples: Annotated[int, Field(ge=1, le=2**30), WHOLE] | None = Field(
+    samples: Annotated[int, Field(ge=1, le=2**30), validation.WHOLE] | None = Field(
         None, description="samples in each cell of the grid"
     )
     sampler: _Sampler | None = Field(None, description="how samples are drawn, see below; default: random")
@@ -246,7 +219,8 @@ class SweepFile(BlockKeys):
 
     version: Literal[1] = Field(description="version of the format: 1")
     name: Annotated[str, AfterValidator(_printable)] = Field(
-        max_length=LONGEST_NAME, description="name of the sweep, in figures and pages; of a block, unique in its sweep"
+        max_length=validation.LONGEST_NAME,
+        description="name of the sweep, in figures and pages; of a block, unique in its sweep",
     )
     seed: Whole = Field(ge=0, le=LARGEST_SEED, description="whole number from which all random numbers follow")
     blocks: list[BlockOfFile] | None = Field(
@@ -284,7 +258,8 @@ def _checked(model: type[ModelT], content: object, path: str, source: object) ->
     try:
         return model.model_validate(content, context={"expanded": 0})
     except ValidationError as error:
-        raise InputError(*refusals(error, path, _KEYS if model is SweepFile else model.model_fields)) from None
+        keys = _KEYS if model is SweepFile else model.model_fields
+        raise InputError(*validation.refusals(error, path, keys)) from None
 
 
 def read_walk_file(path: str | os.PathLike[str]) -> tuple[str | None, dict[str, dict[str, Any]]]:
@@ -304,7 +279,7 @@ def read_sweep(
     source: str | os.PathLike[str] | Mapping[str, object], **replaced: object
 ) -> tuple[str, int, tuple[str, ...], tuple[Block, ...], Recording]:
     """The fields of a `Sweep`: name, seed, axes of equal samples, blocks, recording; see `load_sweep`."""
-    content = plain(source, "sweep") if isinstance(source, Mapping) else read_yaml(sweep_path(source))
+    content = validation.plain(source, "sweep") if isinstance(source, Mapping) else read_yaml(sweep_path(source))
     replaced = {key: value for key, value in replaced.items() if value is not None}
     if isinstance(content, dict):
         if "samples" in replaced and content.get("samples") is None:
@@ -368,11 +343,10 @@ def _drawn(
 
 def _same_samples_along(written: list[str], known: set[str]) -> tuple[str, ...]:
     """The axes along which the same samples are used, sorted."""
-    names = {full_name(name) for name in written}
+    names = {validation.full_name(name) for name in written}
     for name in names - known:
-        raise InputError(
-            f"sweep.same_samples_along: {shown(name)} is no axis of any block; {suggestion(name, sorted(known))}"
-        )
+        remedy = validation.suggestion(name, sorted(known))
+        raise InputError(f"sweep.same_samples_along: {shown(name)} is no axis of any block; {remedy}")
     return tuple(sorted(names))
 
 
