@@ -46,11 +46,7 @@ def failure(number: int, text: str) -> OSError:
 
 
 def given_path(path: str | os.PathLike[str]) -> Path:
-    """A path as a user gave it.
-
-    Raises:
-        OSError: it is empty, which `Path` takes for the current folder, or no path at all.
-    """
+    """A path as a user gave it; an `OSError` if it is none, or empty, which `Path` takes for the current folder."""
     text = os.fspath(path)
     if not text:
         raise failure(errno.ENOENT, "a path is empty; name a file or folder")
@@ -141,11 +137,7 @@ def remove_output(path: str | os.PathLike[str]) -> None:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder for files that follow, unless it is there.
-
-    Raises:
-        OSError: it cannot be made; one line that names it.
-    """
+    """Make a folder for files that follow, unless it is there; else an `OSError` of one line that names it."""
     with naming(folder):
         folder.mkdir(parents=True, exist_ok=True)
 

@@ -198,11 +198,9 @@ def _compare(path: str | os.PathLike[str], remedy: str, wanted: str | None) -> N
 
 
 def open_regular(path: str | os.PathLike[str]) -> BinaryIO:
-    """A file, open for reading; opening a pipe or a device does not wait, and is refused.
+    """A file, open for reading; an `OSError` of one line names one that cannot be read.
 
-    Raises:
-        OSError: it cannot be read; one line that names it.
-        InputError: it is no regular file.
+    Opening a pipe or a device does not wait: what is no regular file is refused by an `InputError`.
     """
     try:
         file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK))

@@ -18,11 +18,9 @@ def package_versions() -> dict[str, str]:
 
 
 def version_refusal(found: int, remedy: str) -> str | None:
-    """Why a file of a format version is refused; None if it is that of this warpchain.
+    """Why a file is refused whose format version was `found`; None if it is that of this warpchain.
 
-    Args:
-        found: version of the file.
-        remedy: how to get an older file's content in this version.
+    The remedy says how to get an older file's content in this version.
     """
     if found == FORMAT_VERSION:
         return None

@@ -88,7 +88,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out the figures, which take most of the time."""
-    monkeypatch.setattr(sweep_page, "_figures", lambda result: "none")
+    monkeypatch.setattr(sweep_page, "figures", lambda result: [])
 
 
 @pytest.fixture(scope="module")

@@ -33,11 +33,7 @@ app = typer.Typer(pretty_exceptions_enable=False, rich_markup_mode=None)  # boxe
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
-    """Run the command line and exit.
-
-    Args:
-        arguments: words after the name of the command; by default those of this process.
-    """
+    """Run the command line and exit; `arguments` follow the name of the command, by default those of this process."""
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal without Δ gets a question mark
     with interrupts_heard() as heard:

@@ -34,11 +34,9 @@ Rows = Annotated[
 
 
 def sprocket_places(motion: Motion | None, times: ArrayLike) -> NDArray[np.float64]:
-    """Places x, y of the sprocket relative to that at the release [m], shape (t, 2); NaN where it has vanished.
+    """Places x, y of the sprocket relative to that at the release [m], (t, 2), at times since then [s], (t,).
 
-    Args:
-        motion: its rows; None: it vanishes at once.
-        times: since the release [s], shape (t,).
+    They are NaN where it has vanished; without a motion it vanishes at once.
     """
     if motion is None:
         return np.full((np.size(times), 2), np.nan)

@@ -33,10 +33,7 @@ class Curve:
 def stadium(radius: float) -> Curve:
     """Upper half circle about the origin, two vertical straights, lower half circle: a chain hung on a sprocket.
 
-    Its size is the length of a straight [m], s the arc length from the top [m].
-
-    Args:
-        radius: Radius of both half circles [m].
+    Its size is the length of a straight [m], s the arc length from the top [m], `radius` that of the half circles [m].
     """
     quarter = np.pi * radius / 2
 
@@ -65,12 +62,9 @@ def stadium(radius: float) -> Curve:
 
 @functools.lru_cache
 def ellipse(aspect: float) -> Curve:
-    """An ellipse about the origin.
+    """An ellipse about the origin; `aspect` is its height over its width.
 
     Its size is the geometric mean of the semi-axes [m], s the angle of the parametric form from the top [rad].
-
-    Args:
-        aspect: Height over width.
     """
     wide, high = 1 / np.sqrt(aspect), np.sqrt(aspect)
 

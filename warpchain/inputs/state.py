@@ -127,7 +127,14 @@ class State:
             object.__setattr__(self, name, checked_array(getattr(self, name), name, *shape))
         if self.axes is not None and not np.allclose(self.axes @ self.axes.T, np.eye(2), atol=1e-9):
             raise InputError("axes: not two directions at right angles; give unit vectors")
-        self._check_closed()
+        left, right = np.split(circles_of(self.position, self.parameters.link_length), 2)
+        opening = np.linalg.norm(np.roll(left, -1, axis=0) - right, axis=1)
+        if (widest := float(opening.max())) > WIDEST_OPENING * self.parameters.link_length:
+            link = int(opening.argmax())
+            raise InputError(
+                f"position: the loop is not closed: the ends of links {link} and {(link + 1) % self.links} are "
+                f"{widest:.3g} m apart, and links are {self.parameters.link_length:g} m long; give links that join"
+            )
 
     def __repr__(self) -> str:
         """One line."""
@@ -196,16 +203,6 @@ class State:
     def joints(self) -> Array:
         """Joints x, y [m], (n, 2), as the end of link i; if the plane tilts, in the plane."""
         return circles_of(self.position, self.parameters.link_length)[self.links :]
-
-    def _check_closed(self) -> None:
-        left, right = np.split(circles_of(self.position, self.parameters.link_length), 2)
-        opening = np.linalg.norm(np.roll(left, -1, axis=0) - right, axis=1)
-        if (widest := float(opening.max())) > WIDEST_OPENING * self.parameters.link_length:
-            link = int(opening.argmax())
-            raise InputError(
-                f"position: the loop is not closed: the ends of links {link} and {(link + 1) % self.links} are "
-                f"{widest:.3g} m apart, and links are {self.parameters.link_length:g} m long; give links that join"
-            )
 
 
 def checked_array(given: object, path: str, *shape: int | str) -> Array:

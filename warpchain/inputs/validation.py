@@ -182,13 +182,8 @@ ModelT = TypeVar("ModelT", bound=BaseModel)
 def validated(model: type[ModelT], values: Mapping[str, object], path: str) -> ModelT:
     """Build a pydantic model, with errors as one line that names the field and what to give.
 
-    Args:
-        model: `Parameters`, or another model whose fields carry a unit.
-        values: name → value; NumPy's numbers are taken as `plain` does.
-        path: where the values were given, such as `scene`; the error's field path starts with it.
-
-    Raises:
-        InputError: some value is refused; the first is described, the others are counted.
+    NumPy's numbers are taken as `plain` does. If a value is refused, an `InputError` describes the first and counts
+    the others; it begins with `path`, where they were given, such as `scene`.
     """
     own = all(type(value) in _OWN for value in values.values())  # as in the millions of walks of a sweep
     try:
@@ -240,10 +235,8 @@ def plain(value: object, path: str = "value") -> Any:
 
     NumPy's numbers, truth values and texts become Python's; arrays, ranges, tuples and what pandas and xarray have for
     them become lists, tables mappings of lists, also inside of lists and mappings. NumPy's times become texts, which no
-    number can be.
-
-    Raises:
-        InputError: there are more than `MOST_VALUES` of them, or deeper than `DEEPEST`; the message begins with `path`.
+    number can be. An `InputError`, which begins with `path`, says that there are more than `MOST_VALUES` of them, or
+    deeper than `DEEPEST`.
     """
     left = MOST_VALUES
 

@@ -16,8 +16,7 @@ LARGEST_FILE: Final = 100_000
 def read_yaml(path: str | os.PathLike[str]) -> object:
     """Content of a YAML file, see `parse_yaml`.
 
-    Raises:
-        InputError: the file cannot be read, is no regular file, too large or no such YAML.
+    An `InputError` says that it cannot be read, is no regular file, too large or no such YAML.
     """
     path = checked_path(path, "file")
     try:
@@ -40,11 +39,8 @@ def parse_yaml(text: str, path: str) -> Any:
     """Content of a YAML text: texts, numbers, truth values, nothing, lists and mappings.
 
     Numbers are those of YAML 1.2: `1e9` is one and so is `1_000`; `060` and `1:30`, which versions of YAML read
-    differently, are texts, and so are dates.
-
-    Raises:
-        InputError: the text is not YAML, gives a key twice, or has more values than `plain` takes; the message begins
-            with `path`.
+    differently, are texts, and so are dates. An `InputError`, which begins with `path`, says that the text is not YAML,
+    gives a key twice, or has more values than `plain` takes.
     """
     try:
         content = yaml.load(text, Loader=_Loader)

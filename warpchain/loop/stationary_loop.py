@@ -290,8 +290,7 @@ def _spread(joints: Array, moved: Array, curve: _Harmonics) -> Array:
 def _free_part(s: Array, distance: Array, least: float) -> tuple[float, float]:
     """Both ends s [m] of the part round s = 0 whose distance from the sprocket's centre exceeds `least` [m].
 
-    Raises:
-        ValueError: there is no such part, or it is the whole loop.
+    A `ValueError` says that there is no such part, or that it is the whole loop.
     """
     middle, touching = len(s) // 2, np.flatnonzero(distance <= least)
     before, after = touching[touching < middle], touching[touching > middle]

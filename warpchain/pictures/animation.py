@@ -143,12 +143,7 @@ def _write_mp4(walk: "WalkResult", path: Path, fps: float, slow: float) -> None:
 def player(walk: "WalkResult", slow: float = 4.0) -> str:
     """A page with a player of the frames from the side: lengths in tenths of a millimetre, times in microseconds.
 
-    Args:
-        walk: a walk with frames.
-        slow: playing time per simulated time at the start.
-
-    Raises:
-        ValueError: the walk has no frames or broken ones.
+    It starts `slow` times slower than the walk. A `ValueError` says that the walk has no frames or broken ones.
     """
     joints, sprocket = checked_joints(walk), walk.sprocket_center
     count = min(len(walk.frame_time), _PLAYER_FRAMES)
@@ -208,11 +203,7 @@ class Film:
     """
 
     def __init__(self, walk: "WalkResult") -> None:
-        """Fit the walk and the floor below it into the picture.
-
-        Raises:
-            ValueError: the walk has no frames or broken ones.
-        """
+        """Fit the walk and the floor below it into the picture; a `ValueError` if frames are none or broken."""
         self._walk, self._joints, self._center = walk, checked_joints(walk), center_in_room(walk)
         self._radii = chain.circle_radii(walk)
         self._tilts = walk.joints_in_room is not None

@@ -162,8 +162,7 @@ def from_floor(walk: "WalkResult", joints: Array) -> Array:
 def stretches(walk: "WalkResult", left: float, right: float) -> list[tuple[str, str, Array]]:
     """What of the floor has coefficients of its own, between two x [m].
 
-    Returns:
-        For each pair of coefficients a colour, a label, and ends of the straight faces that have it [m], (f, 2, 2).
+    For each pair of coefficients a colour, a label, and ends of the straight faces that have it [m], (f, 2, 2).
     """
     floor, parameters = walk.setup.floor, walk.setup.parameters
     points, laws = floor.points.copy(), floor.laws

@@ -96,7 +96,8 @@ def film_strip(walk: "WalkResult", figure: Figure | None = None) -> Figure:
         for frame in shown:
             chain.draw_chain(axes, joints[frame], radius, view, _link_colors(colors[frame]), edge=0.25)
             chain.draw_sprocket(axes, walk, walk.frame_time[frame], facecolor="none", edgecolor=colors[frame])
-        _draw_way(axes, walk, center, view)
+        chain.draw_release(axes, walk, view)
+        axes.plot(*(view @ center.T)[:2], color=INK, linewidth=1.4, linestyle=DOTS, label="centre of mass", zorder=4)
         tidy(axes)
         axes.set_title(title, fontsize="medium", loc="left")
     for number, (frame, title, spot) in enumerate(moments):
@@ -143,12 +144,6 @@ def _write_times(axes: Axes, times: Array, joints: Array, colors: Array, gap: fl
         taken = np.append(taken, [place], axis=0)
         style: dict[str, Any] = {"color": 0.7 * color, "fontsize": "small", "path_effects": _HALO}
         axes.text(place[0], place[1], f"{moment:.2f} s", ha="center", va="bottom", zorder=6, **style)
-
-
-def _draw_way(axes: Axes, walk: "WalkResult", center: Array, view: Array) -> None:
-    """The sprocket, its height above the floor, and the path of the centre of mass."""
-    chain.draw_release(axes, walk, view)
-    axes.plot(*(view @ center.T)[:2], color=INK, linewidth=1.4, linestyle=DOTS, label="centre of mass", zorder=4)
 
 
 def _draw_distance(axes: Axes, walk: "WalkResult", low: float, depth: float) -> None:

@@ -106,11 +106,7 @@ def cell_values(axes: Mapping[str, NDArray[Any]], place: Iterable[int]) -> dict[
 
 
 def cell_text(values: Mapping[str, Any]) -> str:
-    """Describe a cell, as ``n = 60, ν = 15 Hz``.
-
-    Args:
-        values: name of an axis → value.
-    """
+    """Describe a cell, given the value of each axis by its name, as ``n = 60, ν = 15 Hz``."""
     texts = (f"{axis_symbol(name)} = {value_text(value)} {unit_text(name)}" for name, value in values.items())
     return ", ".join(text.rstrip() for text in texts)
 

@@ -52,22 +52,14 @@ class Picture:
     figure: "Figure"
 
     def save(self, folder: Path) -> Path:
-        """Write the figure into a folder as a PNG named after it, and return the path of the file.
-
-        Raises:
-            OSError: the file cannot be written.
-        """
+        """Write the figure into a folder as a PNG named after it, and return its path; errors as of `save_figure`."""
         path = folder / f"{self.name}.png"
         save_figure(self.figure, path)
         return path
 
 
 def save_figure(figure: "Figure", path: str | os.PathLike[str]) -> None:
-    """Write a figure as a PNG, whole or not at all.
-
-    Raises:
-        OSError: the file cannot be written.
-    """
+    """Write a figure as a PNG, whole or not at all; an `OSError` if it cannot be written."""
     from warpchain.pictures.inline import png
 
     write_whole(path, png(figure, PICTURE_DPI))

@@ -105,10 +105,7 @@ def _tilt(walk: "WalkResult", figure: Figure) -> None:
     """Tilt and yaw of the plane, and lateral drift of the centre of mass, against time.
 
     Marked are the moments at which the chain was first tilted by 45°, beyond which it has fallen over, and at which
-    its loop collapsed, if they came.
-
-    Raises:
-        ValueError: the plane of the walk is fixed.
+    its loop collapsed, if they came. A `ValueError` says that the plane of the walk is fixed.
     """
     if walk.joints_in_room is None:
         raise ValueError("walk: its plane is fixed, so it has no tilt; run it with plane: tilting")
@@ -143,8 +140,7 @@ def _finish(walk: "WalkResult", *panels: Axes) -> None:
 def _loop(walk: "WalkResult", figure: Figure) -> None:
     """The mean loop of a walk before its release, to scale, and its curvature and tension along the arc.
 
-    Raises:
-        ValueError: the time before the release was not kept, or is not enough for a mean loop.
+    A `ValueError` says that the time before the release was not kept, or is not enough for a mean loop.
     """
     loop = walk.mean_loop()
     kink = loop.kink()

@@ -27,8 +27,7 @@ def kinds_of(walk: "WalkResult") -> tuple[Kind, ...]:
 def checked_joints(walk: "WalkResult") -> Array:
     """The joints of a walk in the room [m], shape (f, n, 3); z = 0 if its plane is fixed.
 
-    Raises:
-        ValueError: the walk has no frames or broken ones.
+    A `ValueError` says that the walk has no frames or broken ones.
     """
     if len(walk.frame_time) == 0:
         never = f"it was not released. {walk.status.sentence}"

@@ -46,9 +46,7 @@ def sensitivities(result: SweepResult) -> list[Sensitivity]:
     """Sobol' indices of the distance in each cell that was sampled by ``saltelli``.
 
     The intervals are percentiles of 1000 bootstrap resamples of the samples, from a fixed stream of random numbers.
-
-    Raises:
-        NothingToShow: no block is sampled by ``saltelli``, or none has a cell with two complete samples yet.
+    `NothingToShow`: no block is sampled so, or none has a cell with two complete samples yet.
     """
     named = [given["name"] for given in result.sweep["blocks"] if given["sampler"] == "saltelli"]
     if not named:
@@ -86,12 +84,9 @@ def _sensitivities(block: BlockResult, name: str) -> Iterator[Sensitivity]:
 
 
 def sensitivity(result: SweepResult) -> Picture:
-    """Sobol' indices of the distance with a panel for each cell.
+    """Sobol' indices of the distance with a panel for each cell; errors as of `sensitivities`.
 
     All panels have the quantities in the same order, by the mean of their total indices, the greatest at the top.
-
-    Raises:
-        NothingToShow: see `sensitivities`.
     """
     cells = sensitivities(result)
     totals: dict[str, list[float]] = {}

@@ -90,10 +90,8 @@ def figure6(result: SweepResult) -> Picture:
     """Distance walked against frequency with a panel for each number of links, as in Figure 6.
 
     A dot is the mean, a box the range of one standard deviation, a bar the range of two. Walks that start at rest are
-    red, ellipses green. Blocks with other axes than links, frequency and start are left out.
-
-    Raises:
-        NothingToShow: no walk of such a block has come to rest, or none of the blocks has several cells.
+    red, ellipses green. Blocks with other axes than links, frequency and start are left out. `NothingToShow`: no walk
+    of the other blocks has come to rest, or none of them has several cells.
     """
     # links → label of a series → frequency, mean, standard deviation; links → numbers of walks
     cells: dict[int, dict[str, list[tuple[float, float, float]]]] = defaultdict(lambda: defaultdict(list))

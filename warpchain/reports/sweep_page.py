@@ -20,6 +20,7 @@ from warpchain.files import Kind, checked_output, write_whole
 from warpchain.inputs.validation import short
 from warpchain.pictures.inline import image, png
 from warpchain.pictures.labels import cell_table, cell_text, cell_values, unit_text
+from warpchain.reports.sweep_figures import figures
 from warpchain.status import Status
 from warpchain.store.block_result import BlockResult
 from warpchain.store.manifest import Folder
@@ -83,7 +84,7 @@ def write_report(
     faults = [block.faults for block in result.blocks.values()]
     inaccurate = [(name, remedy, [own[name] for own in faults]) for name, remedy in FAULTS.items()]
     sections = {
-        "Figures": _figures(result),
+        "Figures": "\n".join(_picture(each.figure, each.caption) for each in figures(result)),
         "Cells": _cells(result),
         "Failed walks": _listed(result, failed) or "<p>None.</p>",
         "Inaccurate walks": _listed(result, inaccurate),
@@ -105,12 +106,6 @@ def _tiles(result: SweepResult) -> dict[str, tuple[int, str]]:
     return tiles | ({"inaccurate": (inaccurate, "bad")} if inaccurate else {})
 
 
-def _figures(result: SweepResult) -> str:
-    from warpchain.reports.sweep_figures import figures
-
-    return "\n".join(_picture(each.figure, each.caption) for each in figures(result))
-
-
 def _cells(result: SweepResult) -> str:
     """Mean and spread of the distance in every cell, a table for each block."""
     parts = [
@@ -128,9 +123,7 @@ def _cells(result: SweepResult) -> str:
 def _listed(result: SweepResult, found: Iterable[tuple[str, str, Sequence[Array]]]) -> str:
     """Walks with their block, cell and sample, of many only the first.
 
-    Args:
-        result: the sweep.
-        found: a heading, what it means and what to try, and which walks of each block it is said of.
+    Each item of `found` is a heading, what it means and what to try, and which walks of each block it is said of.
     """
     several, parts = len(result.blocks) > 1, []
     for heading, sentence, chosen in found:

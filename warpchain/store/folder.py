@@ -198,8 +198,7 @@ def read_rows(
 def _prepared(folder: Path, sweep: Sweep, manifest: Manifest, fresh: bool) -> Manifest:
     """Make manifest and folder of the shards, in an order in which a kill at any moment does no harm.
 
-    Returns:
-        The manifest that the folder is to have; a grown one is not written yet.
+    What comes back is the manifest that the folder is to have; a grown one is not written yet.
     """
     _clear_leftovers(folder)
     named = folder / "sweep.h5"
@@ -220,8 +219,7 @@ def _prepared(folder: Path, sweep: Sweep, manifest: Manifest, fresh: bool) -> Ma
 def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
     """The manifest of a folder that is to go on with a sweep, whose manifest in a new folder is given.
 
-    Raises:
-        InputError: the folder holds another sweep, or one whose samples do not grow to those of this one.
+    An `InputError` says that it holds another sweep, or one whose samples do not grow to those of this one.
     """
     found = read_manifest(folder)
     if found.numerics_version != NUMERICS_VERSION:

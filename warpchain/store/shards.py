@@ -97,9 +97,7 @@ def rows_of(file: "h5py.File", kind: np.dtype[np.void]) -> Rows:
 def shard_files(directory: Folder) -> list[str]:
     """Names of all files of shards, sorted; hidden files are ignored.
 
-    Raises:
-        OSError: the folder cannot be read.
-        InputError: there is a file that is none.
+    An `OSError` says that the folder cannot be read, an `InputError` that there is a file that is none.
     """
     folder = Path(directory) / "shards"
     try:
@@ -116,11 +114,9 @@ def shard_files(directory: Folder) -> list[str]:
 
 @contextmanager
 def opened_shard(directory: Folder, name: str, digest: str) -> "Iterator[h5py.File]":
-    """The shard of a sweep with a digest that was written under this name.
+    """The shard of a sweep with a digest that was written under this name; an `OSError` if it cannot be read.
 
-    Raises:
-        OSError: the file cannot be read.
-        InputError: the file is damaged or belongs to another sweep.
+    An `InputError` says that it is damaged or belongs to another sweep.
     """
     path = Path(directory) / "shards" / name
     with reading_hdf5(path, KIND, "delete it and run the sweep again, which computes only its walks") as file:

@@ -5,7 +5,7 @@ A folder can be read while its sweep runs: walks that are not there yet are miss
 
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -223,15 +223,8 @@ def _load_folder(directory: Folder) -> SweepResult:
         except (OSError, InputError):
             if stamp(directory) == begun:  # else a run has begun anew or added samples meanwhile
                 raise
-    blocks = manifest.sweep.blocks
-
-    def column(number: int, name: str) -> Array:
-        values = blocks[number].indices if name == "index" else rows[number][name]
-        return np.ascontiguousarray(values).reshape(blocks[number].shape)
-
     provenance = {"digest": manifest.sweep.digest(), "numerics_version": manifest.numerics_version}
-    provenance["versions"] = manifest.versions
-    return _result(manifest.sweep, provenance, column, lambda number: motions[number].reshape(blocks[number].shape))
+    return _result(manifest.sweep, provenance | {"versions": manifest.versions}, rows, motions)
 
 
 def _load_merged(path: Folder) -> SweepResult:
@@ -241,26 +234,21 @@ def _load_merged(path: Folder) -> SweepResult:
         provenance = {"digest": file.attrs["digest"], "numerics_version": int(file.attrs["numerics_version"])}
         provenance["versions"] = json.loads(file.attrs["versions"])
         groups = [file[block.name] if len(sweep.blocks) > 1 else file for block in sweep.blocks]
-
-        def motions(number: int) -> Array:
-            group = groups[number]
-            found = np.full(group["index"].shape, None)
+        motions = [np.full(block.shape, None) for block in sweep.blocks]
+        for group, found in zip(groups, motions, strict=True):
             for place in group.get("motion", ()):
                 found.flat[int(place)] = opened, f"{group.name}/motion/{place}"
-            return found
-
-        return _result(sweep, provenance, lambda number, name: groups[number][name][()], motions)
+        return _result(sweep, provenance, groups, motions)
 
 
-def _result(
-    sweep: Sweep, provenance: dict[str, Any], column: Callable[[int, str], Array], motions: Callable[[int], Array]
-) -> SweepResult:
-    """A result, given what returns a stored column of a block by its number, and the motions of a block."""
+def _result(sweep: Sweep, provenance: dict[str, Any], stored: Sequence[Any], motions: Sequence[Array]) -> SweepResult:
+    """A result, given for each block what has its stored columns by name, and its motions, both in any shape."""
     blocks = {}
     for number, block in enumerate(sweep.blocks):
         drawn = [*map(drawn_column, block.drawn)]
-        columns = {name: column(number, name) for name in ("index", "status", *STORED_COLUMNS, *drawn)}
-        columns |= derived_columns(columns)
+        names = ("status", *STORED_COLUMNS, *drawn)
+        columns = {name: np.ascontiguousarray(stored[number][name]).reshape(block.shape) for name in names}
+        columns |= {"index": block.indices} | derived_columns(columns)
         blocks[block.name] = BlockResult(
             name=block.name,
             number=number,
@@ -269,6 +257,6 @@ def _result(
             columns={name: columns[name] for name in (*COLUMNS, *drawn)},
             origin=sweep,
             versions=provenance["versions"],
-            motions=motions(number),
+            motions=motions[number].reshape(block.shape),
         )
     return SweepResult(blocks=blocks, origin=sweep, provenance=provenance)

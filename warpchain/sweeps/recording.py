@@ -50,8 +50,7 @@ class Series(BaseModel):
     def steps(self, options: Options, path: str) -> int:
         """The interval in units of `options.record_interval`.
 
-        Raises:
-            InputError: it is no whole multiple; the message begins with `path`, where the choice was given.
+        If it is no whole multiple, an `InputError` begins with `path`, where the choice was given.
         """
         ratio = self.interval / options.record_interval
         steps = round(ratio)

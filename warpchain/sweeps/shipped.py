@@ -23,8 +23,7 @@ def shipped_sweeps() -> list[str]:
 def sweep_path(source: str | os.PathLike[str]) -> Path:
     """Path of a sweep file; a bare name that is no file is that of a sweep that comes with the package.
 
-    Raises:
-        InputError: it is no path, or a bare name that is neither a file nor a sweep of the package.
+    An `InputError` says that it is no path, or a bare name that is neither a file nor a sweep of the package.
     """
     path = checked_path(source, "sweep")
     name = str(path)
@@ -39,9 +38,7 @@ def sweep_path(source: str | os.PathLike[str]) -> Path:
 def write_new_sweep(path: Path) -> None:
     """Write a small sweep file whose comments explain its keys.
 
-    Raises:
-        InputError: there is such a file already.
-        OSError: it cannot be written.
+    An `InputError` says that there is such a file already, an `OSError` that it cannot be written.
     """
     text = _TEMPLATE.read_text(encoding="utf-8")
     if os.path.lexists(path):

@@ -82,11 +82,7 @@ integers.
 
 
 def row_type(drawn: Iterable[str]) -> np.dtype[np.void]:
-    """Type of a row.
-
-    Args:
-        drawn: quantities that some block of the sweep draws, in any order.
-    """
+    """Type of a row, given the quantities that some block of the sweep draws, in any order."""
     names = set(drawn)
     stored = [("status", "<i1"), *((name, column.kind) for name, column in STORED_COLUMNS.items())]
     return np.dtype([*KEYS.descr, *stored, *((drawn_column(name), "<f8") for name in DRAWABLE if name in names)])
@@ -143,8 +139,7 @@ def quantity_of(column: str) -> str:
 def field_column(name: str) -> Column:
     """Unit and meaning of an axis or of the column of a drawn quantity, as a column of floats.
 
-    Raises:
-        KeyError: there is no such field of `Parameters`, `Scene` or `Options`, and it is not `preset`.
+    A `KeyError` says that there is no such field of `Parameters`, `Scene` or `Options`, and that it is not `preset`.
     """
     if name == "preset":
         return Column("<f8", "1", "named set of parameters that others are changed from")
