@@ -22,9 +22,6 @@ from warpchain.inputs.sections import SECTION_OF
 from warpchain.inputs.state import Setup
 from warpchain.inputs.validation import FIELDS, InputError, Whole, checked, field_bounds
 
-CLEARANCE_RANGE: Final = (0.005, 0.015)
-"""Interval of the release height that a sample draws from, in m."""
-
 DRAW_LIMIT: Final = 1000
 """Draws of one quantity before giving up; a mean inside the bounds needs two on average at worst."""
 
@@ -150,7 +147,7 @@ TABLE: Final[Mapping[str, Distribution]] = {
         if quantity.sigma > 0
     },
     "phase": Uniform(0.0, 1.0, field_bounds(FIELDS["phase"])),
-    "clearance": Uniform(*CLEARANCE_RANGE, field_bounds(FIELDS["clearance"])),
+    "clearance": Uniform(0.005, 0.015, field_bounds(FIELDS["clearance"])),  # m
 }
 """Default of what a sample draws: the Gaussians of Table 1 in the order of the table, then phase and clearance of the
 release."""

@@ -58,7 +58,6 @@ _Point = Annotated[
 Points = Annotated[tuple[_Point, ...], Strict(False), Field(max_length=MOST_POINTS), AfterValidator(_without_overhang)]
 """A profile: points x, y [m], and e and μ of the line that begins there, if it has its own."""
 
-
 FloorField = Annotated[
     Annotated[Literal["flat"], Tag("(flat)")] | Annotated[Points, Tag("(points)")],
     Discriminator(lambda given: "(flat)" if isinstance(given, str) else "(points)"),

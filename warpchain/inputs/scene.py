@@ -29,8 +29,6 @@ FASTEST_TAP: Final = 1e3
 """Greatest speed [m/s] and rate [rad/s] of the plane at the release, far beyond that of any loop."""
 LONGEST: Final = 1e6
 """Greatest time, in which numbers still tell a nanosecond, a short step [s]."""
-
-
 STEEPEST: Final = 80.0
 """Greatest angle of a slope [°]."""
 RIGHT_ANGLE: Final = math.pi / 2
@@ -39,7 +37,6 @@ OF_LINKS: Final = ("link_masses", "link_inertias", "viscous_frictions", "coulomb
 TAP: Final = ("lateral_speed", "tilt", "tilt_rate", "yaw_rate")
 """What a release may give to a plane that tilts. Each is 0 by default: an upright plane that nothing disturbs stays
 upright, so that a scene with a tilting plane alone is the paper's."""
-
 
 _COMPOUND: Final = "compound"
 """Marks a field whose value may be a list or a mapping."""

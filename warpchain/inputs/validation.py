@@ -24,6 +24,7 @@ STRICT: Final = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_n
 """Of models that hold a user's values."""
 
 DIMENSIONLESS: Final = "1"
+_LIMITS: Final = ("ge", "gt", "le", "lt")
 
 LONGEST_LINE: Final = 200
 """Most characters of a line of a message."""
@@ -77,7 +78,7 @@ def number_field(default: Any, unit: str, description: str | None = None, **more
         description: its meaning; that of a field of a section may stand below it.
         more: limits `ge`, `gt`, `le`, `lt` in `unit`, as of `pydantic.Field`; anything else stands beside the unit.
     """
-    limits = {name: more.pop(name) for name in ("ge", "gt", "le", "lt") if name in more}
+    limits = {name: more.pop(name) for name in _LIMITS if name in more}
     return Field(default, description=description, json_schema_extra={"unit": unit, **more}, **limits)
 
 
@@ -94,10 +95,7 @@ def field_unit(field: FieldInfo) -> str:
 
 def field_limits(field: FieldInfo) -> dict[str, float]:
     """The limits `ge`, `gt`, `le`, `lt` that a field has."""
-    limits: dict[str, float] = {}
-    for limit in field.metadata:
-        limits |= {name: float(getattr(limit, name)) for name in ("ge", "gt", "le", "lt") if hasattr(limit, name)}
-    return limits
+    return {name: float(getattr(limit, name)) for limit in field.metadata for name in _LIMITS if hasattr(limit, name)}
 
 
 def field_choices(field: FieldInfo) -> tuple[Any, ...]:
@@ -317,8 +315,6 @@ def path_of(path: str, key: object) -> str:
 
 def printable(text: str) -> str:
     """A text fit for any terminal: every character that is not printable, such as ESC, is written as its escape."""
-    if text.isprintable():
-        return text
     return "".join(
         each if each.isprintable() else each.encode("unicode_escape", "surrogatepass").decode("ascii") for each in text
     )

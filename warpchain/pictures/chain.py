@@ -154,11 +154,6 @@ def floor_height(walk: "WalkResult", x: Any) -> Any:
     return walk.setup.floor.heights(x)
 
 
-def from_floor(walk: "WalkResult", joints: Array) -> Array:
-    """Distance of joints x, y from the floor [m], shape (…, n, 2) → (…, n)."""
-    return walk.setup.floor.distances(joints.reshape(-1, 2)).reshape(joints.shape[:-1])
-
-
 def stretches(walk: "WalkResult", left: float, right: float) -> list[tuple[str, str, Array]]:
     """What of the floor has coefficients of its own, between two x [m].
 

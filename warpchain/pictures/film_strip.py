@@ -165,7 +165,8 @@ def _draw_distance(axes: Axes, walk: "WalkResult", low: float, depth: float) -> 
 def _moments(walk: "WalkResult") -> list[tuple[int, str, Array]]:
     """At most four frames in order of time, no frame twice, with what happens there and where, (2,)."""
     joints, radius = walk.frame_joints, chain.circle_radii(walk).max()
-    above, last = chain.from_floor(walk, joints), len(joints) - 1
+    above = walk.setup.floor.distances(joints.reshape(-1, 2)).reshape(joints.shape[:-1])
+    last = len(joints) - 1
     found: dict[int, tuple[str, Array]] = {}
     touching = np.flatnonzero(above.min(axis=1) < 1.02 * radius)
     if touching.size:

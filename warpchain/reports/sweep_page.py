@@ -42,7 +42,6 @@ _MOST_LISTED: Final = 100
 
 _DPI: Final = 160
 
-
 _HEAD: Final = """<!DOCTYPE html>
 <html lang="en">
 <head>

@@ -207,8 +207,14 @@ def _prepared(folder: Path, sweep: Sweep, manifest: Manifest, fresh: bool) -> Ma
             if (folder / name).exists():
                 raise InputError(f"{folder / name}: in the way of a sweep; give another folder")
         write_whole(named, manifest.image())
-    elif fresh:
-        _discard(folder)
+    elif fresh:  # the shards go first; nothing goes if there is a foreign file among them
+        read_manifest(folder)
+        shard_files(folder)
+        with naming(folder):
+            if (folder / "shards").exists():
+                shutil.rmtree(folder / "shards")
+            for name in ("sweep.yaml", "log.txt"):
+                (folder / name).unlink(missing_ok=True)
         write_whole(named, manifest.image())
     else:
         manifest = _continued(folder, sweep, manifest)
@@ -248,17 +254,6 @@ def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
                 "from the start, or another folder"
             )
     return found if there == asked else replace(manifest, versions=found.versions)
-
-
-def _discard(folder: Path) -> None:
-    """Delete what a sweep left, its shards first; nothing if there is a foreign file among them."""
-    read_manifest(folder)
-    shard_files(folder)
-    with naming(folder):
-        if (folder / "shards").exists():
-            shutil.rmtree(folder / "shards")
-        for name in ("sweep.yaml", "log.txt"):
-            (folder / name).unlink(missing_ok=True)
 
 
 def _clear_leftovers(folder: Path) -> None:

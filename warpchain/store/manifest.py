@@ -147,12 +147,10 @@ def stored_sweep(path: Folder, content: Mapping[str, object]) -> Sweep:
 
 
 def read_manifest(directory: Folder) -> Manifest:
-    """The manifest of a folder.
+    """The manifest of a folder; an `OSError` if that cannot be read.
 
-    Raises:
-        OSError: the folder cannot be read.
-        InputError: there is no sweep in it, or one of another version of warpchain.
-        DamagedFileError: its sweep.h5 is damaged.
+    An `InputError` says that there is no sweep in it, or one of another version of warpchain, a `DamagedFileError` that
+    its sweep.h5 is damaged.
     """
     path = Path(directory) / "sweep.h5"
     if not os.path.lexists(path):

@@ -13,7 +13,6 @@ SERIES_INTERVAL: Final = 1e-3
 FRAME_INTERVAL: Final = 2e-3
 """Default time [s] between two frames."""
 
-
 _Numbers = Annotated[
     tuple[Annotated[int, Field(ge=0, le=2**30)], ...],
     Strict(False),

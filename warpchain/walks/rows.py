@@ -26,8 +26,6 @@ MISSING: Final = -1
 _DRAWN: Final = "_drawn"
 _PREFIXES: Final = {"greatest_penetration": "penetration"}
 """Field that is a dictionary → how the names of its columns begin, if not with its own."""
-_ONLY_OF_A_WALK: Final = ("wall_time",)
-"""Fields that are no columns: a number of a sweep is the same however its walk was computed."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +49,7 @@ def _stored_columns() -> Iterator[tuple[str, Column]]:
     """The columns of the fields of `WalkResult`."""
     types = {item.name: get_args(item.type) for item in fields(WalkResult)}
     for name, stored in NUMBERS.items():
-        if name in _ONLY_OF_A_WALK:
+        if name == "wall_time":  # a number of a sweep is the same however its walk was computed
             continue
         kind = "<i8" if types[name][0] in (int, dict[str, int]) else "<f8"
         for key, meaning in (stored.keys or {"": stored.meaning}).items():
