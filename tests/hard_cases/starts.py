@@ -5,25 +5,23 @@ from typing import Any, Final
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from tests.oracle_model import contact_equations, motion_equations
 from tests.oracle_model.circular_loop import circular_loop
-from warpchain.inputs.parameters import Parameters, preset
+from tests.support.arrays import Array
+from tests.support.presets import PAPER, SOFT
+from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.start_shapes import ellipse, lay_chain, links_between
 from warpchain.kernels.methods.method import method_names
 from warpchain.run.simulation import Trajectory
 from warpchain.walks.walk_result import WalkResult
 
-Array = NDArray[np.float64]
 State = tuple[Array, Array]
 """Position (n, 3) and velocity (n, 3) of a chain."""
 
 METHODS = method_names()
 every_method = pytest.mark.parametrize("method", METHODS)
 
-PAPER: Final = preset("paper")
-SOFT: Final = preset("soft")
 UNDISSIPATIVE: Final[Mapping[str, float]] = {
     "joint_stiffness": 1e5,
     **dict.fromkeys(["joint_damping", "viscous_friction", "coulomb_friction"], 0.0),

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tests.support.arrays import Array
 from tests.support.setups import setup_walk
 from warpchain.engine.batch import Batch, Recorded
 from warpchain.inputs.link_values import LinkValues
@@ -15,8 +15,6 @@ from warpchain.inputs.setup import Setup
 from warpchain.kernels import layout
 from warpchain.status import Status
 from warpchain.walks.walk_phases import WalkRun
-
-Array = NDArray[np.float64]
 
 SHAPE = (layout.HEIGHT, layout.WIDTH, layout.CENTER_X, layout.CENTER_Y)
 """Columns of a sample that say where a loop is."""

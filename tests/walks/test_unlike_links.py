@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 import warpchain
+from tests.support.presets import SOFT
 from tests.support.setups import setup_walk
-from warpchain import Status, preset
+from warpchain import Status
 from warpchain.inputs.link_values import alternating
 from warpchain.inputs.scene import link_values, riding_radius
 from warpchain.pictures.chain import circle_radii, link_outlines
 
-SOFT = preset("soft")
 BRIEF = {"preset": "soft", "method": "explicit", "links": 36, "frequency": 15.0}
 """A short chain, which walks for a second of one core."""
 KINDS = {

@@ -7,9 +7,9 @@ import pytest
 
 import warpchain
 from tests.support.made_walks import assert_same
-from warpchain import Status, preset
+from tests.support.presets import SOFT
+from warpchain import Status
 
-SOFT = preset("soft")
 LOSSES = ("joint_friction", "joint_damping", "floor", "self_contact")
 
 

@@ -11,13 +11,11 @@ from tests.oracle_model import contact_equations
 from tests.oracle_model.circular_loop import circular_loop
 from tests.support.folded_chains import chain_of_angles, folded_chain
 from tests.support.kernels_under_test import LIST, SELF, ContactPass, Placed
+from tests.support.presets import PAPER, SOFT
 from warpchain import Status
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import preset
 
-PAPER = preset("paper")
-SOFT = preset("soft")
 LENGTH = PAPER.link_length
 SKIN = 2e-3
 

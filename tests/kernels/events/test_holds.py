@@ -7,15 +7,14 @@ import numpy as np
 import pytest
 
 import warpchain
+from tests.support.presets import SOFT
 from tests.support.setups import setup_walk
-from warpchain import InputError, Status, preset
+from warpchain import InputError, Status
 from warpchain.engine.batch import ATTEMPTS
 from warpchain.inputs.link_values import alternating
 from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL
 from warpchain.inputs.scene import Scene, fewest_links
 from warpchain.walks import scheduler
-
-SOFT = preset("soft")
 
 CELL = {"links": 60, "frequency": 15.0}
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 import warp as wp
-from numpy.typing import NDArray
 
-from warpchain import Status, preset
+from tests.support.presets import SOFT
+from warpchain import Status
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import start_device
 from warpchain.inputs.options import Options
@@ -25,9 +25,6 @@ from warpchain.kernels.events.release import (
 from warpchain.kernels.physics.scaled_loads import under_load
 from warpchain.kernels.types import Drive, Model, State
 
-Array = NDArray[np.float64]
-
-SOFT = preset("soft")
 CPU = start_device("cpu").warp
 STEP = 1 / 1024  # s between two samples; sums of it are exact
 HEIGHT, WIDTH, SPEED = 0.5, 0.125, 5.0

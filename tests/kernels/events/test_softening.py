@@ -5,11 +5,11 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import warpchain
+from tests.support.presets import PAPER
 from tests.support.setups import setup_walk
-from warpchain import InputError, State, Status, preset
+from warpchain import InputError, State, Status
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 
-PAPER = preset("paper")
 SERIES = ("time", "center", "center_velocity", "kinetic_energy", "spring_energy", "lowest", "rms_speed")
 
 
