@@ -14,7 +14,6 @@ from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.start_shapes import ellipse, lay_chain, links_between
 from warpchain.kernels.methods.method import method_names
 from warpchain.run.simulation import Trajectory
-from warpchain.walks.walk_result import WalkResult
 
 State = tuple[Array, Array]
 """Position (n, 3) and velocity (n, 3) of a chain."""
@@ -141,8 +140,3 @@ def energy_scale(parameters: Parameters, start: State) -> float:
         start[0], parameters
     )
     return moving + parameters.gravity * float(motion_equations.link_masses(len(start[0]), parameters).sum()) * 0.01
-
-
-def ledger_error(walk: WalkResult) -> float:
-    """What the energy ledger of a walk leaves open, relative to the energy at release; NaN if it was not released."""
-    return abs(walk.energy["residual"]) / (walk.energy["kinetic_at_release"] + walk.energy["potential_at_release"])

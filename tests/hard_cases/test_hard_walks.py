@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from tests.hard_cases.starts import METHODS, SOFT, every_method, ledger_error, quick_with
+from tests.hard_cases.starts import METHODS, SOFT, every_method, quick_with
 from tests.support.setups import setup_walk
 from warpchain import Status, WalkResult
 from warpchain.inputs.methods import METHODS_BY_NEED
@@ -28,12 +28,12 @@ class Walk:
     def end(self, method: str, within: float, **settings: object) -> WalkResult:
         """Walk with other settings, check status and Δx, and that the ledger closes to this share of the energy."""
         limits = {"step_limit": 20_000_000, "tolerance": 1e-6, "flight_tolerance": 1e-4}
-        setup = setup_walk(self.preset, {"method": method, **limits, **self.settings, **settings}, None)
+        setup = setup_walk(self.preset, {"method": method, **limits, **self.settings, **settings})
         done = run_walk(setup, frame_interval=None)
         assert done.status == self.status
         if self.status == Status.AT_REST:
             assert self.distance[0] < done.dx < self.distance[1]
-        assert ledger_error(done) < within
+        assert done.energy_error < within
         return done
 
 
