@@ -20,11 +20,6 @@ LENGTH = PAPER.link_length
 SKIN = 2e-3
 
 
-def doubled_line(n):
-    """A chain drawn straight: n/2 links out, n/2 back over them."""
-    return chain_of_angles(np.repeat([0.3, 0.3 + np.pi], n // 2), LENGTH)
-
-
 def straight_heap(n, angle):
     """A chain drawn out and back along a line, with every fifth link or so turned round: joints share spots."""
     generator = np.random.default_rng(n)
@@ -34,7 +29,7 @@ def straight_heap(n, angle):
 
 STATES = {
     "loop": lambda n: circular_loop(n, PAPER, 0.0)[0],
-    "doubled line": doubled_line,
+    "doubled line": lambda n: chain_of_angles(np.repeat([0.3, 0.3 + np.pi], n // 2), LENGTH),
     "collinear": lambda n: straight_heap(n, 0.0),
     "collinear, upright": lambda n: straight_heap(n, np.pi / 2),
     "flat pile": lambda n: folded_chain(n, n, LENGTH, tilt=0.1)[0],
