@@ -14,7 +14,7 @@ from warpchain import Chains, InputError, simulate, walk
 from warpchain.engine.batch import Batch
 from warpchain.walks import one_walk
 
-SETUP = setup_walk("soft", {}, None)
+SETUP = setup_walk("soft", {})
 POSITION, VELOCITY = circular_loop(8, SOFT, 1.0)
 POSITION[:, 1] += 0.1
 PAIR = {"parameters": [SOFT, SOFT], "position": np.array([POSITION] * 2), "velocity": np.array([VELOCITY] * 2)}

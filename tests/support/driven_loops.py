@@ -37,7 +37,7 @@ def period_of(setup: Setup) -> float:
 
 def released_loop(preset: str = "soft", **settings: Any) -> Loop:
     """Carry a walk of a preset's chain to the end of its drive."""
-    setup = setup_walk(preset, {"method": "explicit"} | settings, None)
+    setup = setup_walk(preset, {"method": "explicit"} | settings)
     batch = Batch(1, setup.scene.links, setup.options)
     run = WalkRun(batch, 0, setup)
     found: Loop | None = None

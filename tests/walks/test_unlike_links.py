@@ -28,7 +28,7 @@ KINDS = {
 
 def values_of(links: int = 60, **settings: Any) -> Any:
     """Values of the links of a scene."""
-    setup = setup_walk("soft", {"links": links, **settings}, None)
+    setup = setup_walk("soft", {"links": links, **settings})
     return link_values(setup.scene, setup.parameters)
 
 
@@ -53,7 +53,7 @@ def test_the_sprocket_knows_the_circles_of_the_links(measures: str) -> None:
 def test_joints_ride_on_the_wider_of_their_circles() -> None:
     """Every second link may be narrow, and a charm wide: the other joints ride as high as without."""
     for wide, height in (({"link_radii": [2e-3, 6e-3] * 30}, 6e-3), ({"charm_radius": 6e-3}, SOFT.circle_radius)):
-        assert riding_radius(setup_walk("soft", {"links": 60, **wide}, None).scene, SOFT) == height
+        assert riding_radius(setup_walk("soft", {"links": 60, **wide}).scene, SOFT) == height
 
 
 def test_a_charm_closes_the_ledger_and_is_read_back(tmp_path: Path) -> None:

@@ -73,8 +73,7 @@ def test_a_drive_depends_neither_on_its_launches_nor_on_its_neighbours(monkeypat
         {"links": 30, "frequency": 12.0, "load_factor": 1.0, "steady_time": 0.2, "steady_tolerance": 0.05},
     ]
     setups = [
-        setup_walk("soft", {"method": "explicit", "start": "spinning", "walk_limit": 1e-3} | case, None)
-        for case in cases
+        setup_walk("soft", {"method": "explicit", "start": "spinning", "walk_limit": 1e-3} | case) for case in cases
     ]
 
     def outcomes(attempts: int, slots: int) -> dict[int, tuple[Any, ...]]:
@@ -149,18 +148,18 @@ def test_hard_holds_end_in_a_release_or_as_not_steady(name: str, start: str) -> 
 def test_factors_that_cannot_be_are_refused(load_factor: Any) -> None:
     """Loads are multiplied by 1 to 10 000, or by what suits the chain."""
     with pytest.raises(InputError, match=r"^scene\.load_factor: "):
-        setup_walk("soft", {"load_factor": load_factor}, None)
+        setup_walk("soft", {"load_factor": load_factor})
 
 
 def test_factors_that_links_cannot_bear_are_refused() -> None:
     """Point-like links may be given as much as leaves them half of their inertia; an ellipse is never loaded."""
     most = alternating(SOFT.with_values(TENTH), 4).greatest_load(SOFT.link_length)
-    setup_walk("soft", TENTH | {"load_factor": 0.999 * most}, None)
+    setup_walk("soft", TENTH | {"load_factor": 0.999 * most})
     with pytest.raises(
         InputError, match=r"^scene\.load_factor: 15 is too much for links .*; give at most 1\.\d+, or null$"
     ):
-        setup_walk("soft", TENTH | {"load_factor": 15.0}, None)
-    setup_walk("soft", TENTH | {"load_factor": 15.0, "start": "ellipse"}, None)
+        setup_walk("soft", TENTH | {"load_factor": 15.0})
+    setup_walk("soft", TENTH | {"load_factor": 15.0, "start": "ellipse"})
 
 
 def test_samples_too_far_apart_for_loads_to_fall_are_refused() -> None:
@@ -169,7 +168,7 @@ def test_samples_too_far_apart_for_loads_to_fall_are_refused() -> None:
     with pytest.raises(
         InputError, match=r"^options\.record_interval: loads on the sprocket .*or scene\.load_factor: 1$"
     ):
-        setup_walk("soft", coarse, None)
-    setup_walk("soft", coarse | {"load_factor": 1.0}, None)
-    setup_walk("soft", coarse | {"start": "ellipse"}, None)
-    setup_walk("soft", coarse | {"record_interval": LONGEST_DRIVE_INTERVAL}, None)
+        setup_walk("soft", coarse)
+    setup_walk("soft", coarse | {"load_factor": 1.0})
+    setup_walk("soft", coarse | {"start": "ellipse"})
+    setup_walk("soft", coarse | {"record_interval": LONGEST_DRIVE_INTERVAL})
