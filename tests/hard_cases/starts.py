@@ -1,7 +1,7 @@
 """Chains in awkward states, what their energy ledger leaves open, and the methods that must cope with them."""
 
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import pytest
@@ -30,12 +30,6 @@ UNDISSIPATIVE: Final[Mapping[str, float]] = {
 """Nothing dissipates, neither joints nor collisions; springs soft enough to show the order of convergence."""
 
 ELASTIC: Final = SOFT.with_values(UNDISSIPATIVE)
-
-
-def quick_with(*quick: str) -> Any:
-    """Parametrises a test with every method, marked as slow unless it is one of these."""
-    slow = pytest.mark.slow
-    return pytest.mark.parametrize("method", [pytest.param(m, marks=() if m in quick else slow) for m in METHODS])
 
 
 def set_down(position: Array, gap: float = 2e-4, parameters: Parameters = SOFT) -> Array:

@@ -6,13 +6,16 @@ from typing import Any
 
 import pytest
 
-from tests.hard_cases.starts import METHODS, SOFT, every_method, quick_with
+from tests.hard_cases.starts import METHODS, SOFT, every_method
 from tests.support.setups import setup_walk
 from warpchain import Status, WalkResult
 from warpchain.inputs.methods import METHODS_BY_NEED
 from warpchain.walks.one_walk import run_walk
 
-every_method_walks = quick_with("rkf78", "dp5", "hybrid")
+QUICK = ("rkf78", "dp5", "hybrid")
+every_method_walks = pytest.mark.parametrize(
+    "method", [pytest.param(method, marks=() if method in QUICK else pytest.mark.slow) for method in METHODS]
+)
 """Walks need a kernel more than short runs: no other quick test uses those of bs32 and os32."""
 
 

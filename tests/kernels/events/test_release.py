@@ -124,16 +124,11 @@ def end_of_watch(start: float, window: float, wanted: float, since: float | None
     return start + max(1, math.ceil((wanted + since - start) / length - 1e-9)) * length
 
 
-def fall_of(load: float, start: float = 0.5) -> float:
-    """When the loads of a loop that keeps its shape begin to fall."""
-    return end_of_watch(start, max(float(SHORTEST_WINDOW), crossing(load) / 2), crossing(load))
-
-
 def test_a_loop_that_keeps_its_shape_is_released_in_time() -> None:
     """Held for a window and a crossing under load, let down, watched for a period; then further_hold and the phase."""
     watched = Watched(drive={"further_hold": 0.75, "release_phase": 0.5}).sample()
     time, loads = watched.time, watched.loads
-    fall = fall_of(16.0)
+    fall = end_of_watch(0.5, max(float(SHORTEST_WINDOW), crossing(16.0) / 2), crossing(16.0))
     assert np.all(loads[time < 0.5] == 1.0)
     assert np.all(loads[(time >= 0.5) & (time < fall)] == 16.0)
     falling = (time >= fall) & (time < fall + FALL)
