@@ -7,13 +7,11 @@ import pytest
 
 from tests.oracle_model import motion_equations
 from tests.support.command_line import Command
+from tests.support.presets import PAPER
 from warpchain.bench import measurements, numpy_model
-from warpchain.inputs.parameters import preset
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels.methods.method import method_names
 from warpchain.run.simulation import simulate
-
-PAPER = preset("paper")
 
 
 @pytest.mark.parametrize("links", [4, 10])

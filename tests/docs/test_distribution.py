@@ -12,6 +12,7 @@ import pytest
 
 import warpchain
 from tests.docs.code_blocks import ROOT
+from tests.test_architecture import tracked
 from warpchain.sweeps.plan import load_sweep
 
 BUILD = "from setuptools import build_meta; print(build_meta.build_{}({!r}))"
@@ -30,11 +31,7 @@ def sdist(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The source distribution, made from the files under version control."""
     pytest.importorskip("setuptools", minversion="77", reason="the extra `test` has it")
     folder = tmp_path_factory.mktemp("sdist")
-    command = ["git", "-c", f"safe.directory={ROOT}", "ls-files", "-z"]
-    listing = subprocess.run(command, cwd=ROOT, capture_output=True, encoding="utf-8")
-    if listing.returncode:
-        pytest.skip("not a git checkout")
-    for name in listing.stdout.split("\0")[:-1]:
+    for name in tracked():
         target = folder / "source" / name
         target.parent.mkdir(parents=True, exist_ok=True)
         if (ROOT / name).exists():

@@ -1,29 +1,26 @@
 """Chains in awkward states, what their energy ledger leaves open, and the methods that must cope with them."""
 
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from tests.oracle_model import contact_equations, motion_equations
 from tests.oracle_model.circular_loop import circular_loop
-from warpchain.inputs.parameters import Parameters, preset
+from tests.support.arrays import Array
+from tests.support.presets import PAPER, SOFT
+from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.start_shapes import ellipse, lay_chain, links_between
 from warpchain.kernels.methods.method import method_names
 from warpchain.run.simulation import Trajectory
-from warpchain.walks.walk_result import WalkResult
 
-Array = NDArray[np.float64]
 State = tuple[Array, Array]
 """Position (n, 3) and velocity (n, 3) of a chain."""
 
 METHODS = method_names()
 every_method = pytest.mark.parametrize("method", METHODS)
 
-PAPER: Final = preset("paper")
-SOFT: Final = preset("soft")
 UNDISSIPATIVE: Final[Mapping[str, float]] = {
     "joint_stiffness": 1e5,
     **dict.fromkeys(["joint_damping", "viscous_friction", "coulomb_friction"], 0.0),
@@ -33,12 +30,6 @@ UNDISSIPATIVE: Final[Mapping[str, float]] = {
 """Nothing dissipates, neither joints nor collisions; springs soft enough to show the order of convergence."""
 
 ELASTIC: Final = SOFT.with_values(UNDISSIPATIVE)
-
-
-def quick_with(*quick: str) -> Any:
-    """Parametrises a test with every method, marked as slow unless it is one of these."""
-    slow = pytest.mark.slow
-    return pytest.mark.parametrize("method", [pytest.param(m, marks=() if m in quick else slow) for m in METHODS])
 
 
 def set_down(position: Array, gap: float = 2e-4, parameters: Parameters = SOFT) -> Array:
@@ -143,8 +134,3 @@ def energy_scale(parameters: Parameters, start: State) -> float:
         start[0], parameters
     )
     return moving + parameters.gravity * float(motion_equations.link_masses(len(start[0]), parameters).sum()) * 0.01
-
-
-def ledger_error(walk: WalkResult) -> float:
-    """What the energy ledger of a walk leaves open, relative to the energy at release; NaN if it was not released."""
-    return abs(walk.energy["residual"]) / (walk.energy["kinetic_at_release"] + walk.energy["potential_at_release"])

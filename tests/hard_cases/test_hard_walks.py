@@ -6,13 +6,16 @@ from typing import Any
 
 import pytest
 
-from tests.hard_cases.starts import METHODS, SOFT, every_method, ledger_error, quick_with
+from tests.hard_cases.starts import METHODS, SOFT, every_method
 from tests.support.setups import setup_walk
 from warpchain import Status, WalkResult
 from warpchain.inputs.methods import METHODS_BY_NEED
 from warpchain.walks.one_walk import run_walk
 
-every_method_walks = quick_with("rkf78", "dp5", "hybrid")
+QUICK = ("rkf78", "dp5", "hybrid")
+every_method_walks = pytest.mark.parametrize(
+    "method", [pytest.param(method, marks=() if method in QUICK else pytest.mark.slow) for method in METHODS]
+)
 """Walks need a kernel more than short runs: no other quick test uses those of bs32 and os32."""
 
 
@@ -28,12 +31,12 @@ class Walk:
     def end(self, method: str, within: float, **settings: object) -> WalkResult:
         """Walk with other settings, check status and Δx, and that the ledger closes to this share of the energy."""
         limits = {"step_limit": 20_000_000, "tolerance": 1e-6, "flight_tolerance": 1e-4}
-        setup = setup_walk(self.preset, {"method": method, **limits, **self.settings, **settings}, None)
+        setup = setup_walk(self.preset, {"method": method, **limits, **self.settings, **settings})
         done = run_walk(setup, frame_interval=None)
         assert done.status == self.status
         if self.status == Status.AT_REST:
             assert self.distance[0] < done.dx < self.distance[1]
-        assert ledger_error(done) < within
+        assert done.energy_error < within
         return done
 
 

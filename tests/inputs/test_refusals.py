@@ -16,11 +16,7 @@ import warpchain
 from tests.support.setups import setup_walk
 from warpchain.inputs.sections import SECTION_OF, SECTIONS
 from warpchain.inputs.setup import resolve
-from warpchain.inputs.validation import (
-    LONGEST_LINE,
-    InputError,
-    field_limits,
-)
+from warpchain.inputs.validation import LONGEST_LINE, InputError, field_limits
 from warpchain.inputs.yaml_files import LARGEST_FILE, read_yaml
 from warpchain.kernels.methods.method import find_method, method_names
 from warpchain.sweeps.plan import load_sweep
@@ -136,7 +132,7 @@ def test_refusals_say_what_to_give(settings: dict[str, Any], message: str) -> No
 @pytest.mark.parametrize("method", [name for name in method_names() if not find_method(name).runs_on_gpus])
 def test_methods_that_a_gpu_has_no_kernel_for_are_refused_there(method: str) -> None:
     """With what to give instead."""
-    text = refusal(lambda: setup_walk("soft", {"method": method, "device": "cuda:1"}, None))
+    text = refusal(lambda: setup_walk("soft", {"method": method, "device": "cuda:1"}))
     assert text == f"options.method: {method!r} runs on a CPU only; give explicit, or device: cpu"
 
 
@@ -190,7 +186,7 @@ def test_a_hostile_value_is_refused_in_short_lines(kind: str) -> None:
     """Numbers, words and truth values, given by keyword; every key of a sweep, given from Python."""
     value = HOSTILE[kind]()
     for name in ("links", "frequency", "start", "device", "method", "self_contact"):
-        assert refusal(lambda name=name: setup_walk("soft", {name: value}, None))
+        assert refusal(lambda name=name: setup_walk("soft", {name: value}))
     for key in ("seed", "samples", "sampler", "preset", "scene", "grid", "distributions", "record", "blocks"):
         assert refusal(lambda key=key: load_sweep({**SWEEP, key: value})).startswith("sweep")
 

@@ -39,9 +39,9 @@ def test_every_parameter_has_one_symbol() -> None:
 def test_symbols_stand_for_names(tmp_path: Path, name: str) -> None:
     """A value by its symbol, in ASCII or as printed, is the value by its name: in a call, in a file, in a change."""
     value = 1.1 * Parameters.quantities()[name].value if name != "sprocket_friction" else 0.5
-    expected = setup_walk("soft", {name: value}, None)
+    expected = setup_walk("soft", {name: value})
     for symbol in (SYMBOLS[name], Parameters.quantities()[name].symbol):
-        assert setup_walk("soft", {symbol: value}, None) == expected
+        assert setup_walk("soft", {symbol: value}) == expected
         assert preset("soft").with_values({symbol: value}) == expected.parameters
         path = written(tmp_path, f"preset: soft\nparameters: {{{symbol}: {value!r}}}")
         assert read_walk_file(path)[1]["parameters"] == {name: value}

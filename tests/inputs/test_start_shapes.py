@@ -5,10 +5,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tests.oracle_model import motion_equations
-from warpchain import preset
+from tests.support.presets import PAPER
 from warpchain.inputs.start_shapes import ellipse, lay_chain, stadium
 
-PAPER = preset("paper")
 LENGTH = PAPER.link_length
 RADIUS = PAPER.sprocket_radius + PAPER.circle_radius
 

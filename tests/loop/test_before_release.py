@@ -1,8 +1,6 @@
 """The last moments on the sprocket, kept with a walk: what they are, that they change nothing, files."""
 
-from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +9,6 @@ import warpchain
 from warpchain.inputs.validation import InputError
 from warpchain.loop.stationary_loop import FIELDS, BeforeRelease
 from warpchain.walks.one_walk import run_walk
-from warpchain.walks.walk_result import WalkResult
 
 BRIEF = {
     "links": 40,
@@ -21,17 +18,12 @@ BRIEF = {
     "further_hold": 0.5,  # under its own loads, and nothing else is kept of the time before the release
     "walk_limit": 0.05,
 }
-
-
-@cache
-def brief_walk(**settings: Any) -> WalkResult:
-    """The first 50 ms of a walk of 40 links at 12 Hz, half a second after its loop has become stationary."""
-    return warpchain.walk(**BRIEF, **settings)
+"""The first 50 ms of a walk, half a second after its loop has become stationary."""
 
 
 def test_they_end_with_the_release() -> None:
     """Times are negative and as far apart as those of the walk, which goes on where they end, in height as well."""
-    walk = brief_walk(record_before=0.2)
+    walk = warpchain.walk(**BRIEF, record_before=0.2)
     before = walk.before_release
     assert before is not None
     assert -0.2 <= before.frame_time[0] < -0.197 and -2.1e-3 < before.frame_time[-1] < 0

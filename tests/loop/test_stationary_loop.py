@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 
 from tests.support.made_walks import make_walk
-from warpchain.inputs.parameters import preset
+from tests.support.presets import SOFT
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.loop.stationary_loop import BeforeRelease, StationaryLoop, average_frames
 
-SOFT = preset("soft")
 LENGTH, MASS = SOFT.link_length, (SOFT.inner_mass + SOFT.outer_mass) / 2
 RATE = 591.3  # links a second
 

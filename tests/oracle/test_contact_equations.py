@@ -7,9 +7,7 @@ from numpy.testing import assert_allclose
 from tests.oracle_model import contact_equations, motion_equations
 from tests.support.folded_chains import crumpled_chain
 from tests.support.mild_parameters import UNIT
-from warpchain.inputs.parameters import preset
-
-PAPER = preset("paper")
+from tests.support.presets import PAPER
 
 # Notation: n̂ from A to B, t̂ = ẑ × n̂, W, J₁, J₂ as in `collision_impulse`, D = J₂ − J₁, vectors in brackets are (n, t)
 # components. A case is v_A − v_B, n̂, the levers of A and B, 1/m and 1/I of A, then of B.

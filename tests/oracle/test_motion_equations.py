@@ -7,9 +7,8 @@ from numpy.testing import assert_allclose
 from tests.oracle_model import motion_equations
 from tests.oracle_model.circular_loop import circular_loop
 from tests.support.mild_parameters import MILD, UNIT
-from warpchain.inputs.parameters import Parameters, preset
-
-PAPER = preset("paper")
+from tests.support.presets import PAPER
+from warpchain.inputs.parameters import Parameters
 
 
 def disturbed_loop(n: int, parameters: Parameters, seed: int = 1):

@@ -8,10 +8,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.oracle_model import tilting_contacts, tilting_plane
 from tests.oracle_model.tilting_plane import axes, tilted_plane
+from tests.support.presets import PAPER
 from tests.support.tilted_chains import tilted_heap
-from warpchain.inputs.parameters import preset
 
-PAPER = preset("paper")
 HEAPS = range(150)
 
 

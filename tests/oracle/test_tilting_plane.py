@@ -9,10 +9,9 @@ from numpy.testing import assert_allclose
 from tests.oracle_model import motion_equations, tilting_plane
 from tests.oracle_model.tilting_plane import Plane, axes, tilted_plane
 from tests.support.mild_parameters import MILD
+from tests.support.presets import PAPER
 from tests.support.tilted_chains import tumbling_loop
-from warpchain.inputs.parameters import preset
 
-PAPER = preset("paper")
 WIDE = 0.02
 """Half width with which S is as large as the links' moments of inertia, m."""
 SEEDS = range(8)

@@ -1,12 +1,10 @@
 """A loop that turns like a rigid body, in closed form, with the conventions of `motion_equations`."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tests.oracle_model.motion_equations import direction, link_masses, turned
+from tests.support.arrays import Array
 from warpchain.inputs.parameters import Parameters
-
-Array = NDArray[np.float64]
 
 
 def circular_loop(n: int, parameters: Parameters, speed: float) -> tuple[Array, Array]:

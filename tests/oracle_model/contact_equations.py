@@ -8,12 +8,11 @@ from collections.abc import Iterator
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tests.oracle_model.motion_equations import cross, link_ends, link_inertias, link_masses, turned
+from tests.support.arrays import Array
 from warpchain.inputs.parameters import Parameters
 
-Array = NDArray[np.float64]
 Sprocket = tuple[Array, float, float]
 """Centre (2,) in m, radius that the link circles touch in m, angular velocity in rad/s (anticlockwise > 0)."""
 

@@ -16,12 +16,10 @@ Source: "A walking roller chain", section 2.1.
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from tests.support.arrays import Array
 from warpchain.inputs.parameters import Parameters
-
-Array = NDArray[np.float64]
 
 
 def link_masses(n: int, parameters: Parameters) -> Array:

@@ -7,13 +7,12 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tests.oracle_model.contact_equations import collision_impulse, link_radii
 from tests.oracle_model.motion_equations import acceleration, cross, link_ends, link_inertias, link_masses, turned
+from tests.support.arrays import Array
 from warpchain.inputs.parameters import Parameters
 
-Array = NDArray[np.float64]
 Contact = tuple[int, float, Array, Array]
 """Link, gap [m], normal from the floor to the link, and the touching point."""
 

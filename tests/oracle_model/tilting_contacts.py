@@ -11,13 +11,11 @@ considerations", Journal of Applied Mechanics 65 (1998) 939-951, in its three di
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tests.oracle_model.motion_equations import cross, link_ends, link_inertias, link_masses, turned
 from tests.oracle_model.tilting_plane import Plane, plane_mass_matrix
+from tests.support.arrays import Array
 from warpchain.inputs.parameters import Parameters
-
-Array = NDArray[np.float64]
 
 LEAST_SLOPE = 1e-12
 """ε: with less than this of Ŷ within the plane, a roller's lowest points go to the middle of its face."""

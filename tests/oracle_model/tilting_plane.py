@@ -22,7 +22,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tests.oracle_model.motion_equations import (
     acceleration,
@@ -34,9 +33,8 @@ from tests.oracle_model.motion_equations import (
     spring_energy,
     turned,
 )
+from tests.support.arrays import Array
 from warpchain.inputs.parameters import Parameters
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,21 +10,13 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 from scipy import stats
 
-from tests.support.made_sweeps import FIGURE_6, distance, make_sweep
+from tests.support.made_sweeps import FIGURE_6, SMALL, distance, make_sweep
 from warpchain.pictures.style import GREEN, RED, NothingToShow, Picture
 from warpchain.reports.sensitivity import sensitivities, sensitivity
 from warpchain.reports.sweep_figures import figure6, figures
 from warpchain.status import Status
 from warpchain.store.sweep_result import SweepResult
 from warpchain.sweeps.plan import PlannedWalk
-
-SMALL: dict[str, Any] = FIGURE_6 | {
-    "samples": 3,
-    "blocks": [
-        {"name": "rest", "grid": {"links": [60, 120], "frequency": [10, 20]}},
-        {"name": "ellipse", "scene": {"start": "ellipse"}, "grid": {"links": [120], "frequency": [10, 20]}},
-    ],
-}
 
 
 def one_block(**keys: Any) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from tests.support.command_line import Command
-from tests.support.made_sweeps import FIGURE_6, distance, make_sweep
+from tests.support.made_sweeps import FIGURE_6, SMALL, distance, make_sweep
 from tests.support.made_walks import make_unreleased, make_walk
 from warpchain.inputs.validation import InputError
 from warpchain.reports import sweep_page
@@ -20,15 +20,7 @@ from warpchain.store.sweep_result import load
 from warpchain.sweeps.plan import PlannedWalk, load_sweep
 from warpchain.walks.walk_result import WalkResult
 
-CONTENT: dict[str, Any] = FIGURE_6 | {
-    "samples": 3,
-    "options": {"method": "explicit"},
-    "distributions": {"gravity": {"uniform": [9.0, 10.0]}},
-    "blocks": [
-        {"name": "rest", "grid": {"links": [60, 120], "frequency": [10, 20]}},
-        {"name": "ellipse", "scene": {"start": "ellipse"}, "grid": {"links": [120], "frequency": [10, 20]}},
-    ],
-}
+CONTENT = SMALL | {"options": {"method": "explicit"}, "distributions": {"gravity": {"uniform": [9.0, 10.0]}}}
 
 
 def flawed(walk: PlannedWalk) -> float | Status | None:

@@ -7,9 +7,9 @@ import pytest
 
 import warpchain
 from tests.support.folded_chains import folded_chain
+from tests.support.presets import SOFT
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 
-SOFT = warpchain.preset("soft")
 LINKS = 12
 
 

@@ -19,7 +19,7 @@ def test_every_setting_takes_a_numpy_value():
     setup = setup_walk("soft", drive | each, 5)
     given = {**setup.parameters.model_dump(), **setup.scene.model_dump(), **setup.options.model_dump()}
     assert given.keys() == SECTION_OF.keys() and None not in given.values()
-    again = setup_walk("soft", {name: of_numpy(value) for name, value in given.items()}, None)
+    again = setup_walk("soft", {name: of_numpy(value) for name, value in given.items()})
     assert again == setup
     for model in (again.parameters, again.scene, again.options):
         for name, value in model:

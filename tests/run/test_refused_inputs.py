@@ -7,15 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-import warpchain
 from tests.oracle_model.circular_loop import circular_loop
+from tests.support.presets import SOFT
 from tests.support.setups import setup_walk
 from warpchain import Chains, InputError, simulate, walk
 from warpchain.engine.batch import Batch
 from warpchain.walks import one_walk
 
-SOFT = warpchain.preset("soft")
-SETUP = setup_walk("soft", {}, None)
+SETUP = setup_walk("soft", {})
 POSITION, VELOCITY = circular_loop(8, SOFT, 1.0)
 POSITION[:, 1] += 0.1
 PAIR = {"parameters": [SOFT, SOFT], "position": np.array([POSITION] * 2), "velocity": np.array([VELOCITY] * 2)}

@@ -5,13 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from studies.waves.fields import (
-    characteristic,
-    curvatures,
-    normal_velocities,
-    stacked_power,
-    tensions,
-)
+from studies.waves.fields import characteristic, curvatures, normal_velocities, stacked_power, tensions
 from studies.waves.picture import waves_figure
 from tests.support.made_walks import make_walk
 

@@ -6,23 +6,21 @@ from contextlib import contextmanager
 import numpy as np
 import warp as wp
 from numpy.testing import assert_allclose, assert_array_equal
-from numpy.typing import NDArray
 
+from tests.support.arrays import Array
 from tests.support.folded_chains import folded_chain
+from tests.support.presets import SOFT
 from tests.support.unlike_links import UnlikeLinks
 from warpchain.engine.batch import Batch
 from warpchain.inputs.floor import Floor, floor_from
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import Parameters, preset
+from warpchain.inputs.parameters import Parameters
 from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.cpu import loop as cpu_loop
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu import loop as gpu_loop
 from warpchain.status import Status
 
-Array = NDArray[np.float64]
-
-SOFT = preset("soft")
 FIXED_STEP = 2e-6  # s
 HILLS = np.array([[-1.0, -0.002], [-0.02, 0.003], [0.0, -0.001], [0.015, 0.002], [0.03, -0.01], [1.0, -0.01]])
 """Points of a floor with corners of both kinds, which heaps cut."""

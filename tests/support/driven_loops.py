@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tests.support.arrays import Array
 from tests.support.setups import setup_walk
 from warpchain.engine.batch import Batch, Recorded
 from warpchain.inputs.link_values import LinkValues
@@ -15,8 +15,6 @@ from warpchain.inputs.setup import Setup
 from warpchain.kernels import layout
 from warpchain.status import Status
 from warpchain.walks.walk_phases import WalkRun
-
-Array = NDArray[np.float64]
 
 SHAPE = (layout.HEIGHT, layout.WIDTH, layout.CENTER_X, layout.CENTER_Y)
 """Columns of a sample that say where a loop is."""
@@ -39,7 +37,7 @@ def period_of(setup: Setup) -> float:
 
 def released_loop(preset: str = "soft", **settings: Any) -> Loop:
     """Carry a walk of a preset's chain to the end of its drive."""
-    setup = setup_walk(preset, {"method": "explicit"} | settings, None)
+    setup = setup_walk(preset, {"method": "explicit"} | settings)
     batch = Batch(1, setup.scene.links, setup.options)
     run = WalkRun(batch, 0, setup)
     found: Loop | None = None

@@ -1,9 +1,8 @@
 """Folded chains whose joints are all but closed, as contacts meet them in a pile, and heaps of torn ones."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from tests.support.arrays import Array
 
 
 def chain_of_angles(angle: Array, link_length: float) -> Array:

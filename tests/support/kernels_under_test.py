@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from tests.support.arrays import Array
 from tests.support.blocks_under_test import floor_with
 from tests.support.unlike_links import UnlikeLinks
 from warpchain.engine.batch import Batch
@@ -29,8 +29,6 @@ from warpchain.kernels.cpu.explicit import place_ends
 from warpchain.kernels.cpu.loop import load_state
 from warpchain.kernels.features import COMPILER_FLAGS
 from warpchain.kernels.types import Model, State, read_ground
-
-Array = NDArray[np.float64]
 
 DEVICE = start_device("cpu").warp
 POISONED_JOINT = 2**30
@@ -65,9 +63,6 @@ def chain_on_cpu(position: Array, velocity: Array, parameters: Parameters | Unli
     state.load_factor = wp.ones(1, dtype=wp.float64, device=DEVICE)
     state.links = wp.array(np.hstack([position, velocity]).T[None], dtype=wp.float64, device=DEVICE)
     return model_of([(len(position), parameters)]), state
-
-
-# --- the impulse law ---
 
 
 # --- the contact pass ---
@@ -204,14 +199,6 @@ class ContactPass:
     def fixed_loss(self, world: int) -> float:
         """Energy lost to floor and sprocket in the last pass."""
         return float(self._rows(world, layout.LOST_FIXED).sum())
-
-    def listed_pairs(self, world: int) -> list[tuple[int, int]]:
-        """Pairs of joints in the neighbour list, in its order."""
-        lists = list_layout(self.columns)
-        row = self.lists.numpy()[world]
-        count = int(row[lists.count])
-        first, second = (row[start : start + count].tolist() for start in (lists.first, lists.second))
-        return list(zip(first, second, strict=True))
 
     def _rows(self, world: int, *rows: int) -> Array:
         return self.scratch.numpy()[world, list(rows), : self.links[world]].copy()

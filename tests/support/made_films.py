@@ -4,11 +4,8 @@ from dataclasses import replace
 from statistics import NormalDist
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpchain import films
-
-Array = NDArray[np.float64]
 
 TIME = np.arange(0.0, 0.39, 0.004)
 GRAVITY = 9.809

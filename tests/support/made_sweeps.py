@@ -34,6 +34,14 @@ FIGURE_6: dict[str, Any] = {
     ],
 }
 
+SMALL: dict[str, Any] = FIGURE_6 | {
+    "samples": 3,
+    "blocks": [
+        {"name": "rest", "grid": {"links": [60, 120], "frequency": [10, 20]}},
+        {"name": "ellipse", "scene": {"start": "ellipse"}, "grid": {"links": [120], "frequency": [10, 20]}},
+    ],
+}
+
 TOLERANCE: dict[str, Any] = {
     "version": 1,
     "name": "tolerance",

@@ -4,13 +4,11 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tests.support.arrays import Array
 from tests.support.made_walks import make_walk
 from warpchain.inputs.setup import resolve
 from warpchain.walks.walk_result import WalkResult
-
-Array = NDArray[np.float64]
 
 
 def plane_axes(tilt: Array, yaw: Array) -> Array:

@@ -1,18 +1,13 @@
 """Rigid joints: their chains, and the truth by dense algebra and SciPy."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from tests.oracle_model import motion_equations
-from warpchain import preset
+from tests.support.arrays import Array
+from tests.support.presets import PAPER
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.start_shapes import ellipse, lay_chain
-
-Array = NDArray[np.float64]
-
-PAPER = preset("paper")
-
 
 # --- by dense algebra ---
 

@@ -3,14 +3,12 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tests.oracle_model.circular_loop import circular_loop
 from tests.oracle_model.tilting_plane import Plane, tilted_plane
+from tests.support.arrays import Array
 from tests.support.folded_chains import crumpled_chain
 from warpchain.inputs.parameters import Parameters
-
-Array = NDArray[np.float64]
 
 
 def tumbling_loop(n: int, parameters: Parameters, seed: int) -> tuple[Array, Array, Plane]:

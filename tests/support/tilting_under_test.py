@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
 from tests.oracle_model.tilting_plane import Plane
+from tests.support.arrays import Array
 from tests.support.kernels_under_test import DEVICE, chain_on_cpu, compiled, poisoned
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
@@ -22,7 +22,6 @@ from warpchain.kernels.physics.plane import on_plane
 from warpchain.kernels.types import Ground, Model, State
 from warpchain.status import Status
 
-Array = NDArray[np.float64]
 Start = tuple[Array, Array, Plane]
 """Position (n, 3), velocity (n, 3) and plane."""
 

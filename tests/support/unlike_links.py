@@ -3,12 +3,9 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpchain.inputs.link_values import LinkValues
 from warpchain.inputs.parameters import Parameters
-
-Array = NDArray[np.float64]
 
 
 class UnlikeLinks:

@@ -41,13 +41,10 @@ def test_an_index_stays_when_samples_are_added() -> None:
     few = load_sweep(blocks({"grid": grid}, {"samples": 2}, {"sampler": "saltelli", "samples": 2}))
     many = load_sweep(blocks({"grid": grid, "samples": 5}, {"samples": 8}, {"sampler": "saltelli", "samples": 4}))
     for index in few.indices.tolist():
-        one, other = few.planned(index), many.planned(index)
-        assert (one.block, one.cell, one.sample, one.setup.scene) == (
-            other.block,
-            other.cell,
-            other.sample,
-            other.setup.scene,
+        one, other = (
+            (walk.block, walk.cell, walk.sample, walk.setup.scene) for walk in (few.planned(index), many.planned(index))
         )
+        assert one == other
     assert len(set(many.indices.tolist())) == many.walk_count
 
 
@@ -109,10 +106,8 @@ def test_values_on_an_axis_are_exact_unless_scatter_is_asked_for(name: str, othe
     assert list(exact.blocks[0].drawn) == [*(other for other in TABLE_1 if other != name), "phase", "clearance"]
     scattered = load_sweep(given | {"distributions": {**others, name: "table"}})
     assert scattered.blocks[0].drawn == (*TABLE_1, "phase", "clearance") and scattered.digest() != exact.digest()
-    assert (
-        len({getattr(scattered.planned(index).setup.parameters, name) for index in scattered.indices[:40].tolist()})
-        == 40
-    )
+    values = {getattr(scattered.planned(index).setup.parameters, name) for index in scattered.indices[:40].tolist()}
+    assert len(values) == 40
 
 
 @pytest.mark.parametrize(

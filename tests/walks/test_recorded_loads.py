@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import warpchain
+from tests.oracle_model.motion_equations import friction_torque, link_masses
 from tests.support.made_walks import assert_same
 from warpchain.inputs.validation import InputError
 from warpchain.walks.walk_result import WalkResult
@@ -22,17 +23,11 @@ def flight(**settings: Any) -> WalkResult:
     return warpchain.walk(**FLIGHT | settings, record_loads=True, frame_interval=FINE)
 
 
-def masses(walk: WalkResult) -> np.ndarray:
-    """Masses of the links [kg], shape (n,)."""
-    parameters = walk.setup.parameters
-    return np.tile([parameters.inner_mass, parameters.outer_mass], walk.setup.scene.links // 2)
-
-
 def test_forces_and_gravity_accelerate_each_link() -> None:
     """From 10 ms on the impulse of both joints and gravity on a link is its change of momentum in the frames."""
     walk = flight(ellipse_aspect=1.5, method="dp5")
     time, joints, forces = walk.frame_time, walk.frame_joints, walk.frame_forces
-    mass = masses(walk)[:, None]
+    mass = link_masses(FLIGHT["links"], walk.setup.parameters)[:, None]
     velocity = np.gradient((joints + np.roll(joints, 1, axis=1)) / 2, time, axis=0)
     on_link = forces - np.roll(forces, 1, axis=1) - mass * np.array([0.0, walk.setup.parameters.gravity])
     impulse = np.cumsum((on_link[1:] + on_link[:-1]) / 2 * np.diff(time)[:, None, None], axis=0)
@@ -53,7 +48,8 @@ def test_a_circulating_ring_has_the_tension_rho_v_squared() -> None:
     """
     walk = flight(ellipse_aspect=1.0, method="dp5")
     late = walk.frame_time > 0.03
-    joints, forces, mass = walk.frame_joints[late], walk.frame_forces[late], masses(walk)
+    joints, forces = walk.frame_joints[late], walk.frame_forces[late]
+    mass = link_masses(FLIGHT["links"], walk.setup.parameters)
     center = joints.mean(axis=1, keepdims=True)
     velocity = np.gradient(joints - center, walk.frame_time[late], axis=0)
     ahead = np.roll(joints, -1, axis=1) - np.roll(joints, 1, axis=1)
@@ -67,14 +63,11 @@ def test_a_circulating_ring_has_the_tension_rho_v_squared() -> None:
 def test_moments_are_those_of_turning_joints() -> None:
     """In every joint the moment on the link before it is β w + τ_c tanh(w / ω_c), with w from the frames, to 0.1 %."""
     walk = flight(ellipse_aspect=1.5, method="dp5")
-    parameters, joints = walk.setup.parameters, walk.frame_joints
-    link = joints - np.roll(joints, 1, axis=1)
+    link = walk.frame_joints - np.roll(walk.frame_joints, 1, axis=1)
     angle = np.unwrap(np.arctan2(link[..., 1], link[..., 0]), axis=0)
     spin = np.gradient(angle, walk.frame_time, axis=0)
     turn = np.roll(spin, -1, axis=1) - spin
-    expected = parameters.viscous_friction * turn + parameters.coulomb_friction * np.tanh(
-        turn / parameters.friction_smoothing
-    )
+    expected = friction_torque(turn, walk.setup.parameters)
     late = walk.frame_time > 0.01
     apart = np.abs(walk.frame_moments - expected)[late]
     assert np.median(apart) < 1e-3 * np.median(np.abs(expected))

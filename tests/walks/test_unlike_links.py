@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 import warpchain
+from tests.support.presets import SOFT
 from tests.support.setups import setup_walk
-from warpchain import Status, preset
+from warpchain import Status
 from warpchain.inputs.link_values import alternating
 from warpchain.inputs.scene import link_values, riding_radius
 from warpchain.pictures.chain import circle_radii, link_outlines
 
-SOFT = preset("soft")
 BRIEF = {"preset": "soft", "method": "explicit", "links": 36, "frequency": 15.0}
 """A short chain, which walks for a second of one core."""
 KINDS = {
@@ -28,7 +28,7 @@ KINDS = {
 
 def values_of(links: int = 60, **settings: Any) -> Any:
     """Values of the links of a scene."""
-    setup = setup_walk("soft", {"links": links, **settings}, None)
+    setup = setup_walk("soft", {"links": links, **settings})
     return link_values(setup.scene, setup.parameters)
 
 
@@ -53,7 +53,7 @@ def test_the_sprocket_knows_the_circles_of_the_links(measures: str) -> None:
 def test_joints_ride_on_the_wider_of_their_circles() -> None:
     """Every second link may be narrow, and a charm wide: the other joints ride as high as without."""
     for wide, height in (({"link_radii": [2e-3, 6e-3] * 30}, 6e-3), ({"charm_radius": 6e-3}, SOFT.circle_radius)):
-        assert riding_radius(setup_walk("soft", {"links": 60, **wide}, None).scene, SOFT) == height
+        assert riding_radius(setup_walk("soft", {"links": 60, **wide}).scene, SOFT) == height
 
 
 def test_a_charm_closes_the_ledger_and_is_read_back(tmp_path: Path) -> None:

@@ -8,9 +8,8 @@ from tests.oracle_model import contact_equations, motion_equations
 from tests.oracle_model.circular_loop import circular_loop
 from tests.support.folded_chains import folded_chain
 from tests.support.kernels_under_test import FLOOR, LIST, SELF, SPROCKET, ContactPass, Placed
-from warpchain.inputs.parameters import preset
+from tests.support.presets import PAPER
 
-PAPER = preset("paper")
 TURNING = -90.0
 """Angular velocity of the sprocket, in rad/s: about that of 15 Hz."""
 HUB = (np.zeros(2), PAPER.sprocket_radius, TURNING)

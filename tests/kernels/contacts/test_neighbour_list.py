@@ -11,20 +11,13 @@ from tests.oracle_model import contact_equations
 from tests.oracle_model.circular_loop import circular_loop
 from tests.support.folded_chains import chain_of_angles, folded_chain
 from tests.support.kernels_under_test import LIST, SELF, ContactPass, Placed
+from tests.support.presets import PAPER, SOFT
 from warpchain import Status
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import preset
 
-PAPER = preset("paper")
-SOFT = preset("soft")
 LENGTH = PAPER.link_length
 SKIN = 2e-3
-
-
-def doubled_line(n):
-    """A chain drawn straight: n/2 links out, n/2 back over them."""
-    return chain_of_angles(np.repeat([0.3, 0.3 + np.pi], n // 2), LENGTH)
 
 
 def straight_heap(n, angle):
@@ -36,7 +29,7 @@ def straight_heap(n, angle):
 
 STATES = {
     "loop": lambda n: circular_loop(n, PAPER, 0.0)[0],
-    "doubled line": doubled_line,
+    "doubled line": lambda n: chain_of_angles(np.repeat([0.3, 0.3 + np.pi], n // 2), LENGTH),
     "collinear": lambda n: straight_heap(n, 0.0),
     "collinear, upright": lambda n: straight_heap(n, np.pi / 2),
     "flat pile": lambda n: folded_chain(n, n, LENGTH, tilt=0.1)[0],

@@ -10,9 +10,8 @@ from tests.oracle_model import motion_equations, terrain
 from tests.support.blocks_under_test import floor_with
 from tests.support.folded_chains import folded_chain
 from tests.support.kernels_under_test import TERRAIN, ContactPass, Placed
-from warpchain.inputs.parameters import preset
+from tests.support.presets import PAPER, SOFT
 
-PAPER, SOFT = preset("paper"), preset("soft")
 STAIRS = np.array([[-0.05, 0.0], [0.0, 0.0], [0.0, -0.02], [0.03, -0.02], [0.03, -0.04], [0.1, -0.04]])
 HILLS = np.array([[-0.06, 0.01], [-0.02, 0.0], [0.0, 0.012], [0.011, 0.0], [0.03, -0.004], [0.06, 0.0]])
 BOX = np.array([[-0.1, 0.0], [-0.01, 0.0], [-0.01, 0.02], [0.02, 0.02], [0.02, 0.0], [0.1, 0.0]])

@@ -6,11 +6,10 @@ from numpy.testing import assert_allclose
 
 from tests.oracle_model import tilting_contacts, tilting_plane
 from tests.oracle_model.tilting_plane import Plane
+from tests.support.presets import PAPER
 from tests.support.tilted_chains import tilted_heap
 from tests.support.tilting_under_test import floor_pass
-from warpchain.inputs.parameters import preset
 
-PAPER = preset("paper")
 HEAPS = range(150)
 """Seeds; every third heap is almost or exactly upright, every third almost or exactly flat, and a third have h = 0."""
 

@@ -3,17 +3,15 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from numpy.typing import NDArray
 
 import warpchain
 from tests.oracle_model import motion_equations
+from tests.support.arrays import Array
+from tests.support.presets import SOFT
 from tests.support.rigid_chains import PAPER, exact_rigid_flight, loop, projected, rigid_motion
 from warpchain import Parameters, Status, preset
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 
-Array = NDArray[np.float64]
-
-SOFT = preset("soft")
 SMOOTH = PAPER.with_values({"friction_smoothing": 20.0})
 LENGTHS = (4, 6, 8, 10, 12, 14, 16, 22, 60)
 """Every way in which a loop is cut into eight segments: less than a link each, full ones, short ones, one of each."""

@@ -9,16 +9,15 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.oracle_model import tilting_plane
 from tests.oracle_model.tilting_plane import tilt_of, tilted_plane
+from tests.support.presets import SOFT
 from tests.support.tilted_chains import mirrored
 from tests.support.tilting_under_test import end_of, row_of, tilting_batch
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import preset
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels import layout
 from warpchain.status import Status
 
-SOFT = preset("soft")
 LIMIT = 2.5
 """Of a fall [s]; most take 0.8 s."""
 TAP: dict[str, Any] = {"speed": 0.1, "turn": (-1.0, 0.5)}

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 import warp as wp
-from numpy.typing import NDArray
 
-from warpchain import Status, preset
+from tests.support.presets import SOFT
+from warpchain import Status
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import start_device
 from warpchain.inputs.options import Options
@@ -25,9 +25,6 @@ from warpchain.kernels.events.release import (
 from warpchain.kernels.physics.scaled_loads import under_load
 from warpchain.kernels.types import Drive, Model, State
 
-Array = NDArray[np.float64]
-
-SOFT = preset("soft")
 CPU = start_device("cpu").warp
 STEP = 1 / 1024  # s between two samples; sums of it are exact
 HEIGHT, WIDTH, SPEED = 0.5, 0.125, 5.0
@@ -127,16 +124,11 @@ def end_of_watch(start: float, window: float, wanted: float, since: float | None
     return start + max(1, math.ceil((wanted + since - start) / length - 1e-9)) * length
 
 
-def fall_of(load: float, start: float = 0.5) -> float:
-    """When the loads of a loop that keeps its shape begin to fall."""
-    return end_of_watch(start, max(float(SHORTEST_WINDOW), crossing(load) / 2), crossing(load))
-
-
 def test_a_loop_that_keeps_its_shape_is_released_in_time() -> None:
     """Held for a window and a crossing under load, let down, watched for a period; then further_hold and the phase."""
     watched = Watched(drive={"further_hold": 0.75, "release_phase": 0.5}).sample()
     time, loads = watched.time, watched.loads
-    fall = fall_of(16.0)
+    fall = end_of_watch(0.5, max(float(SHORTEST_WINDOW), crossing(16.0) / 2), crossing(16.0))
     assert np.all(loads[time < 0.5] == 1.0)
     assert np.all(loads[(time >= 0.5) & (time < fall)] == 16.0)
     falling = (time >= fall) & (time < fall + FALL)

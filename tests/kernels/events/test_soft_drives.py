@@ -4,11 +4,8 @@ import numpy as np
 import pytest
 
 import warpchain
-from warpchain import preset
+from tests.support.presets import PAPER
 from warpchain.engine.control import STIFFENING_TIME
-
-PAPER = preset("paper")
-
 
 SPINNING = {"links": 30, "frequency": 15.0, "start": "spinning", "steady_time": 0.4, "method": "explicit"}
 

@@ -5,11 +5,11 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import warpchain
+from tests.support.presets import PAPER
 from tests.support.setups import setup_walk
-from warpchain import InputError, State, Status, preset
+from warpchain import InputError, State, Status
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 
-PAPER = preset("paper")
 SERIES = ("time", "center", "center_velocity", "kinetic_energy", "spring_energy", "lowest", "rms_speed")
 
 
@@ -99,7 +99,7 @@ def test_ledger_of_a_softened_walk_closes(method: str) -> None:
 def test_marks_too_far_apart_for_joints_to_stiffen_are_refused() -> None:
     """Joints stiffen at marks of the record, which may be 2 ms apart at most."""
     with pytest.raises(InputError, match=r"^options\.soften_drive: .* 0\.005 s .* at most 0\.002 s, or .*$"):
-        setup_walk("paper", {"soften_drive": True, "record_interval": 5e-3}, None)
+        setup_walk("paper", {"soften_drive": True, "record_interval": 5e-3})
 
 
 @pytest.mark.parametrize("name", ["soften_pile", "soften_drive"])

@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import warpchain
 from tests.oracle_model import motion_equations
 from tests.oracle_model.circular_loop import circular_loop, circular_loop_force
+from tests.support.presets import PAPER, SOFT
 from warpchain import Status, preset
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
@@ -16,7 +17,6 @@ from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels.methods.method import find_method, method_names
 
 METHODS = [name for name in method_names() if not find_method(name).has_rigid_flight]
-PAPER, SOFT = preset("paper"), preset("soft")
 FRICTIONLESS = {"joint_damping": 0.0, "viscous_friction": 0.0, "coulomb_friction": 0.0}
 LINKS = 12
 HIGH = np.array([0.0, 0.05, 0.0])

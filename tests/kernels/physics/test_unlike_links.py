@@ -5,23 +5,20 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from numpy.typing import NDArray
 
 from tests.oracle_model import contact_equations, motion_equations
+from tests.support.arrays import Array
 from tests.support.driven_loops import hold, released_loop
 from tests.support.folded_chains import folded_chain
 from tests.support.kernels_under_test import FLOOR, LIST, SELF, SPROCKET, ContactPass, Placed
+from tests.support.presets import PAPER, SOFT
 from tests.support.rigid_chains import exact_rigid_flight, loop
 from tests.support.unlike_links import UnlikeLinks, unlike_links
-from warpchain import Status, preset
+from warpchain import Status
 from warpchain.engine.batch import Batch
 from warpchain.inputs.link_values import LinkValues, alternating
 from warpchain.inputs.options import Options
 from warpchain.inputs.start_shapes import ellipse, lay_chain
-
-Array = NDArray[np.float64]
-
-PAPER, SOFT = preset("paper"), preset("soft")
 
 
 def fly(chain: UnlikeLinks, start: tuple[Array, Array], duration: float, fixed_body: str, **options: Any) -> Batch:
