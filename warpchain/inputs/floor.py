@@ -147,7 +147,7 @@ class Floor:
             )
 
     def raised_by(self, circles: Array, radius: Array, clearance: float) -> float:
-        """How far links must be raised for the nearest to be so far from the floor [m]: a clearance.
+        """How far links must be raised for the nearest to have a clearance from the floor [m].
 
         Args:
             circles: Their left circles, then their right ones, (2 n, 2); between them they are as broad.
