@@ -48,7 +48,10 @@ VALUE_OPENING, VALUE_FIXED_DEPTH, VALUE_STOP_TIME, VALUE_NEXT_SAMPLE, VALUE_DEAD
 VALUE_CONTACT_STEP, VALUE_TOLERANCE = 5, 6
 # A plane that tilts in the middle of the attempt before: the first PLANE_VALUES of State.plane.
 VALUE_PLANE_BEFORE = 7
-VALUES = 19
+# What a sample finds: totals over the links, see events.summary, and what drag leaves of their velocities across the
+# path of the loop.
+VALUE_TOTALS, VALUE_DRAG = 19, 34
+VALUES = 35
 BOARD_ROWS = 31
 
 # State.watch. Of each watched quantity of a loop on its sprocket, in the order of WATCHED_COLUMNS: the sum over the

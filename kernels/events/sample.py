@@ -1,6 +1,7 @@
 """One sample of a chain: record it, then evaluate every watch. Frames may have closer marks of their own."""
 
 import functools
+from typing import Any
 
 import warp as wp
 
@@ -31,8 +32,11 @@ def next_mark(state: State, control: Control, world: int):
 
 
 @functools.cache
-def observation(features: Features):
-    """Warp function that writes a sample of a chain whose ends are placed; it returns the area inside the loop [m²]."""
+def observation(features: Features, summarise: Any = summarise):
+    """Warp function that writes a sample of a chain whose ends are placed; it returns the area inside the loop [m²].
+
+    ``summarise(K, chain, sample)`` → that area: writes the totals over all links into a sample.
+    """
     energy = LOADS[features.load].energy
     has_energy = energy is not no_energy
 
@@ -51,7 +55,7 @@ def observation(features: Features):
 
 
 @functools.cache
-def sampling(features: Features):
+def sampling(features: Features, summarise: Any = summarise, drag_shape: Any = drag_shape):
     """Warp function of a sample of a chain whose ends are placed: time series, frame, watches.
 
     ``sample(K, chain, drive, state, record, control, world, time)`` → status. It is called at or after
@@ -59,10 +63,11 @@ def sampling(features: Features):
     joints, and on a sprocket the chain's loads and the velocities of its links.
 
     On a sprocket it watches until the loop is stationary, on a floor until the chain rests or is far. The sums of a
-    plane that tilts must be those of the present state.
+    plane that tilts must be those of the present state. ``drag_shape(K, chain, left)``: a drag on all links, at once or to
+    be carried out later.
     """
     has_floor, is_driven = features.has_floor, features.is_driven
-    write = observation(features)
+    write = observation(features, summarise)
     append_frame = write_frame_in_room if features.tilts else write_frame
 
     @wp.func

@@ -5,6 +5,7 @@ import functools
 import warp as wp
 
 from warpchain.kernels import layout
+from warpchain.kernels.events import summary
 from warpchain.kernels.events.present_chain import has_changed, present_chain
 from warpchain.kernels.events.record import lacks_last_sample, record_is_full
 from warpchain.kernels.events.sample import next_mark, observation, sampling
@@ -13,13 +14,17 @@ from warpchain.kernels.events.tallies import add_count, of_fixed_body, raise_ext
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.board import load_link, publish
 from warpchain.kernels.gpu.contacts.self_contacts import TouchLayout
-from warpchain.kernels.gpu.stage import Run, write_constants
+from warpchain.kernels.gpu.stage import Run, constants, write_constants
 from warpchain.kernels.gpu.threads import barrier, clock
 from warpchain.kernels.gpu.upright import BlockPlane
 from warpchain.kernels.layout import BOARD_LOST_SELF, BOARD_VALUES, SELF_IMPULSES, STRAND_IMPULSES, VALUE_DEADLINE
-from warpchain.kernels.physics.elementary import ZERO
-from warpchain.kernels.physics.scaled_loads import write_link
-from warpchain.kernels.types import Control, Drive, Integers, Model, Record, State
+from warpchain.kernels.physics.elementary import ONE, ZERO
+from warpchain.kernels.physics.scaled_loads import drag_link, write_link
+from warpchain.kernels.types import Chain, Control, Drive, Integers, Model, Record, Row, Rows, State
+
+
+SHARES = 5
+"""Doubles of a thread in the memory in which stages exchange ends."""
 
 
 @wp.func
@@ -52,6 +57,46 @@ def hits_booking(features: Features, touch: TouchLayout):
     return book_hits
 
 
+@wp.func
+def write_totals(run: Run):
+    """Writes totals over the links on the board, for all threads; ends are published, and a barrier has passed.
+
+    A thread adds a quantity up in the order of the links, as a CPU does. Totals are on the board after the last barrier.
+    """
+    K = run.K
+    share = summary.share_of(K, constants(K), run.column)
+    for first in range(0, wp.static(summary.TOTALS), SHARES):
+        if run.lane < run.links:
+            for k in range(SHARES):
+                run.M[SHARES * run.lane + k] = share[first + k]
+        barrier()
+        if run.lane < SHARES:
+            total = run.M[run.lane]
+            for i in range(1, run.links):
+                further = run.M[SHARES * i + run.lane]
+                if first < wp.static(summary.SUMS):
+                    total += further
+                else:
+                    total = summary.greater(total, further)
+            K[BOARD_VALUES, layout.VALUE_TOTALS + first + run.lane] = total
+        barrier()
+
+
+@wp.func
+def read_totals(K: Rows, chain: Chain, sample: Row):
+    """Writes the totals on the board into a sample; returns the area inside the loop [m²]."""
+    totals = summary.Totals()
+    for k in range(wp.static(summary.TOTALS)):
+        totals[k] = K[BOARD_VALUES, layout.VALUE_TOTALS + k]
+    return summary.write_summary(totals, chain, sample)
+
+
+@wp.func
+def note_drag(K: Rows, _chain: Chain, left: wp.float64):
+    """Lets every thread drag its link after the sample, see :func:`physics.scaled_loads.drag_link`."""
+    K[BOARD_VALUES, layout.VALUE_DRAG] = left
+
+
 @functools.cache
 def block_run(features: Features, touch: TouchLayout, plane: BlockPlane):
     """Warp functions for all threads of a block that load a chain's run and store it.
@@ -62,7 +107,7 @@ def block_run(features: Features, touch: TouchLayout, plane: BlockPlane):
     is_driven = features.is_driven
     fixed_loss, fixed_depth, _ = of_fixed_body(features.is_driven)
     book_hits = hits_booking(features, touch)
-    write_sample = observation(features)
+    write_sample = observation(features, read_totals)
 
     @wp.func
     def load(run: Run, model: Model, drive: Drive, state: State, control: Control):
@@ -106,6 +151,8 @@ def block_run(features: Features, touch: TouchLayout, plane: BlockPlane):
         is_last = lacks_last_sample(state, world, time, status)
         publish(run)
         barrier()
+        if is_last:
+            write_totals(run)
         if lane < run.links:
             for k in range(6):
                 state.links[world, layout.X + k, lane] = K[layout.X + k, lane]
@@ -138,7 +185,7 @@ def block_sample(features: Features, touch: TouchLayout, plane: BlockPlane):
     stage must be evaluated again; whether the launch pauses; status.
     """
     is_driven = features.is_driven
-    sample = sampling(features)
+    sample = sampling(features, read_totals, note_drag)
     book_hits = hits_booking(features, touch)
 
     @wp.func
@@ -149,19 +196,22 @@ def block_sample(features: Features, touch: TouchLayout, plane: BlockPlane):
         world = run.world
         softness = state.softness[world]
         load_factor = state.load_factor[world]
+        K = run.K
         publish(run)
         barrier()
+        write_totals(run)
         if run.lane == 0:
+            K[BOARD_VALUES, layout.VALUE_DRAG] = ONE
             plane.store(run)
             book_hits(T, state, world)
             chain = present_chain(model, state, control, world)
-            state.status[world] = sample(run.K, chain, drive, state, record, control, world, time)
+            state.status[world] = sample(K, chain, drive, state, record, control, world, time)
             if has_changed(state, world, softness, load_factor):
                 after = present_chain(model, state, control, world)
                 book_softening(chain, after, state, world)
-                write_constants(run.K, after)
+                write_constants(K, after)
             write_bounds(run, drive, state, control, wp.static(is_driven))
-            if clock() > run.K[BOARD_VALUES, VALUE_DEADLINE]:
+            if clock() > K[BOARD_VALUES, VALUE_DEADLINE]:
                 T[wp.static(touch.is_late)] = 1
         barrier()
         status = state.status[world]
@@ -169,8 +219,11 @@ def block_sample(features: Features, touch: TouchLayout, plane: BlockPlane):
         barrier()
         changed = has_changed(state, world, softness, load_factor)
         if wp.static(is_driven):
-            if changed and run.lane < run.links:
-                write_link(run.K, model, world, run.lane, state.load_factor[world])
+            if run.lane < run.links:
+                if K[BOARD_VALUES, layout.VALUE_DRAG] != ONE:
+                    drag_link(K, run.lane, run.before, run.after, K[BOARD_VALUES, layout.VALUE_DRAG])
+                if changed:
+                    write_link(K, model, world, run.lane, state.load_factor[world])
         return changed, pauses, status
 
     return take_sample

@@ -104,18 +104,22 @@ def crossing_time(speed: wp.float64, gravity: wp.float64, radius: wp.float64, he
 
 
 @wp.func
+def drag_link(K: Rows, i: int, before: int, after: int, left: wp.float64):
+    """Multiplies the part of a link's velocity that is across the path of the loop by ``left``."""
+    # sines of the turns to the neighbours: their sum is the second difference of θ to third order
+    sum_cosine = K[COSINE, before] + K[COSINE, after]
+    sum_sine = K[SINE, before] + K[SINE, after]
+    turn = TWELFTH * (K[COSINE, i] * sum_sine - K[SINE, i] * sum_cosine)
+    cosine = K[COSINE, i] - turn * K[SINE, i]
+    sine = K[SINE, i] + turn * K[COSINE, i]
+    across = (left - ONE) * (K[V, i] * cosine - K[U, i] * sine)
+    K[U, i] = K[U, i] - across * sine
+    K[V, i] = K[V, i] + across * cosine
+
+
+@wp.func
 def drag_shape(K: Rows, chain: Chain, left: wp.float64):
-    """Multiplies the part of each link's velocity that is across the path of the loop by ``left``."""
+    """Drag on all links, see :func:`drag_link`."""
     n = chain.link_count
     for i in range(n):
-        before = wp.where(i == 0, n - 1, i - 1)
-        after = wp.where(i == n - 1, 0, i + 1)
-        # sines of the turns to the neighbours: their sum is the second difference of θ to third order
-        sum_cosine = K[COSINE, before] + K[COSINE, after]
-        sum_sine = K[SINE, before] + K[SINE, after]
-        turn = TWELFTH * (K[COSINE, i] * sum_sine - K[SINE, i] * sum_cosine)
-        cosine = K[COSINE, i] - turn * K[SINE, i]
-        sine = K[SINE, i] + turn * K[COSINE, i]
-        across = (left - ONE) * (K[V, i] * cosine - K[U, i] * sine)
-        K[U, i] = K[U, i] - across * sine
-        K[V, i] = K[V, i] + across * cosine
+        drag_link(K, i, wp.where(i == 0, n - 1, i - 1), wp.where(i == n - 1, 0, i + 1), left)
