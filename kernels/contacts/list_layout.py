@@ -18,6 +18,7 @@ class ListLayout:
     capacity: int  # greatest number of pairs; more is an overflow, which ends the walk with a status
     table: int  # number of hash buckets, a power of two
     count: int  # offset of the number of pairs (one integer). All below are offsets, too
+    nearest: int  # least distance of two joints that are not listed [m], bits of a single-precision number
     first: int  # lower joint of each pair; on a CPU in the order of contact resolution
     second: int  # higher joint of each pair
     touching: int  # GPU scratch: pairs that touch now, beyond those in shared memory
@@ -46,6 +47,7 @@ def list_layout(columns: int) -> ListLayout:
         table *= 2
     integers = layout.consecutive_offsets(
         count=1,
+        nearest=1,
         first=capacity,
         second=capacity,
         touching=capacity + 1,

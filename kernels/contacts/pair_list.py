@@ -1,9 +1,14 @@
-"""The neighbour list of a chain: its reach, distances of joints, and the hash of grid cells."""
+"""The neighbour list of a chain: its reach, how long it lasts, distances of joints, and the hash of grid cells.
+
+The list holds all pairs of joints closer than its reach, 2r + skin + 2|C|, but for those that a link holds apart. It is
+complete until joints have moved as far as the nearest pair that it lacks is apart, see :func:`slack_of`. While a chain
+is far from itself cells are wider than the reach, so that this distance is known to be great and lists last long.
+"""
 
 import warp as wp
 
 from warpchain.kernels.layout import RIGHT_X
-from warpchain.kernels.physics.elementary import TWO
+from warpchain.kernels.physics.elementary import HALF, TWO
 from warpchain.kernels.physics.geometry import two
 from warpchain.kernels.types import Chain, Rows
 
@@ -12,6 +17,34 @@ from warpchain.kernels.types import Chain, Rows
 def listing_reach(chain: Chain, skin: wp.float64, opening: wp.float64):
     """Distance [m] below which two joints are listed; ``opening``: greatest |C| [m]."""
     return TWO * chain.circle_radius + skin + TWO * opening
+
+
+@wp.func
+def cell_width(chain: Chain, reach: wp.float64, is_far: bool):
+    """Width [m] of the grid's cells: the reach or, while a chain is far from itself, two links.
+
+    Next joints but one are never further apart than that.
+    """
+    return wp.where(is_far, wp.max(reach, TWO * TWO * chain.half_length), reach)
+
+
+@wp.func
+def slack_of(chain: Chain, nearest: wp.int32, opening: wp.float64, displacement: wp.float64):
+    """How far joints may still move [m] before the list may lack a pair of circles that touch; 0 or less: it is stale.
+
+    Args:
+        chain: Its constants.
+        nearest: Least distance of a pair that is not listed, as the list holds it.
+        opening: Greatest |C| now [m]: circles are so far from their joints.
+        displacement: Greatest of a joint since the list was built [m].
+    """
+    return HALF * wp.float64(wp.cast(nearest, wp.float32)) - chain.circle_radius - opening - displacement
+
+
+@wp.func
+def are_apart(p: int, q: int, n: int):
+    """Whether no link joins the joints p < q."""
+    return q - p != 1 and q - p != n - 1
 
 
 @wp.func

@@ -67,8 +67,8 @@ def chain_on_cpu(position: Array, velocity: Array, parameters: Parameters | Unli
 
 # --- the contact pass ---
 
-LIST, FLOOR, SPROCKET, SELF, TERRAIN = 1, 2, 4, 8, 16
-"""Parts of a pass, to be added up: make the neighbour list; resolve contacts."""
+LIST, FLOOR, SPROCKET, SELF, TERRAIN, FAR = 1, 2, 4, 8, 16, 32
+"""Parts of a pass, to be added up: make the neighbour list; resolve contacts; nothing was listed before."""
 
 RESULTS = (
     *("opening", "floor_gap", "sprocket_gap", "fits", "displacement", "slack"),
@@ -83,7 +83,7 @@ def _contact_pass(columns: int) -> wp.Kernel:
     floor_gap, resolve_floor = fixed_contacts("floor")
     sprocket_gap, resolve_sprocket = fixed_contacts("sprocket")
     terrain_gap, resolve_terrain = fixed_contacts("terrain")
-    size = list_layout(columns).size
+    size, nearest = list_layout(columns).size, list_layout(columns).nearest
 
     @compiled
     def contact_pass(
@@ -115,10 +115,10 @@ def _contact_pass(columns: int) -> wp.Kernel:
         results[world, 1] = floor_gap(block, chain, ground, face)
         results[world, 2] = sprocket_gap(block, chain, ground, face)
         if (parts & 1) != 0:
-            fits = build_list(block, pairs, chain, skin, opening)
+            fits = build_list(block, pairs, chain, skin, opening, (parts & 32) != 0)
             results[world, 3] = wp.where(fits, wp.float64(1.0), wp.float64(0.0))
         results[world, 4] = greatest_displacement(block, chain)
-        results[world, 5] = list_slack(block, chain, skin, opening)
+        results[world, 5] = list_slack(block, chain, pairs[wp.static(nearest)], opening)
         if (parts & 2) != 0:
             results[world, 1] = floor_gap(block, chain, ground, face)
             results[world, 6] = wp.float64(resolve_floor(block, plane, chain, ground, face))

@@ -67,20 +67,30 @@ def body_pass(features: Features, plane: Plane):
 def link_pass(features: Features, joints: Joints):
     """Warp functions of the contacts of a chain with itself; ``opening``: greatest |C| [m] of the placed links.
 
-    ``make_list(K, L, chain, state, world, skin, opening)`` makes the neighbour list, or ends the run if it overflows.
+    ``make_list(K, L, chain, state, world, skin, opening, is_far)`` makes the neighbour list, or ends the run if it
+    overflows; ``is_far``: nothing was listed before.
     ``meet_links(K, L, chain, state, control, world, opening)`` → number of impulses.
     """
     has_self = features.self_contact
     build_list = neighbour_list(features.columns)
     resolve = self_contacts(features.columns)
-    count = list_layout(features.columns).count
+    lists = list_layout(features.columns)
 
     @wp.func
-    def make_list(K: Rows, L: Integers, chain: Chain, state: State, world: int, skin: wp.float64, opening: wp.float64):
+    def make_list(
+        K: Rows,
+        L: Integers,
+        chain: Chain,
+        state: State,
+        world: int,
+        skin: wp.float64,
+        opening: wp.float64,
+        is_far: bool,
+    ):
         if wp.static(has_self):
-            if not build_list(K, L, chain, skin, opening):
+            if not build_list(K, L, chain, skin, opening, is_far):
                 state.status[world] = LIST_OVERFLOW
-            state.slack[world] = list_slack(K, chain, skin, opening)
+            state.slack[world] = list_slack(K, chain, L[wp.static(lists.nearest)], opening)
 
     @wp.func
     def meet_links(K: Rows, L: Integers, chain: Chain, state: State, control: Control, world: int, opening: wp.float64):
@@ -88,11 +98,11 @@ def link_pass(features: Features, joints: Joints):
         if wp.static(has_self):
             skin, least_slack = joints.margins(state, control, world)
             if state.slack[world] > ZERO:
-                state.slack[world] = list_slack(K, chain, skin, opening)
+                state.slack[world] = list_slack(K, chain, L[wp.static(lists.nearest)], opening)
             if not state.slack[world] > least_slack:
                 add_count(state, world, layout.LIST_BUILDS, wp.int64(1))
-                make_list(K, L, chain, state, world, skin, opening)
-            if L[wp.static(count)] > 0:
+                make_list(K, L, chain, state, world, skin, opening, L[wp.static(lists.count)] == 0)
+            if L[wp.static(lists.count)] > 0:
                 hits, strands, lost, depth = resolve(K, L, chain, opening)
                 add_count(state, world, layout.SELF_IMPULSES, hits)
                 add_count(state, world, layout.STRAND_IMPULSES, strands)

@@ -1,8 +1,7 @@
 """Pairs of joints that may touch: a neighbour list with a skin, built with a uniform grid.
 
-Joints are the centres of the links' circles (to within the joint opening |C|). The list holds all pairs of joints
-closer than its reach, 2r + skin + 2|C|. It stays complete until a joint has moved further than skin/2 − |C| from where
-it was listed. Cells of the grid are as wide as the reach and hashed into a table, so that the grid needs no bounds, and
+Joints are the centres of the links' circles (to within the joint opening |C|). Which pairs are listed, and how long a
+list lasts: :mod:`contacts.pair_list`. Cells of the grid are hashed into a table, so that the grid needs no bounds, and
 memory does not depend on the chain's extent.
 """
 
@@ -11,10 +10,9 @@ import functools
 import warp as wp
 
 from warpchain.kernels.contacts.list_layout import list_layout
-from warpchain.kernels.contacts.pair_list import bucket_of, listing_reach, square_distance
+from warpchain.kernels.contacts.pair_list import are_apart, bucket_of, cell_width, listing_reach, slack_of, square_distance
 from warpchain.kernels.cpu.contacts.proximity import greatest_distance
 from warpchain.kernels.layout import LISTED_X, RIGHT_X, RIGHT_Y
-from warpchain.kernels.physics.elementary import HALF
 from warpchain.kernels.physics.geometry import put, two
 from warpchain.kernels.types import Chain, Integers, Rows
 
@@ -49,18 +47,21 @@ def neighbour_list(columns: int):
         L[wp.static(lists.count)] = total
 
     @wp.func
-    def build(K: Rows, L: Integers, chain: Chain, skin: wp.float64, opening: wp.float64):
+    def build(K: Rows, L: Integers, chain: Chain, skin: wp.float64, opening: wp.float64, is_far: bool):
+        """``is_far``: nothing was listed before; ``opening``: greatest |C| [m]."""
         n = chain.link_count
         reach = listing_reach(chain, skin, opening)
+        width = cell_width(chain, reach, is_far)
         square = reach * reach
+        nearest = width * width
         i = int(0)
         while i < wp.static(lists.table):
             L[wp.static(lists.bucket) + i] = -1
             i += 1
         i = int(0)
         while i < n:
-            cell_x = int(wp.floor(K[RIGHT_X, i] / reach))
-            cell_y = int(wp.floor(K[RIGHT_Y, i] / reach))
+            cell_x = int(wp.floor(K[RIGHT_X, i] / width))
+            cell_y = int(wp.floor(K[RIGHT_Y, i] / width))
             bucket = bucket_of(cell_x, cell_y, wp.static(lists.table))
             L[wp.static(lists.cell_x) + i] = cell_x
             L[wp.static(lists.cell_y) + i] = cell_y
@@ -81,7 +82,8 @@ def neighbour_list(columns: int):
                 # joints were put in ascending order, so a bucket is read in descending order
                 while q > p:
                     if L[wp.static(lists.cell_x) + q] == cell_x and L[wp.static(lists.cell_y) + q] == cell_y:
-                        if square_distance(K, p, q) < square:
+                        distance = square_distance(K, p, q)
+                        if are_apart(p, q, n) and distance < square:
                             if total < wp.static(lists.capacity):
                                 # insertion keeps this joint's partners in ascending order
                                 k = total
@@ -93,16 +95,19 @@ def neighbour_list(columns: int):
                                 total += 1
                             else:
                                 fits = bool(False)
+                        elif are_apart(p, q, n):
+                            nearest = wp.min(nearest, distance)
                     q = L[wp.static(lists.next_joint) + q]
                 near += 1
             p += 1
         arrange(L, total)
+        L[wp.static(lists.nearest)] = wp.cast(wp.float32(wp.sqrt(nearest)), wp.int32)
         return fits
 
     return build
 
 
 @wp.func
-def list_slack(K: Rows, chain: Chain, skin: wp.float64, opening: wp.float64):
-    """How far joints may still move [m] before the list may lack a pair; 0 or less: the list is stale."""
-    return HALF * skin - opening - greatest_displacement(K, chain)
+def list_slack(K: Rows, chain: Chain, nearest: wp.int32, opening: wp.float64):
+    """How far joints may still move [m], see :func:`contacts.pair_list.slack_of`."""
+    return slack_of(chain, nearest, opening, greatest_displacement(K, chain))

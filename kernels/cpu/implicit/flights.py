@@ -108,6 +108,7 @@ def swap_models(K: Rows, chain: Chain, state: State, world: int, is_rigid: int, 
     step = state.step[world]
     state.step[world] = state.other_step[world]
     state.other_step[world] = step
+    state.slack[world] = wp.float64(-1.0)  # flights have a greater skin: the list is built anew
     state.last_error[world] = ONE
     place_ends(K, chain)
     book_loss(state, world, layout.LOSS_JOINT_SWITCH, lost)
@@ -130,7 +131,6 @@ def rigid_in_flight(name: str, columns: int) -> Joints:
             closed, lost = close_joints(K, chain)
             state.closing_time[world] = time + QUIET_TIME
             if closed:
-                state.slack[world] = wp.float64(-1.0)  # flights have a greater skin: the list is built anew
                 swap_models(K, chain, state, world, 1, lost)
 
     @wp.func

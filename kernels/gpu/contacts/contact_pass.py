@@ -7,6 +7,7 @@ import warp as wp
 from warpchain.kernels import layout
 from warpchain.kernels.codes import LIST_OVERFLOW, RUNNING
 from warpchain.kernels.contacts.list_layout import list_layout
+from warpchain.kernels.contacts.pair_list import slack_of
 from warpchain.kernels.events.tallies import add_count, note_floor_impulse
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.board import publish, raise_value
@@ -17,8 +18,6 @@ from warpchain.kernels.gpu.stage import Proximity, Run, constants
 from warpchain.kernels.gpu.threads import barrier_count
 from warpchain.kernels.gpu.upright import BlockPlane
 from warpchain.kernels.types import Control, Drive, State
-
-HALF = wp.constant(wp.float32(0.5))
 
 
 @functools.cache
@@ -40,11 +39,19 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
     meet_sprocket = block_contact("moving sprocket")
 
     @wp.func
-    def list_pairs(run: Run, control: Control, opening: wp.float32):
+    def list_pairs(run: Run, control: Control, opening: wp.float32, is_far: bool):
         """Builds the neighbour list; the number of its pairs, and the status."""
-        pairs = build_list(run, control.skin, upper_bound(opening))
+        pairs = build_list(run, control.skin, upper_bound(opening), is_far)
         status = wp.where(pairs > wp.static(lists.capacity), LIST_OVERFLOW, RUNNING)
         return wp.min(pairs, wp.static(lists.capacity)), status
+
+    @wp.func
+    def list_slack(run: Run, opening: wp.float32, displacement: wp.float32):
+        """How far joints may still move [m]; nothing stales a list that is not used."""
+        if wp.static(not has_self):
+            return wp.float32(0.0)
+        nearest = run.L[wp.static(lists.nearest)]
+        return wp.float32(slack_of(constants(run.K), nearest, upper_bound(opening), upper_bound(displacement)))
 
     @wp.func
     def begin(run: Run, state: State, control: Control, proximity: Proximity):
@@ -57,9 +64,9 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
                 pairs = run.L[wp.static(lists.count)]
         else:
             if wp.static(has_self):
-                pairs, status = list_pairs(run, control, proximity.opening)
+                pairs, status = list_pairs(run, control, proximity.opening, True)
             plane.begin_run(run)
-            slack = HALF * wp.float32(control.skin) - proximity.opening
+            slack = list_slack(run, proximity.opening, wp.float32(0.0))
             reach = time_to_contact(control, pairs, proximity.gap, slack, proximity.speed)
         return pairs, reach, status
 
@@ -78,7 +85,7 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
         gap = proximity.gap
         opening = proximity.opening
         pairs = pairs_before
-        slack = HALF * wp.float32(control.skin) - opening - proximity.displacement
+        slack = list_slack(run, opening, proximity.displacement)
         status = int(RUNNING)
         is_hit = bool(False)
         is_near = bool(False)
@@ -115,8 +122,8 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
             if is_stale:
                 if lane == 0:
                     add_count(state, run.world, layout.LIST_BUILDS, wp.int64(1))
-                pairs, status = list_pairs(run, control, opening)
-                slack = HALF * wp.float32(control.skin) - opening
+                pairs, status = list_pairs(run, control, opening, pairs == 0)
+                slack = list_slack(run, opening, wp.float32(0.0))
             if pairs > 0:
                 touched = constants(run.K)
                 touching = find_contacts(run, touched, pairs, upper_bound(opening))
