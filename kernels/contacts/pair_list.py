@@ -1,6 +1,6 @@
 """The neighbour list of a chain: its reach, how long it lasts, distances of joints, and the hash of grid cells.
 
-The list holds all pairs of joints closer than its reach, 2r + skin + 2|C|, but for those that a link holds apart. It is
+The list holds all pairs of joints closer than its reach, 2r + skin + 2|C|, but for those that a link keeps apart. It is
 complete until joints have moved as far as the nearest pair that it lacks is apart, see :func:`slack_of`. While a chain
 is far from itself cells are wider than the reach, so that this distance is known to be great and lists last long.
 """
@@ -11,6 +11,8 @@ from warpchain.kernels.layout import RIGHT_X
 from warpchain.kernels.physics.elementary import HALF, TWO
 from warpchain.kernels.physics.geometry import two
 from warpchain.kernels.types import Chain, Rows
+
+ALMOST = wp.constant(wp.float64(0.9))
 
 
 @wp.func
@@ -42,9 +44,15 @@ def slack_of(chain: Chain, nearest: wp.int32, opening: wp.float64, displacement:
 
 
 @wp.func
-def are_apart(p: int, q: int, n: int):
-    """Whether no link joins the joints p < q."""
-    return q - p != 1 and q - p != n - 1
+def fills_links(chain: Chain, opening: wp.float64):
+    """Whether circles are almost as wide as links, so that those at both ends of one link may touch."""
+    return chain.circle_radius + TWO * opening > ALMOST * chain.half_length
+
+
+@wp.func
+def are_joined(p: int, q: int, n: int):
+    """Whether a link joins the joints p < q."""
+    return q - p == 1 or q - p == n - 1
 
 
 @wp.func

@@ -10,7 +10,7 @@ import functools
 import warp as wp
 
 from warpchain.kernels.contacts.list_layout import list_layout
-from warpchain.kernels.contacts.pair_list import are_apart, bucket_of, cell_width, listing_reach, slack_of, square_distance
+from warpchain.kernels.contacts.pair_list import are_joined, bucket_of, cell_width, fills_links, listing_reach, slack_of, square_distance
 from warpchain.kernels.cpu.contacts.proximity import greatest_distance
 from warpchain.kernels.layout import LISTED_X, RIGHT_X, RIGHT_Y
 from warpchain.kernels.physics.geometry import put, two
@@ -54,6 +54,7 @@ def neighbour_list(columns: int):
         width = cell_width(chain, reach, is_far)
         square = reach * reach
         nearest = width * width
+        of_all = fills_links(chain, opening)
         i = int(0)
         while i < wp.static(lists.table):
             L[wp.static(lists.bucket) + i] = -1
@@ -83,7 +84,8 @@ def neighbour_list(columns: int):
                 while q > p:
                     if L[wp.static(lists.cell_x) + q] == cell_x and L[wp.static(lists.cell_y) + q] == cell_y:
                         distance = square_distance(K, p, q)
-                        if are_apart(p, q, n) and distance < square:
+                        is_counted = of_all or not are_joined(p, q, n)
+                        if is_counted and distance < square:
                             if total < wp.static(lists.capacity):
                                 # insertion keeps this joint's partners in ascending order
                                 k = total
@@ -95,7 +97,7 @@ def neighbour_list(columns: int):
                                 total += 1
                             else:
                                 fits = bool(False)
-                        elif are_apart(p, q, n):
+                        elif is_counted:
                             nearest = wp.min(nearest, distance)
                     q = L[wp.static(lists.next_joint) + q]
                 near += 1

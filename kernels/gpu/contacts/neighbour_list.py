@@ -8,7 +8,7 @@ import functools
 import warp as wp
 
 from warpchain.kernels.contacts.list_layout import list_layout
-from warpchain.kernels.contacts.pair_list import are_apart, bucket_of, cell_width, listing_reach, square_distance
+from warpchain.kernels.contacts.pair_list import are_joined, bucket_of, cell_width, fills_links, listing_reach, square_distance
 from warpchain.kernels.gpu.stage import Run, constants
 from warpchain.kernels.gpu.threads import barrier, warp_greatest, warp_width
 from warpchain.kernels.layout import BOARD_LISTED_X, RIGHT_X, RIGHT_Y
@@ -22,8 +22,11 @@ def block_list(columns: int, block_dim: int):
     lists = list_layout(columns)
 
     @wp.func
-    def search_cells(K: Rows, L: Integers, p: int, links: int, square: wp.float64, furthest: wp.float64):
-        """Lists a joint's pairs; the least squared distance of others in cells near by, at most ``furthest``."""
+    def search_cells(K: Rows, L: Integers, p: int, links: int, square: wp.float64, furthest: wp.float64, of_all: bool):
+        """Lists a joint's pairs; the least squared distance of others in cells near by, at most ``furthest``.
+
+        ``of_all``: also pairs that a link joins.
+        """
         nearest = furthest
         near = int(0)
         while near < 9:
@@ -34,7 +37,7 @@ def block_list(columns: int, block_dim: int):
                 # a bucket may serve several cells
                 if q > p and L[wp.static(lists.cell_x) + q] == cell_x and L[wp.static(lists.cell_y) + q] == cell_y:
                     distance = square_distance(K, p, q)
-                    if are_apart(p, q, links):
+                    if of_all or not are_joined(p, q, links):
                         if distance < square:
                             slot = wp.atomic_add(L, wp.static(lists.count), 1)
                             if slot < wp.static(lists.capacity):
@@ -74,7 +77,8 @@ def block_list(columns: int, block_dim: int):
         barrier()
         nearest = width * width
         if lane < run.links:
-            nearest = search_cells(K, L, lane, run.links, reach * reach, nearest)
+            of_all = fills_links(constants(K), opening)
+            nearest = search_cells(K, L, lane, run.links, reach * reach, nearest, of_all)
         bits = -warp_greatest(-wp.cast(wp.float32(wp.sqrt(nearest)), wp.int32))
         if lane % warp_width() == 0:
             wp.atomic_min(L, wp.static(lists.nearest), bits)
