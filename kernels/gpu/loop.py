@@ -239,7 +239,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 step, status = reject(errors, run, control, h, error)
         if status == RUNNING and attempts_made(state, world) + wp.int64(attempts) >= control.step_limit:
             status = int(STEP_LIMIT)
-        store_run(run, model, state, record, control, time, status, accepted, attempts)
+        store_run(run, state, record, time, status, accepted, attempts)
         if lane == 0:
             state.time_to_contact[world] = wp.float64(reach)
             state.time[world] = time

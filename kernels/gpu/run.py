@@ -22,7 +22,6 @@ from warpchain.kernels.physics.elementary import ONE, ZERO
 from warpchain.kernels.physics.scaled_loads import drag_link, write_link
 from warpchain.kernels.types import Chain, Control, Drive, Integers, Model, Record, Row, Rows, State
 
-
 SHARES = 5
 """Doubles of a thread in the memory in which stages exchange ends."""
 
@@ -61,7 +60,7 @@ def hits_booking(features: Features, touch: TouchLayout):
 def write_totals(run: Run):
     """Writes totals over the links on the board, for all threads; ends are published, and a barrier has passed.
 
-    A thread adds a quantity up in the order of the links, as a CPU does. Totals are on the board after the last barrier.
+    A thread adds a quantity up in the order of the links, as a CPU does. The last barrier follows.
     """
     K = run.K
     share = summary.share_of(K, constants(K), run.column)
@@ -72,12 +71,13 @@ def write_totals(run: Run):
         barrier()
         if run.lane < SHARES:
             total = run.M[run.lane]
-            for i in range(1, run.links):
-                further = run.M[SHARES * i + run.lane]
+            place = SHARES + run.lane
+            while place < SHARES * run.links:
                 if first < wp.static(summary.SUMS):
-                    total += further
+                    total += run.M[place]
                 else:
-                    total = summary.greater(total, further)
+                    total = summary.greater(total, run.M[place])
+                place += SHARES
             K[BOARD_VALUES, layout.VALUE_TOTALS + first + run.lane] = total
         barrier()
 
@@ -102,7 +102,7 @@ def block_run(features: Features, touch: TouchLayout, plane: BlockPlane):
     """Warp functions for all threads of a block that load a chain's run and store it.
 
     ``load(run, model, drive, state, control)``, which ends with a barrier, and
-    ``store(run, model, state, record, control, time, status, accepted, attempts)``.
+    ``store(run, state, record, time, status, accepted, attempts)``.
     """
     is_driven = features.is_driven
     fixed_loss, fixed_depth, _ = of_fixed_body(features.is_driven)
@@ -134,17 +134,7 @@ def block_run(features: Features, touch: TouchLayout, plane: BlockPlane):
         barrier()
 
     @wp.func
-    def store(
-        run: Run,
-        model: Model,
-        state: State,
-        record: Record,
-        control: Control,
-        time: wp.float64,
-        status: int,
-        accepted: int,
-        attempts: int,
-    ):
+    def store(run: Run, state: State, record: Record, time: wp.float64, status: int, accepted: int, attempts: int):
         K = run.K
         lane = run.lane
         world = run.world
@@ -161,7 +151,7 @@ def block_run(features: Features, touch: TouchLayout, plane: BlockPlane):
         if lane == 0:
             plane.store(run)
             if is_last:
-                write_sample(K, present_chain(model, state, control, world), state, record, world, time)
+                write_sample(K, constants(K), state, record, world, time)
             store_losses(K, layout.BOARD_LOST_FRICTION, state, world, run.links, wp.static(fixed_loss))
             state.losses[world, layout.LOSS_SELF] = row_total(K, BOARD_LOST_SELF, run.links)
             add_count(state, world, layout.ACCEPTED, wp.int64(accepted))
@@ -204,7 +194,7 @@ def block_sample(features: Features, touch: TouchLayout, plane: BlockPlane):
             K[BOARD_VALUES, layout.VALUE_DRAG] = ONE
             plane.store(run)
             book_hits(T, state, world)
-            chain = present_chain(model, state, control, world)
+            chain = constants(K)
             state.status[world] = sample(K, chain, drive, state, record, control, world, time)
             if has_changed(state, world, softness, load_factor):
                 after = present_chain(model, state, control, world)

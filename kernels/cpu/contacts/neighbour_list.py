@@ -10,7 +10,15 @@ import functools
 import warp as wp
 
 from warpchain.kernels.contacts.list_layout import list_layout
-from warpchain.kernels.contacts.pair_list import are_joined, bucket_of, cell_width, fills_links, listing_reach, slack_of, square_distance
+from warpchain.kernels.contacts.pair_list import (
+    are_joined,
+    bucket_of,
+    cell_width,
+    fills_links,
+    listing_reach,
+    slack_of,
+    square_distance,
+)
 from warpchain.kernels.cpu.contacts.proximity import greatest_distance
 from warpchain.kernels.layout import LISTED_X, RIGHT_X, RIGHT_Y
 from warpchain.kernels.physics.geometry import put, two

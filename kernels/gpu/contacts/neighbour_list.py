@@ -8,7 +8,14 @@ import functools
 import warp as wp
 
 from warpchain.kernels.contacts.list_layout import list_layout
-from warpchain.kernels.contacts.pair_list import are_joined, bucket_of, cell_width, fills_links, listing_reach, square_distance
+from warpchain.kernels.contacts.pair_list import (
+    are_joined,
+    bucket_of,
+    cell_width,
+    fills_links,
+    listing_reach,
+    square_distance,
+)
 from warpchain.kernels.gpu.stage import Run, constants
 from warpchain.kernels.gpu.threads import barrier, warp_greatest, warp_width
 from warpchain.kernels.layout import BOARD_LISTED_X, RIGHT_X, RIGHT_Y
