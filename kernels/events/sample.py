@@ -63,8 +63,7 @@ def sampling(features: Features, summarise: Any = summarise, drag_shape: Any = d
     joints, and on a sprocket the chain's loads and the velocities of its links.
 
     On a sprocket it watches until the loop is stationary, on a floor until the chain rests or is far. The sums of a
-    plane that tilts must be those of the present state. ``drag_shape(K, chain, left)`` drags all links, perhaps after the
-    sample.
+    plane that tilts must be those of the present state. ``drag_shape(K, chain, left)`` drags all links.
     """
     has_floor, is_driven = features.has_floor, features.is_driven
     write = observation(features, summarise)
