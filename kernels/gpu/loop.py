@@ -43,7 +43,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
 
     Args:
         features: What the kernel is compiled for.
-        block_dim: Threads in a block, at least the number of links of every chain; on a GPU a multiple of 32.
+        block_dim: Threads in a block, at least the number of links of every chain: a multiple of 4, on a GPU of 32.
         registers: Most registers of a thread on a GPU; None: as many as a block of this size can have.
 
     Arrays of the kernel:

@@ -60,25 +60,31 @@ def hits_booking(features: Features, touch: TouchLayout):
 def write_totals(run: Run):
     """Writes totals over the links on the board, for all threads; ends are published, and a barrier has passed.
 
-    A thread adds a quantity up in the order of the links, as a CPU does. The last barrier follows.
+    A thread adds a quantity up in the order of the links, as a CPU does, four at a time: it waits for memory. Threads
+    without a link change nothing. The last barrier follows.
     """
     K = run.K
+    lane = run.lane
     share = summary.share_of(K, constants(K), run.column)
     for first in range(0, wp.static(summary.TOTALS), SHARES):
-        if run.lane < run.links:
-            for k in range(SHARES):
-                run.M[SHARES * run.lane + k] = share[first + k]
+        nothing = wp.where(first < wp.static(summary.SUMS), ZERO, -wp.float64(wp.inf))
+        for k in range(SHARES):
+            run.M[SHARES * lane + k] = wp.where(lane < run.links, share[first + k], nothing)
         barrier()
-        if run.lane < SHARES:
-            total = run.M[run.lane]
-            place = SHARES + run.lane
+        if lane < SHARES:
+            total = nothing
+            place = lane
             while place < SHARES * run.links:
-                if first < wp.static(summary.SUMS):
-                    total += run.M[place]
-                else:
-                    total = summary.greater(total, run.M[place])
-                place += SHARES
-            K[BOARD_VALUES, layout.VALUE_TOTALS + first + run.lane] = total
+                four = wp.vec4d(
+                    run.M[place], run.M[place + SHARES], run.M[place + 2 * SHARES], run.M[place + 3 * SHARES]
+                )
+                for k in range(4):
+                    if first < wp.static(summary.SUMS):
+                        total += four[k]
+                    else:
+                        total = summary.greater(total, four[k])
+                place += 4 * SHARES
+            K[BOARD_VALUES, layout.VALUE_TOTALS + first + lane] = total
         barrier()
 
 

@@ -11,7 +11,7 @@ import warp as wp
 
 from warpchain.kernels.contacts.fixed_body import BODIES
 from warpchain.kernels.contacts.list_layout import list_layout
-from warpchain.kernels.contacts.pair_list import square_distance
+from warpchain.kernels.contacts.pair_list import MOST_WAY, square_distance
 from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.cpu.contacts.proximity import greatest_speed
 from warpchain.kernels.features import Features
@@ -129,7 +129,7 @@ def step_bound(features: Features, has_flight: bool):
             distance = HALF * gap
         if wp.static(has_self):
             is_near = is_near or L[wp.static(count)] > 0
-            distance = wp.min(distance, slack)
+            distance = wp.min(distance, wp.min(slack, MOST_WAY * control.skin))
         if is_near:
             return longest
         return wp.max(longest, distance / greatest_speed(K, chain))

@@ -7,6 +7,7 @@ import warp as wp
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.fixed_body import BODIES, link_and_body
 from warpchain.kernels.contacts.impulse import Touching
+from warpchain.kernels.contacts.pair_list import MOST_WAY
 from warpchain.kernels.contacts.tilting_floor import greatest_across_speed, middle_height, steepness
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.board import ends_of
@@ -129,7 +130,7 @@ def block_proximity(features: Features, block_dim: int):
             is_near = is_near or gap < distance
             distance = wp.float32(0.5) * gap
         if wp.static(has_self):
-            distance = wp.min(distance, slack)
+            distance = wp.min(distance, wp.min(slack, wp.float32(MOST_WAY * control.skin)))
         return wp.where(is_near, wp.float32(0.0), quick_quotient(distance, speed))
 
     return write_proximity, read_proximity, time_to_contact

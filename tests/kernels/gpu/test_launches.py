@@ -23,16 +23,16 @@ from warpchain.kernels.gpu.loop import make_advance_block
 from warpchain.kernels.types import State
 from warpchain.status import Status
 
-LINKS = 12
+LINKS = 24
 
 
 def piles() -> Batch:
     """Two heaps on the floor whose joints soften half-way; the first has longer links than the second."""
-    chains = [heap(LINKS, seed, tilt=2.0) for seed in (5, 10)]
+    chains = [heap(LINKS, seed, tilt=2.0) for seed in (5, 9)]
     batch = batch_of(chains, method="dp5", fixed_step=False, keeps=True, stop_time=100 * FIXED_STEP)
     batch.control.contact_step = FIXED_STEP
     batch.control.sample_interval = 5 * FIXED_STEP
-    batch.control.skin = 2e-4
+    batch.control.skin = 1e-4
     batch.control.soften_area = 0.998
     batch.control.soft_stiffness, batch.control.soft_damping, batch.control.soft_smoothing = 1e6, 10.0, 1.0
     batch.control.pile_push = 20.0  # circles of these heaps overlap by millimetres

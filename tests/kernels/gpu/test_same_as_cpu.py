@@ -33,7 +33,7 @@ from warpchain.kernels.gpu import functions
 from warpchain.kernels.gpu.loop import make_advance_block
 from warpchain.status import Status
 
-LINKS = 12
+LINKS = 24
 
 
 pytestmark = pytest.mark.usefixtures("without_fused_operations")
@@ -74,7 +74,7 @@ def test_unlike_links_equal_a_cpu_kernel(links: int) -> None:
     for batch in (ours, theirs):
         batch.set_chain(0, SOFT, links, own=unlike_links(links, SOFT).own)
     features = ours.features(fixed_body="floor")
-    launch_blocks(ours, features, 40, block_dim=links)
+    launch_blocks(ours, features, 40, block_dim=LINKS + 4)
     launch_chains(theirs, features, 40)
     assert theirs.counts(0)["self"] > 10
     assert theirs.counts(0)["floor"] > 10
