@@ -1,8 +1,8 @@
 """The neighbour list of a chain: its reach, how long it lasts, distances of joints, and the hash of grid cells.
 
-The list holds all pairs of joints closer than its reach, 2r + skin + 2|C|, but for those that a link keeps apart. It is
-complete until joints have moved as far as the nearest pair that it lacks is apart, see :func:`slack_of`. While a chain
-is far from itself cells are wider than the reach, so that this distance is known to be great and lists last long.
+The list holds all pairs of joints closer than its reach, 2r + skin + 2|C|, but for those that a link keeps apart. It
+lasts until the nearest pair that it lacks may touch, see :func:`slack_of`. While a chain is far from itself, the cells
+of the grid are wider than the reach: then the nearest pair is known to be far, and lists last long.
 """
 
 import warp as wp
@@ -13,11 +13,12 @@ from warpchain.kernels.physics.geometry import two
 from warpchain.kernels.types import Chain, Rows
 
 ALMOST = wp.constant(wp.float64(0.9))
+"""Radius of circles, as a part of half a link, from which on they are almost as wide as links."""
 MOST_WAY = wp.constant(wp.float64(0.25))
 """Way of a joint in one step away from all contacts, as a part of the skin.
 
-Longer steps on springs save less than 1 % of them, and ledgers of soft joints are wrong by twice as much (100 links at 40
-Hz, `os32`: 1.4 instead of 0.6 thousandths of the energy).
+Longer steps on springs save less than 1 % of them, and ledgers of soft joints are wrong by twice as much (100 links at
+40 Hz, `os32`: 1.4 instead of 0.6 thousandths of the energy).
 """
 
 
