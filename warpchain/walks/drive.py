@@ -44,12 +44,7 @@ BY_ITSELF = -1.0
 
 
 def drive_of(setup: Setup, links: LinkValues) -> tuple[tuple[Array, Array], dict[str, float]]:
-    """Position and velocity (n, 3) of a chain on its sprocket, about the origin, and fields of `Drive` by name.
-
-    Args:
-        setup: Of the walk.
-        links: What each of its links has.
-    """
+    """Position and velocity (n, 3) of a chain on its sprocket, about the origin, and fields of `Drive` by name."""
     scene, parameters, options = setup.scene, setup.parameters, setup.options
     from_rest = scene.start == "rest"
     radius = joint_radius(scene, parameters)

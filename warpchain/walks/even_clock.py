@@ -13,11 +13,7 @@ from warpchain.kernels import layout
 
 Array = NDArray[np.float64]
 
-_PLACES = (
-    (layout.CENTER_X, layout.CENTER_U),
-    (layout.CENTER_Y, layout.CENTER_V),
-    (layout.CENTER_Z, layout.CENTER_W),
-)
+_PLACES = ((layout.CENTER_X, layout.CENTER_U), (layout.CENTER_Y, layout.CENTER_V), (layout.CENTER_Z, layout.CENTER_W))
 """Columns of a sample: a place, and its velocity."""
 
 

@@ -32,7 +32,8 @@ def released_plane(setup: Setup, position: Array) -> Array:
     links = link_values(scene, parameters)
     masses = links.mass
     center_x, center_y, _ = masses @ position / masses.sum()
-    lowest = lowest_point(position, parameters.link_length, links.radius)
+    ends = position[:, 1] - parameters.link_length / 2 * np.abs(np.sin(position[:, 2]))  # the lower ones of all links
+    lowest = float(np.min(ends - links.radius))
     sine, cosine = math.sin(scene.tilt), math.cos(scene.tilt)
     turn_x, turn_y = -scene.tilt_rate, scene.yaw_rate
     plane = np.zeros(layout.PLANE_VALUES)
@@ -43,12 +44,6 @@ def released_plane(setup: Setup, position: Array) -> Array:
     raised = lowest * (1 - cosine) + parameters.half_width * abs(sine)
     plane[layout.ORIGIN : layout.ORIGIN + 3] = 0.0, raised, center_y * sine
     return plane
-
-
-def lowest_point(position: Array, link_length: float, radius: Array) -> float:
-    """Height [m] of the lowest point of a chain's circles; position (n, 3), radius (n,)."""
-    ends = position[:, 1] - link_length / 2 * np.abs(np.sin(position[:, 2]))
-    return float(np.min(ends - radius))
 
 
 def angles(planes: Array) -> tuple[Array, Array]:

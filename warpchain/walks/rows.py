@@ -26,8 +26,6 @@ MISSING: Final = -1
 _DRAWN: Final = "_drawn"
 _PREFIXES: Final = {"greatest_penetration": "penetration"}
 """Field that is a dictionary → how the names of its columns begin, if not with its own."""
-_ONLY_OF_A_WALK: Final = ("wall_time",)
-"""Fields that are no columns: a number of a sweep is the same however its walk was computed."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +49,7 @@ def _stored_columns() -> Iterator[tuple[str, Column]]:
     """The columns of the fields of `WalkResult`."""
     types = {item.name: get_args(item.type) for item in fields(WalkResult)}
     for name, stored in NUMBERS.items():
-        if name in _ONLY_OF_A_WALK:
+        if name == "wall_time":  # a number of a sweep is the same however its walk was computed
             continue
         kind = "<i8" if types[name][0] in (int, dict[str, int]) else "<f8"
         for key, meaning in (stored.keys or {"": stored.meaning}).items():
@@ -82,11 +80,7 @@ integers.
 
 
 def row_type(drawn: Iterable[str]) -> np.dtype[np.void]:
-    """Type of a row.
-
-    Args:
-        drawn: quantities that some block of the sweep draws, in any order.
-    """
+    """Type of a row, given the quantities that some block of the sweep draws, in any order."""
     names = set(drawn)
     stored = [("status", "<i1"), *((name, column.kind) for name, column in STORED_COLUMNS.items())]
     return np.dtype([*KEYS.descr, *stored, *((drawn_column(name), "<f8") for name in DRAWABLE if name in names)])
@@ -143,8 +137,7 @@ def quantity_of(column: str) -> str:
 def field_column(name: str) -> Column:
     """Unit and meaning of an axis or of the column of a drawn quantity, as a column of floats.
 
-    Raises:
-        KeyError: there is no such field of `Parameters`, `Scene` or `Options`, and it is not `preset`.
+    A `KeyError` says that there is no such field of `Parameters`, `Scene` or `Options`, and that it is not `preset`.
     """
     if name == "preset":
         return Column("<f8", "1", "named set of parameters that others are changed from")

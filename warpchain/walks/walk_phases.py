@@ -287,13 +287,11 @@ class WalkRun:
         """Results of the walk apart from its motion, by the names of the fields of `WalkResult`."""
         counts, extremes = self.counts, self.extremes
         is_at_rest = self.status == Status.AT_REST
-        first = self._batch.first_sample(self._world)
+        first, last = self._batch.first_sample(self._world), self._batch.last_sample(self._world)
         # Δx is x of the centre of mass, because the sprocket's centre is at x = 0; on a slope, along the floor
         return {
             "status": self.status,
-            "dx": float(self._batch.last_sample(self._world)[layout.CENTER_X]) / self._level
-            if is_at_rest
-            else math.nan,
+            "dx": float(last[layout.CENTER_X]) / self._level if is_at_rest else math.nan,
             "walk_time": self.walk_time,
             "simulated_time": self.simulated_time,
             "hold_time": self.hold_time,
