@@ -7,11 +7,9 @@ shares no code with the kernels.
 import time
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.parameters import Parameters
-
-Array = NDArray[np.float64]
 
 STAGES = 12
 """Evaluations of the equations in an attempted step of DOP853."""

@@ -15,6 +15,7 @@ from warpchain.engine.devices import Gpu, start_device
 from warpchain.engine.kernel_choice import block_threads, step_kernel
 from warpchain.engine.mirror import Mirror
 from warpchain.engine.tallies import COUNTS, EXTREMES, LOSSES
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.floor import Floor
 from warpchain.inputs.link_values import LinkValues, alternating
 from warpchain.inputs.options import Options
@@ -28,8 +29,6 @@ from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.functions import board_rows
 from warpchain.kernels.types import LOADING_TIME, Drive, Model, Record, State
 from warpchain.status import Status
-
-Array = NDArray[np.float64]
 
 FIRST_STEP = 1e-7  # s; it may grow fivefold per step
 LANES = 3

@@ -3,12 +3,10 @@
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.sprocket_motion import Motion
 from warpchain.kernels import layout
-
-Array = NDArray[np.float64]
 
 BEYOND: Final = 1e30
 """Time [s] of the rows behind the last."""

@@ -8,14 +8,13 @@ import math
 from typing import Annotated, Any, Final, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import AfterValidator, Discriminator, Field, Strict, Tag
 
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.parameters import FRACTION, FRICTION
 from warpchain.inputs.validation import InputError
 from warpchain.kernels import layout
-
-Array = NDArray[np.float64]
 
 MOST_POINTS: Final = 256
 """Most points of a profile; each takes time where a chain is near it."""

@@ -10,11 +10,9 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.parameters import Parameters
-
-Array = NDArray[np.float64]
 
 LEAST_INERTIA: Final = 0.5
 """Part of its rotary inertia that a link must keep under multiplied loads."""

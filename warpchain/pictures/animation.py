@@ -21,14 +21,13 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpchain.files import checked_output, replacing, write_whole
+from warpchain.inputs.arrays import Array
 from warpchain.pictures import chain
 from warpchain.pictures.style import BLUE, GROUND, INK, tidy
 from warpchain.pictures.walk_shape import center_in_room, checked_joints, headline
 
 if TYPE_CHECKING:
     from warpchain.walks.walk_result import WalkResult
-
-Array = NDArray[np.float64]
 
 WIDTH, TALLEST = 960, 560
 """Greatest width and height of a picture [pixels]."""

@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
+from warpchain.inputs.arrays import Array
 from warpchain.pictures import chain
 from warpchain.pictures.inline import InlineFigure
 from warpchain.pictures.style import DOTS, GROUND, INK, tidy
@@ -22,8 +22,6 @@ from warpchain.status import Status
 
 if TYPE_CHECKING:
     from warpchain.walks.walk_result import WalkResult
-
-Array = NDArray[np.float64]
 
 _WIDTH: Final = 10.0
 _HIGHEST: Final = 4.6

@@ -5,8 +5,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.distributions import random_generator
 from warpchain.pictures.labels import cell_text, cell_values, quantity_text
 from warpchain.pictures.style import BLUE, INK, LINE_COLORS, RED, NothingToShow, Picture, panel_grid, tidy
@@ -14,8 +14,6 @@ from warpchain.status import Status
 from warpchain.store.block_result import BlockResult
 from warpchain.store.sweep_result import SweepResult
 from warpchain.sweeps.designs import sobol_indices, walks_per_sample
-
-Array = NDArray[np.float64]
 
 CONFIDENCE: Final = 0.95
 """Confidence level of bootstrap intervals."""

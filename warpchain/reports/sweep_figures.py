@@ -13,7 +13,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
 from warpchain.pictures.grid_figure import draw_grid
 from warpchain.pictures.labels import COUNTS, DISTANCE, FREQUENCY, cell_values, lost_note, quantity_name
@@ -22,8 +21,6 @@ from warpchain.reports.sensitivity import sensitivity
 from warpchain.store.block_result import BlockResult
 from warpchain.store.sweep_result import SweepResult
 from warpchain.walks.rows import quantity_of
-
-Array = NDArray[np.float64]
 
 _STARTS: Final = {
     "rest": ("started at rest", RED, "o"),

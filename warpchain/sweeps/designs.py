@@ -14,11 +14,9 @@ from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.validation import InputError
-
-Array = NDArray[np.float64]
 
 SAMPLERS: Final = ("random", "sobol", "latin_hypercube", "saltelli")
 """Independent samples; a scrambled Sobol' sequence; a latin hypercube; a Sobol' sequence of twice the dimension, each

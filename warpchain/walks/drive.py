@@ -2,18 +2,14 @@
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from warpchain.engine.control import SOFT, SOFTEST
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.link_values import LinkValues, mean_value
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import joint_radius, loop_speed, settling_time
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.start_shapes import lay_chain, stadium
-
-Array = NDArray[np.float64]
 
 HOLD_STRAIN = 3e-4
 """Greatest strain of a held loop on softened joints by its speed."""

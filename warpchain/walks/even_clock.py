@@ -7,11 +7,9 @@ to an eighth of the jump times the time between the samples.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpchain.inputs.arrays import Array
 from warpchain.kernels import layout
-
-Array = NDArray[np.float64]
 
 _PLACES = ((layout.CENTER_X, layout.CENTER_U), (layout.CENTER_Y, layout.CENTER_V), (layout.CENTER_Z, layout.CENTER_W))
 """Columns of a sample: a place, and its velocity."""

@@ -8,14 +8,12 @@ way that the chain walks.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.scene import link_values
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.state import State
 from warpchain.kernels import layout
-
-Array = NDArray[np.float64]
 
 
 def released_plane(setup: Setup, position: Array) -> Array:

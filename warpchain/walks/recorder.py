@@ -3,16 +3,14 @@
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpchain.engine.batch import Batch, Recorded
+from warpchain.inputs.arrays import Array
 from warpchain.kernels import layout
 from warpchain.loop.stationary_loop import BEFORE, BeforeRelease
 from warpchain.walks.even_clock import even_rows
 from warpchain.walks.motion import Keep
 from warpchain.walks.moving_plane import angles, frame_axes
-
-Array = NDArray[np.float64]
 
 SERIES: Final[dict[str, int | list[int]]] = {
     "time": layout.TIME,

@@ -16,6 +16,7 @@ from warpchain.engine.batch import Batch
 from warpchain.engine.snapshot import CACHES, change, restore, take_snapshot
 from warpchain.engine.sprocket_motion import motion_rows
 from warpchain.engine.tallies import CONTACTS, COUNTS, EXTREMES, LOST
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.floor import circles_of
 from warpchain.inputs.scene import joint_radius, link_values, settling_time
 from warpchain.inputs.setup import Setup
@@ -30,8 +31,6 @@ from warpchain.walks.landmarks import at_release
 from warpchain.walks.motion import NOTHING, Keep
 from warpchain.walks.moving_plane import angles, plane_of_state, released_plane, state_of_plane
 from warpchain.walks.recorder import Recorder
-
-Array = NDArray[np.float64]
 
 _OF_THE_RUN = ("raised", "drive_time", "drift", "_at_full_speed", "_has_sprocket")
 """What a run knows of the time before its release."""
