@@ -82,13 +82,9 @@ def stored_fields(kind: type) -> dict[str, Stored]:
 def write_fields(
     group: "h5py.Group", values: Mapping[str, Any], kept: Mapping[str, Stored], joints: type = np.float64
 ) -> None:
-    """Write annotated fields with units and meanings; arrays without numbers are left out.
+    """Write `kept` fields, see `stored_fields`, with units and meanings; arrays without numbers are left out.
 
-    Args:
-        group: where to.
-        values: name → value of each field.
-        kept: the fields, see `stored_fields`.
-        joints: precision of what each joint has in each frame.
+    What each joint has in each frame gets the precision of `joints`.
     """
     for name, stored in kept.items():
         for key, meaning in (stored.keys or {"": stored.described}).items():
@@ -143,13 +139,10 @@ def hdf5_image(kind: str, fill: "Callable[[h5py.File], None]") -> bytes:
 def reading_hdf5(
     path: str | os.PathLike[str], kind: str | None, remedy: str, wanted: str | None = None
 ) -> "Iterator[h5py.File]":
-    """An HDF5 file that `hdf5_image` made, undamaged and of the right kind.
+    """An HDF5 file that `hdf5_image` made, undamaged and of a kind, or of any if that is None.
 
-    Args:
-        path: the file.
-        kind: its kind; None for any.
-        remedy: what to do about a damaged or an older file.
-        wanted: which file to give instead of one of another kind; None if a sweep has it in its folder.
+    The remedy says what to do about a damaged or an older file; `wanted`, which file to give instead of one of another
+    kind, is None of files that a sweep has in its folder.
 
     Raises:
         OSError: it cannot be read.

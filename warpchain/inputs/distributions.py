@@ -41,13 +41,7 @@ _STANDARD: Final = NormalDist()
 
 @dataclass(frozen=True)
 class Uniform:
-    """Equally likely values between two ends; an unphysical value is drawn again.
-
-    Attributes:
-        lower: lower end, in the unit of the quantity.
-        upper: upper end.
-        bounds: least and greatest physical value.
-    """
+    """Equally likely values between two ends; a value outside the physical bounds is drawn again."""
 
     lower: float
     upper: float
@@ -83,10 +77,7 @@ class Uniform:
 class Gaussian:
     """A Gaussian truncated at the physical bounds; a value outside is drawn again, never clipped.
 
-    Attributes:
-        mean: mean of the whole Gaussian, in the unit of the quantity; None: the chain's own value, see `placed`.
-        sigma: standard deviation of the whole Gaussian.
-        bounds: least and greatest physical value.
+    Mean and standard deviation are those of the whole Gaussian; a mean of None is the chain's own value, see `placed`.
     """
 
     mean: float | None

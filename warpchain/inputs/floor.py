@@ -148,10 +148,8 @@ class Floor:
     def raised_by(self, circles: Array, radius: Array, clearance: float) -> float:
         """How far links must be raised for the nearest to have a clearance from the floor [m].
 
-        Args:
-            circles: Their left circles, then their right ones, (2 n, 2); between them they are as broad.
-            radius: Of these, (2 n,).
-            clearance: Of the nearest place of a link [m]; above a corner it may be less by 3 % of a link's length.
+        Given are their left circles, then their right ones, (2 n, 2), and their radii, (2 n,); between them links are
+        as broad. Above a corner the clearance may be less by 3 % of a link's length.
         """
         begin, end = np.split(circles, 2)
         circles = np.concatenate([circles, *(begin + share * (end - begin) for share in (0.25, 0.5, 0.75))])

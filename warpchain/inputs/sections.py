@@ -21,10 +21,7 @@ SECTIONS: Final[Mapping[str, type[Section]]] = {"scene": Scene, "options": Optio
 def takes_fields(*sections: str, without: Container[str] = (), beside: Iterable[str] = ()) -> Callable[[F], F]:
     """Let the signature of a function name the fields that its ``**settings`` take, for notebooks to complete.
 
-    Args:
-        sections: keys of `SECTIONS`.
-        without: fields that it does not take; its own arguments are named anyhow.
-        beside: what it takes beside fields.
+    These are the fields of some `SECTIONS`, `without` those that it does not take, and what it takes `beside` them.
     """
 
     def named(function: F) -> F:

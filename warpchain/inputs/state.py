@@ -29,13 +29,9 @@ WIDEST_MISFIT: Final = 0.5
 class Setup:
     """Everything that says what one walk is, checked and complete.
 
-    Attributes:
-        preset: name of the parameter preset that it started from.
-        parameters: of the chain, its sprocket and the floor.
-        scene: what happens.
-        options: how it is computed.
-        start: state that the walk begins from; None: it begins as the scene says. With a state, those values of the
-            scene that matter before the release are those of the walk that the state was taken from.
+    `preset` is the name of the one that the parameters started from. Without a `start` the walk begins as the scene
+    says. With one, those values of the scene that matter before the release are those of the walk that the state was
+    taken from.
     """
 
     preset: str

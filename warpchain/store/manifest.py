@@ -39,11 +39,7 @@ FIRST_SHARDS: Final = 32
 class Shard:
     """Some walks of a sweep that are computed together and kept in one file.
 
-    Attributes:
-        digest: see `Manifest.digest`.
-        kind: type of the rows.
-        keys: block, cell and sample of each walk, of type `KEYS`.
-        walks: number of each walk in the sweep.
+    `kind` is the type of the rows; `keys` of type `KEYS` and `walks` are of each walk its place and its number.
     """
 
     digest: str
@@ -65,12 +61,9 @@ class Shard:
 class Manifest:
     """What a folder holds.
 
-    Attributes:
-        sweep: the sweep.
-        shard_size: most walks in a shard; the first shards have fewer, see `_bounds`.
-        numerics_version: version of the numbers of its walks.
-        versions: the software that began the sweep.
-        part: (k, N), if the folder is only to have the k-th of N parts of the walks, 1 ≤ k ≤ N; more samples move none.
+    A shard has `shard_size` walks at most, the first ones fewer, see `_bounds`. `versions` are those of the software
+    that began the sweep. Of a `part` (k, N) the folder only has the k-th of N parts of the walks, 1 ≤ k ≤ N; more
+    samples move none.
     """
 
     sweep: Sweep

@@ -47,16 +47,11 @@ def stamp(directory: Folder) -> str:
 def write_shard(
     directory: Folder, expected: str, shard: Shard, rows: Rows, motions: Mapping[int, Mapping[str, Any]]
 ) -> None:
-    """Write a shard; needs no lock, so that workers can call it.
+    """Write a shard into a folder that is open in the process that runs the sweep; workers need no lock for it.
 
     Two workers may write the same shard at the same time: both write the same bytes, and one file replaces the other.
-
-    Args:
-        directory: folder of the sweep, opened before by the process that runs the sweep.
-        expected: `stamp` of the folder when its walks were planned.
-        shard: the shard.
-        rows: rows of its walks, all ended.
-        motions: row → arrays, see `write_motion`, of those of the walks whose motion the sweep keeps.
+    `expected` is the `stamp` of the folder when the walks were planned; all have ended. `motions` has the arrays of
+    `write_motion` by rows, of walks whose motion the sweep keeps.
 
     Raises:
         OSError: the file cannot be written; the folder is as it was.
