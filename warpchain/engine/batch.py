@@ -103,13 +103,9 @@ def _struct(group: str, arrays: Mapping[str, wp.array]) -> Any:
 class Batch:
     """W chains on one device, each with its own parameters, state and statistics.
 
-    The host may read and change any world between launches.
-
-    Attributes:
-        host: Arrays of the structs in :mod:`warpchain.kernels.types` by name, such as ``state/time``.
-        threads: That carry a chain.
-        bytes: Memory that they take on the device.
-        records: Whether samples or frames are kept.
+    The host may read and change any world between launches: `host` has the arrays of the structs in
+    :mod:`warpchain.kernels.types` by name, such as ``state/time``. So many `threads` carry a chain, `bytes` is the
+    memory of all on the device, and `records` says whether samples or frames are kept.
     """
 
     def __init__(
@@ -125,18 +121,11 @@ class Batch:
         tilts: bool = False,
         faces: int = 1,
     ) -> None:
-        """Allocate a batch. All worlds are idle (status FINISHED) until a chain is loaded.
+        """Allocate a batch of so many worlds, which are idle (status FINISHED) until a chain is loaded.
 
-        Args:
-            worlds: Number of chains W.
-            longest: Greatest number of links of a chain that will be loaded.
-            options: Shared by all worlds.
-            keeps_samples: Keep the time series.
-            frame_every: Keep all joint positions at every so many samples; None keeps none.
-            frame_interval: Time [s] between the frames of chains that are loaded with frame marks of their own.
-            keeps_loads: Keep force and moment of every joint with each frame.
-            tilts: Keep the plane of the chain with samples and frames.
-            faces: Most faces of a floor.
+        Chains have at most `longest` links, floors at most so many faces. Kept are the time series, joint positions at
+        every so many samples (None: no frames) or, of chains with frame marks of their own, at an interval [s], and
+        with each frame force and moment of every joint; if planes tilt, these with samples and frames.
         """
         self.options = options
         self.device = start_device(options.device)
@@ -204,12 +193,7 @@ class Batch:
     ) -> None:
         """Set parameters and number of links of a world's chain.
 
-        Args:
-            world: Index.
-            parameters: The chain's parameters.
-            links: Number of links.
-            own: What each link and joint has of its own; None: inner and outer links alternate.
-            scene: Of its walk; None: there is no sprocket.
+        Without values of each link's `own`, inner and outer links alternate; without a scene there is no sprocket.
         """
         own = own or alternating(parameters, links)
         self.links[world] = links
@@ -237,15 +221,10 @@ class Batch:
     ) -> None:
         """Set the state of a world's chain and start its clock at zero; its statistics and watches start anew.
 
-        Args:
-            world: Index.
-            position: (n, 3): x, y [m], θ [rad].
-            velocity: (n, 3), their rates.
-            stop_time: Time [s] at which the run ends, exactly.
-            stop_status: Status it ends with.
-            attempts_before: Attempts of earlier phases, which count towards the option `step_limit`.
-            softness: Softness of the joints, see :mod:`warpchain.kernels.events.softening`.
-            has_frame_marks: Whether frames are `frame_interval` apart, instead of taken with samples.
+        Position, (n, 3), is x, y [m], θ [rad], velocity their rates. The run ends exactly at the stop time [s], with
+        the stop status. Attempts of earlier phases count towards the option `step_limit`. Softness is that of the
+        joints, see :mod:`warpchain.kernels.events.softening`. Frames are taken with samples, or are `frame_interval`
+        apart.
         """
         marks = 0 if has_frame_marks else -1
         self.set_state(world, **_BEGINNING, next_frame=marks, softness=softness, attempts_before=attempts_before)
@@ -300,12 +279,9 @@ class Batch:
         return ATTEMPTS["cpu" if self._gpu is None else "gpu"]
 
     def run(self, worlds: Sequence[int], features: Features, after_launch: Callable[[], None] | None = None) -> None:
-        """Carry worlds on until none of them is running. Results do not depend on how a run is cut into launches.
+        """Carry worlds on until none of them is running; after each launch the record may be drained.
 
-        Args:
-            worlds: Indices.
-            features: What the kernel is compiled for.
-            after_launch: Called after each launch, to drain the record.
+        Results do not depend on how a run is cut into launches.
         """
         while active := [world for world in worlds if self.statuses()[world] == Status.RUNNING]:
             self.launch(active, features)
@@ -382,23 +358,15 @@ class Batch:
 
     def counts(self, world: int) -> dict[str, int]:
         """Counters since loading."""
-        row = self.host["state/counts"][world]
-        return {name: int(value) for name, value in zip(COUNTS, row, strict=True)}
-
-    def attempts(self, world: int) -> int:
-        """Attempted steps since loading, accepted or not."""
-        counts = self.counts(world)
-        return counts["accepted"] + counts["rejected"]
+        return dict(zip(COUNTS, self.host["state/counts"][world].tolist(), strict=True))
 
     def extremes(self, world: int) -> dict[str, float]:
         """Greatest joint opening and depths [m] since loading."""
-        row = self.host["state/extremes"][world]
-        return {name: float(value) for name, value in zip(EXTREMES, row, strict=True)}
+        return dict(zip(EXTREMES, self.host["state/extremes"][world].tolist(), strict=True))
 
     def losses(self, world: int) -> dict[str, float]:
         """Energy [J] lost since loading, by cause."""
-        row = self.host["state/losses"][world]
-        return {name: float(value) for name, value in zip(LOSSES, row, strict=True)}
+        return dict(zip(LOSSES, self.host["state/losses"][world].tolist(), strict=True))
 
     def first_sample(self, world: int) -> Array:
         """The sample taken when the run began: (SAMPLE_COLUMNS,), see :mod:`warpchain.kernels.layout`."""

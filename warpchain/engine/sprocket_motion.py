@@ -15,12 +15,8 @@ BEYOND: Final = 1e30
 def motion_rows(motion: Motion, frequency: float, height: float) -> Array:
     """The rows of `Drive.motion`, (MOTION_ROWS, MOTION_VALUES).
 
-    The sprocket starts at rest; between rows it goes on monotone cubics (PCHIP), without overshoot.
-
-    Args:
-        motion: rows of time [s], place relative to that at the release [m], turns per second as in the drive [Hz].
-        frequency: at the release [Hz].
-        height: of the sprocket's centre at the release [m].
+    The sprocket starts at rest; between rows it goes on monotone cubics (PCHIP), without overshoot. Frequency [Hz] and
+    height of its centre [m] are those at the release.
     """
     from scipy.interpolate import PchipInterpolator
 

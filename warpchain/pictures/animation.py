@@ -160,8 +160,8 @@ def player(walk: "WalkResult", slow: float = 4.0) -> str:
         "places": _whole(places[~np.isnan(places[:, 0])]),
         "view": _whole(box.ravel()),
         "marks": marks,
-        "heights": _whole(np.array(chain.floor_height(walk, np.array(marks)))),
-        "floor": _whole(chain.floor_line(walk, *ends)),
+        "heights": _whole(np.array(walk.setup.floor.heights(np.array(marks)))),
+        "floor": _whole(walk.setup.floor.line(*ends)),
         "stretches": [[color, label, _whole(faces)] for color, label, faces in chain.stretches(walk, *ends)],
         "slow": slow,
         "colors": {"inner": INNER, "outer": OUTER, "edge": EDGE},
@@ -227,7 +227,7 @@ class Film:
         self._axes = self.figure.add_axes((*share[0], *(1 - share.sum(axis=0))), xlim=box[0], ylim=box[1])
         chain.draw_release(self._axes, walk, self._view)
         if not self._tilts:
-            chain.draw_ground(self._axes, walk, chain.floor_line(walk, *box[0]), box[1, 0])
+            chain.draw_ground(self._axes, walk, walk.setup.floor.line(*box[0]), box[1, 0])
             self._axes.set(yticks=[], xticks=floor_marks(*box[0]))
             self._axes.set_xlabel("$x$ / m", loc="right")
             labels = self._axes.get_legend_handles_labels()

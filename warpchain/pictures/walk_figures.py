@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from warpchain.loop.stationary_loop import StationaryLoop
-from warpchain.pictures.chain import floor_height, stretches
+from warpchain.pictures.chain import stretches
 from warpchain.pictures.film_strip import film_strip
 from warpchain.pictures.inline import InlineFigure
 from warpchain.pictures.style import BLUE, DASHES, DOTS, FAINT, GREEN, GROUND, INK, RED, tidy
@@ -70,7 +70,7 @@ def _height_and_speed(walk: "WalkResult", figure: Figure) -> None:
     if walk.setup.scene.is_level:
         height.set_ylim(bottom=0.0)
     else:
-        x, floor = walk.center[:, 0], floor_height(walk, walk.center[:, 0])
+        x, floor = walk.center[:, 0], walk.setup.floor.heights(walk.center[:, 0])
         height.plot(walk.time, floor, color=FAINT, linewidth=0.8)
         for color, label, faces in stretches(walk, x.min(), x.max()):
             is_above = ((faces[:, 0, 0, None] <= x) & (x < faces[:, 1, 0, None])).any(axis=0)

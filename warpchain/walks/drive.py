@@ -82,13 +82,7 @@ def drive_of(setup: Setup, links: LinkValues) -> tuple[tuple[Array, Array], dict
 
 
 def _softness(parameters: Parameters, tension: float, strain: float) -> float:
-    """Softness of joints, from 1 for soft ones to 2 for the softest, that a tension [N] stretches by so much.
-
-    Args:
-        parameters: The chain's parameters.
-        tension: T, which stretches the joints by T/k.
-        strain: Greatest T/k, in link lengths.
-    """
+    """Softness of joints, from 1 for soft ones to 2 for the softest, that a tension [N] strains by so many lengths."""
     wanted = tension / (strain * parameters.link_length)
     soft = min(parameters.joint_stiffness, SOFT.joint_stiffness)  # as no joint becomes stiffer than its own
     softest = SOFTEST.joint_stiffness

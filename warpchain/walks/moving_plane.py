@@ -20,11 +20,7 @@ def released_plane(setup: Setup, position: Array) -> Array:
     """The plane of a chain at its release, (PLANE_VALUES,).
 
     It is tilted about a line along the room's X axis. Its lowest point stays at its height, and the centre of mass
-    stays above z = 0 and moves sideways at the scene's lateral speed.
-
-    Args:
-        setup: of the walk.
-        position: x, y [m], θ [rad] of the links in the upright plane, shape (n, 3).
+    stays above z = 0 and moves sideways at the scene's lateral speed. The position, (n, 3), is in the upright plane.
     """
     scene, parameters = setup.scene, setup.parameters
     links = link_values(scene, parameters)
@@ -76,11 +72,5 @@ def plane_of_state(state: State) -> Array:
 
 
 def in_room(joints: Array, origin: Array, axes: Array) -> Array:
-    """Places in the room, shape (f, n, 3), of points of planes.
-
-    Args:
-        joints: x, y [m] in the plane, shape (f, n, 2).
-        origin: of the plane [m], shape (f, 3).
-        axes: e1 and e2, shape (f, 2, 3).
-    """
+    """Places in the room [m], (f, n, 3), of joints in planes, (f, n, 2), of an origin, (f, 3), and axes, (f, 2, 3)."""
     return origin[:, None, :] + joints @ axes

@@ -30,13 +30,9 @@ _PREFIXES: Final = {"greatest_penetration": "penetration"}
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a sweep.
+    """A column of a sweep: its type in NumPy's notation, SI unit ("1" for pure numbers) and meaning.
 
-    Attributes:
-        kind: its type in NumPy's notation.
-        unit: SI unit, "1" for pure numbers.
-        meaning: one line saying what the numbers are.
-        path: field of `WalkResult` that it is of, and key in that field, if it is a dictionary; none for others.
+    The path is the field of `WalkResult` that it is of, and the key in a field that is a dictionary; others have none.
     """
 
     kind: str
@@ -95,13 +91,7 @@ def missing_rows(kind: np.dtype[np.void], keys: Rows) -> Rows:
 
 
 def fill_row(row: Any, outcome: Mapping[str, Any], drawn: Mapping[str, float]) -> None:
-    """Write a walk into its row, which has its keys already.
-
-    Args:
-        row: one of `missing_rows`.
-        outcome: of the walk, see `WalkRun.outcome`.
-        drawn: name → value of what was drawn for it.
-    """
+    """Write the `WalkRun.outcome` of a walk, and what was drawn for it, into one of `missing_rows`."""
     row["status"] = outcome["status"]
     for name, column in STORED_COLUMNS.items():
         row[name] = reduce(getitem, column.path, outcome)
@@ -149,11 +139,9 @@ def field_column(name: str) -> Column:
 def faults_of_columns(
     columns: Mapping[str, NDArray[Any]], lengths: Mapping[str, NDArray[Any]]
 ) -> dict[str, NDArray[np.bool_]]:
-    """Whether each walk has each of `warpchain.walks.faults.FAULTS`.
+    """Whether each walk in columns of a sweep has each of `warpchain.walks.faults.FAULTS`.
 
-    Args:
-        columns: of a sweep, by name.
-        lengths: the least of each of `LENGTHS` [m] before anything was drawn, along the axes of the columns.
+    Lengths are the least of each of `LENGTHS` [m] before anything was drawn, along the axes of the columns.
     """
     own = dict(lengths)
     for name in own:

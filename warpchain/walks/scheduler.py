@@ -56,8 +56,7 @@ def run_setups(
     Args:
         setups: The walks, samples drawn; with ``draw``, options and links suffice.
         draw: Called with the place of a walk when it begins; returns its setup, with options and links of ``setups``.
-        keeps: What is kept of the motion of each, for ``run.recorder``; None: nothing. Walks of equal options keep
-            frames equally often.
+        keeps: What is kept of the motion of each; None: nothing. Walks of equal options keep frames equally often.
         slots: Number of chains that run at the same time. Default: on a GPU as many as fill it; on a CPU, where one
             core does a launch, one, which stays in the cache.
         stop: When set, the walks are abandoned after the launch that is under way.
@@ -136,9 +135,7 @@ def most_worlds(longest: int, **kept: Any) -> int:
 def compile_kernels(setups: Sequence[Setup], walks: int | None = None) -> None:
     """Load every kernel that these walks need, and compile it if need be, before anybody waits for it alone.
 
-    Args:
-        setups: The walks, or one of each kind.
-        walks: Their number; None: that of the setups.
+    Given are the setups of all walks, or one of each kind and their number.
     """
     wanted: set[tuple[str, Features, int]] = set()
     for places in _groups(setups, len(setups) if walks is None else walks):
@@ -150,12 +147,7 @@ def compile_kernels(setups: Sequence[Setup], walks: int | None = None) -> None:
 
 
 class BatchRun:
-    """A batch and the walks on its worlds.
-
-    Attributes:
-        batch: The batch.
-        waiting: Places of the walks of its group that have not begun.
-    """
+    """A batch and the walks on its worlds; `waiting` are places of the walks of its group that have not begun."""
 
     def __init__(
         self,

@@ -92,6 +92,7 @@ class WalkRun:
         self._settled = settling_time(scene)
         self._tilts = scene.plane == "tilting"
         self._level = math.cos(math.radians(scene.slope))  # of a distance along the floor
+        self._farthest = (scene.distance_limit or 0.0) * self._level  # along x
 
     def phases(self) -> Iterator[Features]:
         """Set the world up for one phase after the other, and yield what its kernel must be compiled for.
@@ -268,10 +269,7 @@ class WalkRun:
     def _ending(self, moment: str, event: str, first: int) -> dict[str, Any]:
         """When an event came, after how many bounces begun, and how long after the last impulse on the floor.
 
-        Args:
-            moment: name of the field that says when.
-            event: as the names of the other two have it.
-            first: of the three entries of :attr:`State.watch`.
+        The field of the moment, those named by the event, and the first of the three entries of :attr:`State.watch`.
         """
         at, bounces, flight = (
             self._batch.watched(self._world, row) if self._released else math.nan for row in range(first, first + 3)
@@ -327,9 +325,8 @@ class WalkRun:
     def _go_on(self, start: State) -> float | None:
         """Place a chain as a state has it; if that was taken from a walk, go on with the walk.
 
-        Returns:
-            None, unless the state was changed. Then the world is to stop at once, and so make the sample with which
-            its new ledger begins; after that `State.first_area` is to be set to this.
+        If the state was changed, the world is to stop at once, and so make the sample with which its new ledger begins;
+        after that `State.first_area` is to be set to what is returned, else None.
         """
         batch, world, memory = self._batch, self._world, start.memory
         self._released = True
@@ -342,7 +339,7 @@ class WalkRun:
         is_kept, interval = start.is_placed_as_in(self.setup), self.recorder.keep.frame_interval
         restore(batch, world, {name: part for name, part in memory.items() if is_kept or name not in CACHES})
         batch.set_state(world, next_frame=np.floor(start.time / interval) if interval > 0 else -1)
-        self._set_farthest()
+        batch.set_drive(world, farthest=self._farthest)
         if is_kept and self._is_at(start):
             batch.resume(world, self._walk_end, Status.TIME_LIMIT)
             self.recorder.go_on(memory["state/last_sample"], start.time)
@@ -366,10 +363,6 @@ class WalkRun:
         length, radius = self.setup.parameters.link_length, self._links.radius
         return self.setup.floor.raised_by(circles_of(position, length), np.tile(radius, 2), clearance)
 
-    def _set_farthest(self) -> None:
-        """Set how far the chain may walk."""
-        self._batch.set_drive(self._world, farthest=(self.setup.scene.distance_limit or 0.0) * self._level)
-
     def _release(self, position: Array, velocity: Array, hanging: float = math.nan) -> None:
         """Begin the walk of a chain; ``hanging``: how far it must be raised as it hung on its sprocket at rest [m]."""
         scene = self.setup.scene
@@ -385,7 +378,7 @@ class WalkRun:
 
     def _load(self, position: Array, velocity: Array) -> None:
         """Begin the walk of a chain on its floor."""
-        self._set_farthest()
+        self._batch.set_drive(self._world, farthest=self._farthest)
         self._batch.load(
             self._world,
             position,
