@@ -51,11 +51,7 @@ def fly(
 ) -> tuple[tuple[Array, Array], float, float]:
     """Integrate a chain in flight by SciPy's DOP853, at a tolerance that is absolute (SI units) and relative.
 
-    Returns:
-        Position and velocity after the duration [s], wall time [s], and attempted steps, accepted or not.
-
-    Raises:
-        RuntimeError: SciPy failed.
+    Position and velocity after the duration [s], wall time [s], and attempted steps, accepted or not.
     """
     from scipy.integrate import solve_ivp
 

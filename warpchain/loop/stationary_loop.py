@@ -142,15 +142,9 @@ class StationaryLoop:
 
 
 def average_loop(setup: Setup, before: BeforeRelease | None, center: Array | None) -> StationaryLoop:
-    """The mean loop of a walk in the last moments before its release.
+    """The mean loop of a walk just before its release, given the sprocket's centre x, y [m] at the release, (2,).
 
-    Args:
-        setup: parameters, scene and options of the walk.
-        before: the motion on the sprocket just before the release; None if it was not kept.
-        center: the sprocket's centre x, y [m] at the release, shape (2,); None without one.
-
-    Raises:
-        ValueError: the walk has kept nothing of that time, or too little.
+    A `ValueError` says that the walk has no sprocket, or has kept nothing of that time or too little.
     """
     if before is None or center is None:
         if not setup.has_drive:
@@ -171,17 +165,10 @@ def average_loop(setup: Setup, before: BeforeRelease | None, center: Array | Non
 def average_frames(
     before: BeforeRelease, parameters: Parameters, mass: float, center: Array, radius: float
 ) -> StationaryLoop:
-    """The mean loop of frames.
+    """The mean loop of frames; a `ValueError` if they are too few, or if the loop does not run clockwise.
 
-    Args:
-        before: frames of a loop that runs clockwise.
-        parameters: parameters of the chain.
-        mass: m̄, mean mass of its links [kg].
-        center: the sprocket's centre x, y [m].
-        radius: distance of joints on the sprocket from its centre [m].
-
-    Raises:
-        ValueError: there are too few frames, or the loop does not run clockwise.
+    Given are the mean mass m̄ of the links [kg], the sprocket's centre x, y [m], and how far joints on it are from that
+    [m].
     """
     joints = before.frame_joints - center
     frames, links = joints.shape[:2]

@@ -21,15 +21,11 @@ _RESAMPLES: Final = 1000
 
 
 class Sensitivity(NamedTuple):
-    """Sobol' indices of the distance in one cell, for its d drawn quantities.
+    """Sobol' indices of the distance in one cell, by which its text tells it, for d drawn quantities of these names.
 
-    Attributes:
-        cell: values of the axes.
-        names: of the quantities.
-        indices: share of the variance that each causes by itself, and together with others, shape (2, d).
-        intervals: bootstrap intervals of these, shape (2, d, 2).
-        samples: how many, of d + 2 walks each.
-        lost: how many were left out, because one of their walks failed or has not been run yet.
+    Indices are the share of the variance that each causes by itself, and together with others, (2, d); intervals are
+    bootstrap intervals of these, (2, d, 2). Samples have d + 2 walks each; lost are those of which a walk failed or has
+    not been run yet.
     """
 
     cell: str

@@ -38,14 +38,7 @@ def figures(result: SweepResult, quantity: str = "dx") -> Iterator[Picture]:
     """Every figure that the sweep has the walks for, the paper's Figure 6 first.
 
     What no special figure shows has one of its grid: one for all blocks that vary one quantity, and one for each set of
-    several axes.
-
-    Args:
-        result: a sweep.
-        quantity: a column of numbers; for any other than ``dx`` there are just its figures over grids.
-
-    Raises:
-        InputError: there is no such column.
+    several axes. A column other than ``dx`` has just these; an `InputError` says that there is none of that name.
     """
     statistics, shown = result.cell_statistics(quantity), set[str]()
     for draw in (figure6, sensitivity) if quantity == "dx" else ():

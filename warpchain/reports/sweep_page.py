@@ -63,13 +63,10 @@ REPORTS: Final = Kind("page that warpchain report has written", _is_report)
 def write_report(
     directory: Folder, path: str | os.PathLike[str], *, animation_of: int | None = None, device: str | None = None
 ) -> None:
-    """Write the report of a sweep as one HTML page, whole or not at all; an older report is replaced.
+    """Write the report of a sweep, which may still be running, as one HTML page, whole or not at all.
 
-    Args:
-        directory: folder of the sweep, which may still be running.
-        path: the file to write.
-        animation_of: number of a walk to show in motion, from its frames in the sweep or else run again; None for none.
-        device: where that walk is run again; by default where the sweep says.
+    An older report is replaced. The walk of a number is shown in motion, from its frames in the sweep or else run again
+    on a device, by default where the sweep says.
 
     Raises:
         OSError: the folder cannot be read, the file cannot be written, or it is there and no report.

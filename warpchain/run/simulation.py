@@ -225,11 +225,7 @@ class Chains:
             self._batch.place(numbers, self.motions(numbers)[0], rates)
 
     def run(
-        self,
-        until: float,
-        chains: Sequence[int] | NDArray[np.integer[Any]] | None = None,
-        *,
-        to_rest: bool = False,
+        self, until: float, chains: Sequence[int] | NDArray[np.integer[Any]] | None = None, *, to_rest: bool = False
     ) -> None:
         """Carry on all chains that can go on, or those of some numbers.
 

@@ -134,11 +134,7 @@ def _checked_call(
     workers: int | None,
     part: str | None,
 ) -> tuple[Sweep, Path, tuple[int, int], int | None]:
-    """The sweep on its device, its folder, its part, and the number of workers.
-
-    Raises:
-        InputError: Something is refused; one line for each value.
-    """
+    """The sweep on its device, its folder, its part, and the number of workers; an `InputError` for all refused."""
     problems: list[str] = []
 
     def gathered(check: Callable[[], T]) -> T | None:
@@ -166,16 +162,10 @@ def _checked_call(
 
 
 def sweep_of_keywords(given: Mapping[str, object], out: str | os.PathLike[str] | None) -> Sweep:
-    """The sweep that keyword arguments describe.
+    """The sweep that keyword arguments describe; an `InputError` with a line for each value that is refused.
 
-    Args:
-        given: `KEYS`, and fields of a walk by name or symbol; a list or a range is an axis of the grid, behind those
-            given. Left out, the name is that of the folder, the seed 0, and the preset that of a walk, unless it is
-            an axis.
-        out: Folder of the results.
-
-    Raises:
-        InputError: Something is refused; one line for each value.
+    They are `KEYS`, and fields of a walk by name or symbol; a list or a range is an axis of the grid, behind those
+    given. Left out, the name is that of the folder, the seed 0, and the preset that of a walk, unless it is an axis.
     """
     usual = {"name": (Path(out).absolute().name if out is not None else "") or "sweep", "seed": 0, "version": VERSION}
     values = plain(given, "sweep")
@@ -251,10 +241,7 @@ def on_device(planned: Sweep, device: str) -> Sweep:
     """The same sweep on another device; a method that was named by need is what this means there.
 
     The canonical form, in which a folder keeps its sweep, names the method itself, so that the sweep is run again with
-    the same method on any device.
-
-    Raises:
-        InputError: The sweep's grid goes over devices.
+    the same method on any device. An `InputError` says that the sweep's grid goes over devices.
     """
     if any("device" in block.varied for block in planned.blocks):
         raise InputError(f"device: {device} is given, but the sweep's grid goes over devices; leave one of them out")
@@ -276,12 +263,8 @@ def shard_size(walks: int) -> int:
 def run_shards(planned: Sweep, directory: str, stamp: str, shards: Sequence[Shard], pulse: Pulse | None = None) -> None:
     """Run the walks of some shards and write each shard as soon as its walks are over; what a worker does.
 
-    Args:
-        planned: The sweep.
-        directory: The sweep's folder.
-        stamp: What the folder has to be, see `SweepFolder.stamp`.
-        shards: The shards.
-        pulse: Counts the walks that are over, and stops the work: unfinished shards are not written.
+    The folder has to have the stamp, see `SweepFolder.stamp`. The pulse counts the walks that are over, and stops the
+    work: unfinished shards are not written.
     """
     stop = None if pulse is None else pulse.stop
     walks = list(planned.undrawn(index for shard in shards for index in shard.walks.tolist()))
