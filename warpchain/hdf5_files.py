@@ -38,14 +38,10 @@ _FIXED: Final[dict[str, Any]] = {"libver": ("v108", "v108"), "track_order": True
 
 @dataclass(frozen=True)
 class Stored:
-    """Annotation of a field that files keep: a number, an array, or a dictionary of numbers.
+    """Annotation of a field that files keep: a number, an array, or a dictionary of numbers by `keys` with meanings.
 
-    Attributes:
-        unit: SI unit, "1" for pure numbers.
-        meaning: one line saying what the numbers are.
-        shape: of an array, such as "t 2" for an array of shape (t, 2); t instants, f frames, n links.
-        empty: when an array has no instants or frames, although there are some; "" if that is never so.
-        keys: of a dictionary its keys and their meanings.
+    Its SI unit, "1" for pure numbers, and its meaning in one line. The shape of an array is such as "t 2" for (t, 2): t
+    instants, f frames, n links; `empty` says when it has no instants or frames although there are some, "" if never.
     """
 
     unit: str
@@ -121,8 +117,7 @@ def read_fields(group: "h5py.Group", kept: Mapping[str, Stored], links: int) -> 
 def hdf5_image(kind: str, fill: "Callable[[h5py.File], None]") -> bytes:
     """The bytes of an HDF5 file of some kind that `fill` fills; equal content gives equal bytes.
 
-    The file is made in memory, because HDF5 fails badly on a full disk: it neither says what is wrong nor closes the
-    file.
+    It is made in memory: on a full disk HDF5 neither says what is wrong nor closes the file.
     """
     import h5py
 

@@ -71,15 +71,11 @@ _BEGINNING = _beginning()
 
 
 class Recorded(NamedTuple):
-    """What launches have recorded of a chain of n links: t samples and f frames.
+    """What launches have recorded of a chain of n links: t samples and f frames, see :mod:`warpchain.kernels.layout`.
 
-    Attributes:
-        samples: shape (t, SAMPLE_COLUMNS), or ALL_COLUMNS if planes are kept, see :mod:`warpchain.kernels.layout`.
-        times: of the frames [s], shape (f,).
-        frames: joints x, y [m], shape (f, n, 2).
-        loads: force x, y [N] and moment [N m] of each joint on the link before it, shape (f, n, 3); f is 0 if they
-            are not kept.
-        planes: of the frames, shape (f, PLANE_VALUES); f is 0 if they are not kept.
+    Samples are (t, SAMPLE_COLUMNS), or ALL_COLUMNS if planes are kept; of the frames there are times [s], (f,), joints
+    x, y [m], (f, n, 2), loads: force x, y [N] and moment [N m] of each joint on the link before it, (f, n, 3), and
+    planes, (f, PLANE_VALUES). Of loads and planes that are not kept f is 0.
     """
 
     samples: Array
@@ -191,10 +187,7 @@ class Batch:
     def set_chain(
         self, world: int, parameters: Parameters, links: int, own: LinkValues | None = None, scene: Scene | None = None
     ) -> None:
-        """Set parameters and number of links of a world's chain.
-
-        Without values of each link's `own`, inner and outer links alternate; without a scene there is no sprocket.
-        """
+        """Set a world's chain; without values of its own, links alternate, and without a scene there is no sprocket."""
         own = own or alternating(parameters, links)
         self.links[world] = links
         self.host["model/chains"][world] = constants_of(parameters, own, scene)

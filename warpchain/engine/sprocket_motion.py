@@ -13,10 +13,9 @@ BEYOND: Final = 1e30
 
 
 def motion_rows(motion: Motion, frequency: float, height: float) -> Array:
-    """The rows of `Drive.motion`, (MOTION_ROWS, MOTION_VALUES).
+    """The rows of `Drive.motion`, given frequency [Hz] and height of the sprocket's centre [m] at the release.
 
-    The sprocket starts at rest; between rows it goes on monotone cubics (PCHIP), without overshoot. Frequency [Hz] and
-    height of its centre [m] are those at the release.
+    The sprocket starts at rest; between rows it goes on monotone cubics (PCHIP), without overshoot.
     """
     from scipy.interpolate import PchipInterpolator
 

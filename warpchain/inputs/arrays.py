@@ -9,10 +9,7 @@ Array = NDArray[np.float64]
 
 
 def checked_array(given: object, path: str, *shape: int | str) -> Array:
-    """Anything like an array of finite real numbers as a new float64 array of this shape; a letter is any number.
-
-    Of anything else an `InputError` that begins with `path`.
-    """
+    """Finite real numbers of any kind as a float64 array of a shape, letters for any size; else an `InputError`."""
     wanted = f"({', '.join(map(str, shape))}{',' * (len(shape) == 1)})"
     try:
         if np.array(given).dtype.kind in "cSU":  # complex numbers and text would be converted without a word

@@ -163,10 +163,7 @@ def placed(distributions: Mapping[str, Distribution], setup: Setup) -> dict[str,
 
 
 def draw(distributions: Mapping[str, Distribution], rng: np.random.Generator) -> dict[str, float]:
-    """One value of each of the `placed` distributions, in their order; one outside its bounds is drawn again.
-
-    An `InputError` says that a quantity had no physical draw.
-    """
+    """A value of each of the `placed` distributions, in order, redrawn until in bounds; an `InputError` if none is."""
     drawn = {}
     for name, distribution in distributions.items():
         least, most = distribution.bounds

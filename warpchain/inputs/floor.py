@@ -67,12 +67,9 @@ FloorField = Annotated[
 class Floor:
     """A floor, as all else knows it: points joined by straight lines, which go on beyond the first and the last point.
 
-    Nothing hangs over. Another kind of floor is a subclass with a body of its own and all that asks for the points.
-
-    Attributes:
-        body: Its name among the `BODIES` of `warpchain.kernels.contacts.fixed_body`; of two points a slope.
-        points: x and y [m], shape (f + 1, 2).
-        laws: Coefficients of restitution and friction of each of its f faces, shape (f, 2).
+    Nothing hangs over. Another kind of floor is a subclass with a body of its own and all that asks for the points. The
+    body is a name among the `BODIES` of `warpchain.kernels.contacts.fixed_body`, of two points a slope; points are x
+    and y [m], (f + 1, 2), laws coefficients of restitution and friction of the f faces, (f, 2).
     """
 
     def __init__(self, points: ArrayLike, laws: ArrayLike) -> None:
@@ -134,10 +131,7 @@ class Floor:
         return np.vstack([first, self.points[(x > left) & (x < right)], last])
 
     def check_above(self, position: Array, link_length: float, path: str) -> None:
-        """Check that the middle of no circle of links (n, 3) is below the floor, where it would never come out.
-
-        If one is, an `InputError` begins with `path`.
-        """
+        """Refuse links (n, 3) with the middle of a circle below the floor; an `InputError` that begins with `path`."""
         depth = -self.distances(circles_of(position, link_length))
         if depth.max() > 0:
             raise InputError(

@@ -59,10 +59,6 @@ class Options(Section):
     `method` is an integrator or a word of `METHODS_BY_NEED`. A word supplies its own defaults; an explicit `tolerance`
     also replaces its `soft_tolerance`. An integrator has the defaults below, except that the default `tolerance` of
     `hybrid` is `BURST_TOLERANCE`.
-
-    Raises:
-        pydantic.ValidationError: a value is unknown or out of bounds, the smallest step is not below the contact step,
-            the device is not supported, or the method does not run on it.
     """
 
     method: Annotated[str, AfterValidator(_known_method)] = Field(

@@ -50,10 +50,7 @@ def by_section(settings: Mapping[str, object]) -> dict[str, dict[str, object]]:
 
 
 def dotted_name(written: str, path: str) -> str:
-    """Name of the field that is written as name or symbol, with or without its section: `parameters.mu_fc`.
-
-    An `InputError` that begins with `path` says that there is none.
-    """
+    """Name of the field written as name or symbol, with or without its section; `path` is for the `InputError`."""
     section, _, last = written.rpartition(".")
     name: str = validation.full_name(last)
     if name not in SECTION_OF or section not in ("", SECTION_OF[name]):

@@ -159,5 +159,4 @@ def _spread_evenly(curve: Curve, size: float, s: Array) -> Array:
     fine = s[0] + np.linspace(0.0, curve.period(size)[0], 1024)
     speed = np.sqrt(np.sum(curve.points(fine, size)[1] ** 2, axis=0))
     arc = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(fine))])
-    spread: Array = np.interp(arc[-1] * np.arange(len(s)) / len(s), arc, fine)
-    return spread
+    return np.asarray(np.interp(arc[-1] * np.arange(len(s)) / len(s), arc, fine))

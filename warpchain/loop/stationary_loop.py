@@ -126,8 +126,7 @@ class StationaryLoop:
     @property
     def is_free(self) -> NDArray[np.bool_]:
         """Points of the free part, shape (g,)."""
-        inside: NDArray[np.bool_] = (self.s >= self.free[0]) & (self.s <= self.free[1])
-        return inside
+        return np.asarray((self.s >= self.free[0]) & (self.s <= self.free[1]))
 
     @property
     def bottom_curvature(self) -> float:
@@ -234,8 +233,7 @@ def _moved(joints: Array) -> Array:
     links = joints.shape[1]
     turning = np.exp(2j * np.pi * np.arange(links) / links)
     first = np.mean((joints[..., 0] + 1j * joints[..., 1]) * turning, axis=1)
-    moved: Array = -np.unwrap(np.angle(first)) * links / (2 * np.pi)
-    return moved
+    return np.asarray(-np.unwrap(np.angle(first)) * links / (2 * np.pi))
 
 
 class _Harmonics:
@@ -257,8 +255,7 @@ class _Harmonics:
     def at(self, order: int) -> Array:
         """The derivative of some order with respect to q, at POINTS_PER_LINK n even points from q = 0 on, (…, c)."""
         spectrum, points = self._spectrum * (2j * np.pi * self._waves[:, None]) ** order, POINTS_PER_LINK
-        values: Array = points * np.fft.irfft(spectrum, points * self._links, axis=0)
-        return values
+        return np.asarray(points * np.fft.irfft(spectrum, points * self._links, axis=0))
 
     def at_joints(self, order: int, moved: Array) -> Array:
         """The same where the joints are in frames, until which the loop has moved (f,) [links], shape (f, n, c)."""

@@ -197,8 +197,7 @@ def side_box(walk: "WalkResult", joints: Array) -> Array:
 class Film:
     """Draws the frames of one walk; dashed is where the sprocket was at the release.
 
-    Attributes:
-        figure: the picture of the frame that was drawn last; an even number of pixels wide and high, for video.
+    The figure of the frame that was drawn last is an even number of pixels wide and high, for video.
     """
 
     def __init__(self, walk: "WalkResult") -> None:
@@ -267,8 +266,7 @@ class Film:
 
     def _project(self, points: Array) -> Array:
         """Points x, y, z [m], shape (p, 3), in the picture: to the right and up [m], shape (2, p)."""
-        projected: Array = self._view[:2] @ points.T
-        return projected
+        return np.asarray(self._view[:2] @ points.T)
 
     def _draw_floor(self, low: Array, high: Array) -> None:
         """The floor with a square grid, and what its squares measure."""

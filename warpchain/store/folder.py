@@ -204,10 +204,7 @@ def _prepared(folder: Path, sweep: Sweep, manifest: Manifest, fresh: bool) -> Ma
 
 
 def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
-    """The manifest of a folder that is to go on with a sweep, whose manifest in a new folder is given.
-
-    An `InputError` says that it holds another sweep, or one whose samples do not grow to those of this one.
-    """
+    """The manifest of a folder that is to go on with a sweep of this manifest; an `InputError` if it holds another."""
     found = read_manifest(folder)
     if found.numerics_version != NUMERICS_VERSION:
         raise InputError(

@@ -122,8 +122,8 @@ class Manifest:
 def _bounds(walks: int, most: int) -> list[int]:
     """Where the shards of some walks begin, and their end.
 
-    The first four have `FIRST_SHARDS` at most, and every four twice as many as those before: a sweep that is stopped in
-    its first minute has lost seconds.
+    The first four have `FIRST_SHARDS` at most, and every four twice as many as those before, so that a sweep that is
+    stopped in its first minute has lost seconds.
     """
     bounds = [0]
     while bounds[-1] < walks:

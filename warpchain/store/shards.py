@@ -90,10 +90,7 @@ def rows_of(file: "h5py.File", kind: np.dtype[np.void]) -> Rows:
 
 
 def shard_files(directory: Folder) -> list[str]:
-    """Names of all files of shards, sorted; hidden files are ignored.
-
-    An `OSError` says that the folder cannot be read, an `InputError` that there is a file that is none.
-    """
+    """Names of all files of shards, sorted; an `InputError` names one that is none, but for hidden files."""
     folder = Path(directory) / "shards"
     try:
         names = sorted(name for name in os.listdir(folder) if not name.startswith("."))
@@ -109,10 +106,7 @@ def shard_files(directory: Folder) -> list[str]:
 
 @contextmanager
 def opened_shard(directory: Folder, name: str, digest: str) -> "Iterator[h5py.File]":
-    """The shard of a sweep with a digest that was written under this name; an `OSError` if it cannot be read.
-
-    An `InputError` says that it is damaged or belongs to another sweep.
-    """
+    """The shard of a sweep with a digest that was written under this name; else an `InputError`, or an `OSError`."""
     path = Path(directory) / "shards" / name
     with reading_hdf5(path, KIND, "delete it and run the sweep again, which computes only its walks") as file:
         if (file.attrs["name"], file.attrs["digest"]) != (name, digest):

@@ -263,10 +263,7 @@ def _checked(model: type[ModelT], content: object, path: str, source: object) ->
 
 
 def read_walk_file(path: str | os.PathLike[str]) -> tuple[str | None, dict[str, dict[str, Any]]]:
-    """Preset, None if there is none, and values by section and full names, of the YAML file of a walk.
-
-    An `InputError` has a line for each problem: the file cannot be read, or something in it is refused.
-    """
+    """Preset or None, and values by section and full names, of the YAML file of a walk; else an `InputError`."""
     file = _checked(WalkKeys, read_yaml(path), "", path)
     return file.preset, {section: getattr(file, section) for section in SECTIONS}
 

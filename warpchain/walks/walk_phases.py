@@ -41,10 +41,7 @@ _NO_FALL: Mapping[str, float] = {
 
 
 def phase_features(setup: Setup) -> dict[str, Features]:
-    """What kernels are compiled for in the phases of a walk: `driven`, `moving` (beside a sprocket that moves), `free`.
-
-    Only the phases that it has; `free` always.
-    """
+    """What kernels are compiled for in those phases that a walk has: `driven`, `moving` (beside a sprocket), `free`."""
     scene, options = setup.scene, setup.options
 
     def features(body: str, **more: Any) -> Features:
@@ -64,15 +61,12 @@ class WalkRun:
     """One walk on a world, which :meth:`phases` takes from one phase to the next.
 
     Attributes:
-        setup: What the walk is.
         status: RUNNING until the run is over.
         raised: Height [m] by which the chain and its sprocket were raised at the release, and so the height of the
             sprocket's centre above the floor; NaN before the release.
         drive_time: Simulated time [s] before the release.
-        drift: How far the loop moved while it was last watched on its sprocket, relative to its height or width; NaN if
-            it was not watched.
+        drift: Of the loop on its sprocket, see `WalkResult.drift`.
         is_free: Whether the chain walks without a sprocket, and all that its start brings has been done.
-        recorder: What is kept of the motion since the release.
     """
 
     def __init__(self, batch: Batch, world: int, setup: Setup, keep: Keep = NOTHING) -> None:
@@ -200,12 +194,6 @@ class WalkRun:
         return dict(zip(EXTREMES, now.tolist(), strict=True))
 
     @property
-    def attempts(self) -> int:
-        """Attempted steps so far."""
-        counts = self.counts
-        return counts["accepted"] + counts["rejected"]
-
-    @property
     def walk_time(self) -> float:
         """Time [s] since the release."""
         return self._batch.time(self._world) if self._released else 0.0
@@ -269,7 +257,7 @@ class WalkRun:
     def _ending(self, moment: str, event: str, first: int) -> dict[str, Any]:
         """When an event came, after how many bounces begun, and how long after the last impulse on the floor.
 
-        The field of the moment, those named by the event, and the first of the three entries of :attr:`State.watch`.
+        Given is the first of its three entries of :attr:`State.watch`.
         """
         at, bounces, flight = (
             self._batch.watched(self._world, row) if self._released else math.nan for row in range(first, first + 3)
