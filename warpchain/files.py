@@ -1,8 +1,7 @@
 """Files that are written whole or not at all, and what a new file may replace.
 
 A file takes the place of nothing or of a regular file, never of a folder, device, FIFO, socket or symbolic link. A link
-is refused, not followed: a folder of unknown origin could point it at any file. Links among the folders of a path are
-followed.
+is refused, not followed: a folder of unknown origin could point it at any file. Links in the path to it are followed.
 
 Content is written to a part beside the file, `.NAME.01234567.part.SUFFIX`; a killed writer leaves it. An unnamed file
 (O_TMPFILE) was rejected: it cannot replace another one.

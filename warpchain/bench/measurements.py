@@ -60,8 +60,7 @@ def step_costs(device: str, links: Sequence[int], report: Report) -> list[Row]:
     `microseconds` of wall time that an attempted step of one chain takes, `step` [s], the mean accepted one (of SciPy
     the attempted one), `rejected`, the share of attempts (NaN for SciPy, which does not tell), `chain_seconds`
     simulated in a second, and the greatest `position_error` [m] and `velocity_error` [m/s] of a link after
-    `COMPARED_TIME`. An `InputError` says that there is no such device, a `RuntimeError` that a flight did not come to
-    its end.
+    `COMPARED_TIME`. An `InputError` says that there is no such device, a `RuntimeError` that a flight ended early.
     """
     methods = [name for name in method_names() if find_method(name).runs_on_gpus or not on_gpu(device)]
     starts, chains = {n: flying(n, device) for n in links}, CHAINS_ON_GPU if on_gpu(device) else 1

@@ -88,14 +88,6 @@ class Recorded(NamedTuple):
 _STRUCTS: dict[str, Any] = {"model": Model, "drive": Drive, "state": State, "record": Record}
 
 
-def _struct(group: str, arrays: Mapping[str, wp.array]) -> Any:
-    """A struct of kernels with the arrays of its name."""
-    filled = _STRUCTS[group]()
-    for name in _STRUCTS[group].vars:
-        setattr(filled, name, arrays[f"{group}/{name}"])
-    return filled
-
-
 class Batch:
     """W chains on one device, each with its own parameters, state and statistics.
 
@@ -163,8 +155,12 @@ class Batch:
         parts = [{name: fields.pop(name) for name in recorded}, fields]
         self._recorded, self._numbers = (Mirror(part, self.device, self._stream) for part in parts)
         self.host, arrays = self._numbers.host | self._recorded.host, self._numbers.arrays | self._recorded.arrays
-        self._worlds = arrays["worlds"]
-        self.model, self.drive, self.state, self.record = (_struct(group, arrays) for group in _STRUCTS)
+        self._worlds = arrays.pop("worlds")
+        structs = {group: struct() for group, struct in _STRUCTS.items()}
+        for path, array in arrays.items():
+            group, _, name = path.partition("/")
+            setattr(structs[group], name, array)
+        self.model, self.drive, self.state, self.record = structs.values()
         self.host["state/status"][:] = int(Status.FINISHED)
 
         self.control = control_of(options)
@@ -215,9 +211,8 @@ class Batch:
         """Set the state of a world's chain and start its clock at zero; its statistics and watches start anew.
 
         Position, (n, 3), is x, y [m], θ [rad], velocity their rates. The run ends exactly at the stop time [s], with
-        the stop status. Attempts of earlier phases count towards the option `step_limit`. Softness is that of the
-        joints, see :mod:`warpchain.kernels.events.softening`. Frames are taken with samples, or are `frame_interval`
-        apart.
+        the stop status. Attempts of earlier phases count towards the option `step_limit`. Softness is that of joints,
+        see :mod:`warpchain.kernels.events.softening`. Frames are taken with samples, or at `frame_interval`.
         """
         marks = 0 if has_frame_marks else -1
         self.set_state(world, **_BEGINNING, next_frame=marks, softness=softness, attempts_before=attempts_before)

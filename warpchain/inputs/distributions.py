@@ -36,8 +36,6 @@ DRAWABLE: Final = (
 )
 """Quantities that can have a distribution, in the order of drawing."""
 
-_STANDARD: Final = NormalDist()
-
 
 @dataclass(frozen=True)
 class Uniform:
@@ -100,7 +98,7 @@ class Gaussian:
         if lower > 0:  # by symmetry below the mean, where shares near 0 keep their digits
             lower, upper, fraction, scale = -upper, -lower, 1.0 - fraction, -scale
         first, last = _below(lower), _below(upper)
-        return self._placed_mean + scale * _STANDARD.inv_cdf(first + (last - first) * fraction)
+        return self._placed_mean + scale * NormalDist().inv_cdf(first + (last - first) * fraction)
 
     @property
     def _placed_mean(self) -> float:

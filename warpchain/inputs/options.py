@@ -64,12 +64,8 @@ class Options(Section):
     method: Annotated[str, AfterValidator(_known_method)] = Field(
         default="standard",
         json_schema_extra={"enum": [*METHODS_BY_NEED, *METHODS]},
-        description="; ".join(
-            [
-                f"{', '.join(METHODS_BY_NEED)}: an integrator with its settings",
-                *(f"{name}: {title}" for name, title in METHODS.items()),
-            ]
-        ),
+        description=f"{', '.join(METHODS_BY_NEED)}: an integrator with its settings; "
+        + "; ".join(f"{name}: {title}" for name, title in METHODS.items()),
     )
     tolerance: float = number_field(1e-6, "1", **TOLERANCES)
     """error allowed in a step, absolute (SI units) and relative; default of hybrid: 1e-4"""

@@ -255,9 +255,8 @@ def contact_radius(scene: Scene, parameters: Parameters) -> float:
 def fewest_links(scene: Scene, parameters: Parameters) -> int:
     """Least even number of links whose loop can hang round the sprocket.
 
-    A link whose joints are both at least ρ from the centre is seen from there under an angle of at most
-    2 asin(ℓ / 2ρ), and a loop round the sprocket needs 2π in all: n ≥ π / asin(ℓ / 2ρ), with ρ of
-    `joint_radius`.
+    A link whose joints are both at least ρ, the `joint_radius`, from the centre is seen from there under an angle of at
+    most 2 asin(ℓ / 2ρ), and a loop round the sprocket needs 2π in all: n ≥ π / asin(ℓ / 2ρ).
     """
     sine = parameters.link_length / (2 * joint_radius(scene, parameters))
     around = math.ceil(math.pi / math.asin(sine)) if sine < 1 else 2

@@ -30,8 +30,7 @@ class Setup:
     """Everything that says what one walk is, checked and complete.
 
     `preset` is the name of the one that the parameters started from. Without a `start` the walk begins as the scene
-    says. With one, those values of the scene that matter before the release are those of the walk that the state was
-    taken from.
+    says; with one, the scene has values that matter before the release from the walk that the state was taken from.
     """
 
     preset: str

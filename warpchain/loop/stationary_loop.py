@@ -166,8 +166,7 @@ def average_frames(
 ) -> StationaryLoop:
     """The mean loop of frames; a `ValueError` if they are too few, or if the loop does not run clockwise.
 
-    Given are the mean mass m̄ of the links [kg], the sprocket's centre x, y [m], and how far joints on it are from that
-    [m].
+    Given are the mean mass m̄ of the links [kg], the sprocket's centre x, y [m], and how far from it joints ride [m].
     """
     joints = before.frame_joints - center
     frames, links = joints.shape[:2]

@@ -195,10 +195,7 @@ def side_box(walk: "WalkResult", joints: Array) -> Array:
 
 
 class Film:
-    """Draws the frames of one walk; dashed is where the sprocket was at the release.
-
-    The figure of the frame that was drawn last is an even number of pixels wide and high, for video.
-    """
+    """Draws frames of a walk, dashed where the sprocket was at the release; even pixels wide and high, for video."""
 
     def __init__(self, walk: "WalkResult") -> None:
         """Fit the walk and the floor below it into the picture; a `ValueError` if frames are none or broken."""

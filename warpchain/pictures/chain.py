@@ -34,8 +34,7 @@ def circle_radii(walk: "WalkResult") -> Array:
 def link_outlines(joints: Array, radius: Array | float) -> Array:
     """Outlines of links between joints, (n, 2) [m], in a picture: two circles of a radius [m] and a waist between them.
 
-    They are corners of a polygon for each link [m], anticlockwise, (n, c, 2); link i reaches from joint i − 1 to joint
-    i.
+    Each is a polygon with corners [m], anticlockwise, (n, c, 2); link i reaches from joint i − 1 to joint i.
     """
     half = (joints - np.roll(joints, 1, axis=0)) / 2
     middle = joints - half
@@ -62,8 +61,7 @@ def draw_chain(
     """Draw one chain, its rearmost link first; odd links, the outer ones, cover their neighbours.
 
     Given are joints in the room [m], (n, 3), the radius of the circles of each link [m], (n,), colours of inner links,
-    of outer links and of edges, and the width of these [points]. A halo is white around the chain, over what is behind
-    it.
+    of outer links and of edges, and the width of these [points]. A halo is white, over what is behind the chain.
     """
     right, up, depth = view @ joints.T
     outlines = link_outlines(np.stack([right, up], axis=1), radius)

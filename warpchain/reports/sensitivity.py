@@ -21,11 +21,10 @@ _RESAMPLES: Final = 1000
 
 
 class Sensitivity(NamedTuple):
-    """Sobol' indices of the distance in one cell, by which its text tells it, for d drawn quantities of these names.
+    """Sobol' indices of the distance in one cell, which a text describes, for d drawn quantities of some names.
 
     Indices are the share of the variance that each causes by itself, and together with others, (2, d); intervals are
-    bootstrap intervals of these, (2, d, 2). Samples have d + 2 walks each; lost are those of which a walk failed or has
-    not been run yet.
+    bootstrap intervals of these, (2, d, 2). Samples have d + 2 walks each; lost are those that are not complete.
     """
 
     cell: str

@@ -212,7 +212,9 @@ def _run_in_folder(
     report: OnProgress,
 ) -> None:
     """Run what is missing in a folder."""
-    kinds, pulse, at_once = kinds_of(planned), None, workers or processors()
+    axes = (*Options.model_fields, "links", "start", "plane")  # along them kernels may differ
+    kinds = [setup for block in planned.blocks for setup in block.fixed_in(block.cells_along(axes))]
+    pulse, at_once = None, workers or processors()
     if executor is None:
         devices = {setup.options.device for setup in kinds}
         if has_gpu_turn() and any(map(on_gpu, devices)):
@@ -221,7 +223,7 @@ def _run_in_folder(
             start_device(device)  # refuses one that is not there before anything is written
         if all(map(on_gpu, devices)):
             at_once = 1  # the others would wait for it
-    size = shard_size(planned.walk_count)
+    size = max(1, min(SHARD_WALKS, planned.walk_count // SHARDS))  # by the sweep only: equal sweeps leave equal files
     with SweepFolder.open(folder, planned, fresh=fresh, shard_size=size, part=part) as store, ExitStack() as held:
         missing = store.missing()
         walks = sum(map(len, store.manifest.wanted))
@@ -261,11 +263,6 @@ def on_device(planned: Sweep, device: str) -> Sweep:
     return moved
 
 
-def shard_size(walks: int) -> int:
-    """Walks per shard; it depends on the sweep only, so that equal sweeps leave equal files."""
-    return max(1, min(SHARD_WALKS, walks // SHARDS))
-
-
 def run_shards(planned: Sweep, directory: str, stamp: str, shards: Sequence[Shard], pulse: Pulse | None = None) -> None:
     """Run the walks of some shards and write each shard as soon as its walks are over; what a worker does.
 
@@ -295,12 +292,6 @@ def run_shards(planned: Sweep, directory: str, stamp: str, shards: Sequence[Shar
                 motions[shard][row] = run.recorder.motion()
             if (rows[shard]["status"] != MISSING).all():
                 write_shard(directory, stamp, shard, rows.pop(shard), motions.pop(shard))
-
-
-def kinds_of(planned: Sweep) -> list[Setup]:
-    """Setups with all options, numbers of links and starts that walks of a sweep have, but not with all else."""
-    axes = (*Options.model_fields, "links", "start", "plane")
-    return [setup for block in planned.blocks for setup in block.fixed_in(block.cells_along(axes))]
 
 
 def _follow(

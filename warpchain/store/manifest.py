@@ -62,8 +62,7 @@ class Manifest:
     """What a folder holds.
 
     A shard has `shard_size` walks at most, the first ones fewer, see `_bounds`. `versions` are those of the software
-    that began the sweep. Of a `part` (k, N) the folder only has the k-th of N parts of the walks, 1 ≤ k ≤ N; more
-    samples move none.
+    that began the sweep. Of `part` (k, N), 1 ≤ k ≤ N, it only has the k-th of N parts; more samples move no walk.
     """
 
     sweep: Sweep
@@ -142,8 +141,8 @@ def stored_sweep(path: Folder, content: Mapping[str, object]) -> Sweep:
 def read_manifest(directory: Folder) -> Manifest:
     """The manifest of a folder; an `OSError` if that cannot be read.
 
-    An `InputError` says that there is no sweep in it, or one of another version of warpchain, a `DamagedFileError` that
-    its sweep.h5 is damaged.
+    An `InputError` says that there is no sweep in it, or one of another version, a `DamagedFileError` that it is
+    damaged.
     """
     path = Path(directory) / "sweep.h5"
     if not os.path.lexists(path):

@@ -39,8 +39,7 @@ def walks_per_sample(sampler: str, dimensions: int) -> int:
 def check_design(sampler: str, samples: int, dimensions: int, path: str) -> None:
     """Check that a sampler can make a number of samples of so many drawn quantities.
 
-    An `InputError`, which begins with `path`, says that samples would all be equal, are too many, or break the balance
-    of a Sobol' sequence.
+    An `InputError`, which begins with `path`, says that samples would be equal, too many, or no balanced sequence.
     """
     if dimensions == 0:
         if sampler == "saltelli":

@@ -77,7 +77,11 @@ _SWITCH: Final = BeforeValidator(
 
 
 class Recording(BaseModel):
-    """What a sweep keeps of the motion of its walks; frames of samples whose series are not kept are refused."""
+    """What a sweep keeps of the motion of its walks.
+
+    Raises:
+        pydantic.ValidationError: a value is refused, or frames are chosen of samples whose series are not.
+    """
 
     model_config = STRICT
 

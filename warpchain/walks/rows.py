@@ -70,8 +70,7 @@ COLUMNS: Final = {
 }
 """Columns of every sweep; behind them comes one for each quantity that the sweep draws, see `drawn_column`.
 
-What is missing, or does not exist (the distance of a walk that failed), is NaN in a column of floats and −1 in one of
-integers.
+What is missing, or does not exist (the distance of a walk that failed), is NaN among floats and −1 among integers.
 """
 
 
