@@ -86,6 +86,13 @@ def changing_line(in_terminals: bool = True, every: float = math.inf) -> Iterato
             print(file=stream)
 
 
+@contextlib.contextmanager
+def progress_bar() -> Iterator[OnProgress]:
+    """Yield a function that shows progress as a bar, without a terminal and a notebook once a minute."""
+    with changing_line(every=LINE_EVERY) as show:
+        yield lambda progress: show(progress_text(progress))
+
+
 def progress_text(progress: SweepProgress) -> str:
     """How far a sweep is, in one line."""
     if progress.compiling:

@@ -24,8 +24,7 @@ from warpchain.inputs.options import Options, on_gpu
 from warpchain.inputs.sections import SECTION_OF, by_section, takes_fields
 from warpchain.inputs.setup import DEFAULT_PRESET, Setup
 from warpchain.inputs.validation import InputError, Whole, by_name, checked, checked_path, plain, shown, validated
-from warpchain.run import progress_bar
-from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text
+from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text, progress_bar
 from warpchain.run.workers import Pulse, losses_named, pulsing_threads
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
@@ -120,15 +119,10 @@ def sweep(
     if hasattr(executor, "get_executor"):
         count = count or sum(executor.nthreads().values())
         executor = executor.get_executor(pure=False)  # pure: a task that failed would fail again, unrun
-    with progress_bar.changing_line(every=progress_bar.LINE_EVERY) as show:
-
-        def report(done: SweepProgress) -> None:
-            if on_progress is not None:
-                on_progress(done)
-            elif progress:
-                show(progress_bar.progress_text(done))
-
-        _run_in_folder(planned, folder, executor, count, fresh, own, report)
+    with ExitStack() as shown:
+        if on_progress is None:
+            on_progress = shown.enter_context(progress_bar()) if progress else lambda progress: None
+        _run_in_folder(planned, folder, executor, count, fresh, own, on_progress)
     return load(folder)
 
 

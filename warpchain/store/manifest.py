@@ -139,11 +139,7 @@ def stored_sweep(path: Folder, content: Mapping[str, object]) -> Sweep:
 
 
 def read_manifest(directory: Folder) -> Manifest:
-    """The manifest of a folder; an `OSError` if that cannot be read.
-
-    An `InputError` says that there is no sweep in it, or one of another version, a `DamagedFileError` that it is
-    damaged.
-    """
+    """The manifest of a folder; an `OSError` if unreadable, an `InputError` if it holds no sweep of this version."""
     path = Path(directory) / "sweep.h5"
     if not os.path.lexists(path):
         if not os.path.exists(directory):

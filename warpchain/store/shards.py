@@ -106,7 +106,7 @@ def shard_files(directory: Folder) -> list[str]:
 
 @contextmanager
 def opened_shard(directory: Folder, name: str, digest: str) -> "Iterator[h5py.File]":
-    """The shard of a sweep with a digest that was written under this name; else an `InputError`, or an `OSError`."""
+    """The shard of this name and digest; an `OSError` if it is unreadable, an `InputError` if damaged or foreign."""
     path = Path(directory) / "shards" / name
     with reading_hdf5(path, KIND, "delete it and run the sweep again, which computes only its walks") as file:
         if (file.attrs["name"], file.attrs["digest"]) != (name, digest):
