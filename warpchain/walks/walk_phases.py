@@ -7,6 +7,7 @@ the release.
 
 import math
 from collections.abc import Iterator, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -43,11 +44,8 @@ _NO_FALL: Mapping[str, float] = {
 def phase_features(setup: Setup) -> dict[str, Features]:
     """What kernels are compiled for in those phases that a walk has: `driven`, `moving` (beside a sprocket), `free`."""
     scene, options = setup.scene, setup.options
-
-    def features(body: str, **more: Any) -> Features:
-        columns = layout.padded_width(scene.links)
-        return Features(options.method, columns, body, self_contact=options.self_contact, **more)
-
+    columns = layout.padded_width(scene.links)
+    features = partial(Features, options.method, columns, self_contact=options.self_contact)
     body, tilts = setup.floor.body, scene.plane == "tilting"
     found = {"free": features(body, tilts=tilts)}
     if setup.has_drive:
