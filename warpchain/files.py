@@ -1,8 +1,7 @@
 """Files that are written whole or not at all, and what a new file may replace.
 
 A file takes the place of nothing or of a regular file, never of a folder, device, FIFO, socket or symbolic link. A link
-is refused, not followed: a folder of unknown origin could point it at any file. Links among the folders of a path are
-followed.
+is refused, not followed: a folder of unknown origin could point it at any file. Links in the path to it are followed.
 
 Content is written to a part beside the file, `.NAME.01234567.part.SUFFIX`; a killed writer leaves it. An unnamed file
 (O_TMPFILE) was rejected: it cannot replace another one.
@@ -27,12 +26,7 @@ class NotReplaceable(OSError):  # noqa: N818 - the path is refused, nothing went
 
 
 class Kind(NamedTuple):
-    """A kind of file by its content.
-
-    Attributes:
-        name: what it is called.
-        has: whether a regular file is of the kind; called with its path.
-    """
+    """A kind of file by its content: what it is called, and whether the regular file at a path is of it."""
 
     name: str
     has: Callable[[Path], bool]
@@ -56,18 +50,10 @@ def given_path(path: str | os.PathLike[str]) -> Path:
 
 
 def checked_output(path: str | os.PathLike[str], only: Kind | None = None) -> Path:
-    """Decide whether a file may be written to a path; everything that writes files for a user asks here.
+    """The path, if a file may be written there; everything that writes files for a user asks here.
 
-    Args:
-        path: the file.
-        only: the kind of file that may be replaced; None for any regular file.
-
-    Returns:
-        The path.
-
-    Raises:
-        NotReplaceable: there is something else than a regular file, or a file of another kind.
-        OSError: it is no path, or the folder is not there.
+    Replaced may be any regular file, or `only` one of a kind; a `NotReplaceable` says that something else is there. An
+    `OSError` says that it is no path, or that the folder is not there.
     """
     target = given_path(path)
     with naming(target):
@@ -91,13 +77,8 @@ def replacing(path: str | os.PathLike[str], only: Kind | None = None) -> Iterato
     The data reach the disk before the part is renamed. So `path` is at any moment, even after a power cut, either the
     old or the whole new file. The block must not replace the part by another file.
 
-    Args:
-        path: the file.
-        only: see `checked_output`.
-
-    Raises:
-        NotReplaceable: see `checked_output`.
-        OSError: the file cannot be written; one line that names it, with the number of the cause. No part is left.
+    Errors are those of `checked_output`, and an `OSError` of one line that names the file, with the number of the
+    cause, if it cannot be written. No part is left.
     """
     target = checked_output(path, only)
     part = target.with_name(f".{target.stem}.{secrets.token_hex(4)}.part{target.suffix}")

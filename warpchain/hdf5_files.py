@@ -38,14 +38,10 @@ _FIXED: Final[dict[str, Any]] = {"libver": ("v108", "v108"), "track_order": True
 
 @dataclass(frozen=True)
 class Stored:
-    """Annotation of a field that files keep: a number, an array, or a dictionary of numbers.
+    """Annotation of a field that files keep: a number, an array, or a dictionary of numbers by `keys` with meanings.
 
-    Attributes:
-        unit: SI unit, "1" for pure numbers.
-        meaning: one line saying what the numbers are.
-        shape: of an array, such as "t 2" for an array of shape (t, 2); t instants, f frames, n links.
-        empty: when an array has no instants or frames, although there are some; "" if that is never so.
-        keys: of a dictionary its keys and their meanings.
+    Its SI unit, "1" for pure numbers, and its meaning in one line. The shape of an array is such as "t 2" for (t, 2): t
+    instants, f frames, n links; `empty` says when it has no instants or frames although there are some, "" if never.
     """
 
     unit: str
@@ -82,13 +78,9 @@ def stored_fields(kind: type) -> dict[str, Stored]:
 def write_fields(
     group: "h5py.Group", values: Mapping[str, Any], kept: Mapping[str, Stored], joints: type = np.float64
 ) -> None:
-    """Write annotated fields with units and meanings; arrays without numbers are left out.
+    """Write `kept` fields, see `stored_fields`, with units and meanings; arrays without numbers are left out.
 
-    Args:
-        group: where to.
-        values: name → value of each field.
-        kept: the fields, see `stored_fields`.
-        joints: precision of what each joint has in each frame.
+    What each joint has in each frame gets the precision of `joints`.
     """
     for name, stored in kept.items():
         for key, meaning in (stored.keys or {"": stored.described}).items():
@@ -125,8 +117,7 @@ def read_fields(group: "h5py.Group", kept: Mapping[str, Stored], links: int) -> 
 def hdf5_image(kind: str, fill: "Callable[[h5py.File], None]") -> bytes:
     """The bytes of an HDF5 file of some kind that `fill` fills; equal content gives equal bytes.
 
-    The file is made in memory, because HDF5 fails badly on a full disk: it neither says what is wrong nor closes the
-    file.
+    It is made in memory: on a full disk HDF5 neither says what is wrong nor closes the file.
     """
     import h5py
 
@@ -143,13 +134,10 @@ def hdf5_image(kind: str, fill: "Callable[[h5py.File], None]") -> bytes:
 def reading_hdf5(
     path: str | os.PathLike[str], kind: str | None, remedy: str, wanted: str | None = None
 ) -> "Iterator[h5py.File]":
-    """An HDF5 file that `hdf5_image` made, undamaged and of the right kind.
+    """An HDF5 file that `hdf5_image` made, undamaged and of a kind, or of any if that is None.
 
-    Args:
-        path: the file.
-        kind: its kind; None for any.
-        remedy: what to do about a damaged or an older file.
-        wanted: which file to give instead of one of another kind; None if a sweep has it in its folder.
+    The remedy says what to do about a damaged or an older file; `wanted`, which file to give instead of one of another
+    kind, is None of files that a sweep has in its folder.
 
     Raises:
         OSError: it cannot be read.

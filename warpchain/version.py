@@ -18,10 +18,7 @@ def package_versions() -> dict[str, str]:
 
 
 def version_refusal(found: int, remedy: str) -> str | None:
-    """Why a file is refused whose format version was `found`; None if it is that of this warpchain.
-
-    The remedy says how to get an older file's content in this version.
-    """
+    """Why a file of a format version is refused, with the remedy for an older one; None if it is this warpchain's."""
     if found == FORMAT_VERSION:
         return None
     if found > FORMAT_VERSION:

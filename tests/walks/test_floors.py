@@ -12,7 +12,6 @@ from tests.kernels.contacts.test_terrain import BOX, SOFT
 from tests.support.blocks_under_test import floor_with
 from warpchain import Status
 from warpchain.pictures.animation import player
-from warpchain.pictures.chain import floor_line
 
 STEP = [[-1.0, 0.0], [0.1, 0.0], [0.1, -0.05], [1.0, -0.05]]
 
@@ -93,7 +92,7 @@ def test_a_profile_survives_files_and_is_drawn(tmp_path: Path) -> None:
     assert loaded.setup == walk.setup and [list(point) for point in loaded.setup.scene.floor] == STEP
     assert loaded.dx == loaded.center[-1, 0]
     line = [[-0.5, 0.0], [0.1, 0.0], [0.1, -0.05], [0.5, -0.05]]
-    assert np.allclose(floor_line(loaded, -0.5, 0.5), line)
+    assert np.allclose(loaded.setup.floor.line(-0.5, 0.5), line)
     drawn = json.loads(re.search(r"const walk = (.*);", player(loaded))[1])["floor"]
     assert drawn[1:4] == [[-10000, 0], [1000, 0], [1000, -500]]
     low = loaded.plot("film_strip").axes[0].get_ylim()[0]

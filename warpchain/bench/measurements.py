@@ -56,21 +56,11 @@ WALK: Final[Row] = {"links": 60, "frequency": 15.0, "start": "spinning"}
 def step_costs(device: str, links: Sequence[int], report: Report) -> list[Row]:
     """Cost and error of a step of all methods of a device, and of SciPy's DOP853, at default tolerances.
 
-    Args:
-        device: ``"cpu"``, ``"cuda"``, ``"cuda:N"`` or ``"fibers"``.
-        links: Numbers of links, even, at least 4.
-        report: Called with a line of progress.
-
-    Returns:
-        For each number of links and method: `links`, `method`, `tolerance`, `chains` that fly side by side,
-        `microseconds` of wall time that an attempted step of one chain takes, `step` [s], the mean accepted one (of
-        SciPy the attempted one), `rejected`, the share of attempts (NaN for SciPy, which does not tell),
-        `chain_seconds` simulated in a second, and the greatest `position_error` [m] and `velocity_error` [m/s] of a
-        link after `COMPARED_TIME`.
-
-    Raises:
-        InputError: There is no such device.
-        RuntimeError: A flight did not come to its end.
+    For each even number of links and each method: `links`, `method`, `tolerance`, `chains` that fly side by side,
+    `microseconds` of wall time that an attempted step of one chain takes, `step` [s], the mean accepted one (of SciPy
+    the attempted one), `rejected`, the share of attempts (NaN for SciPy, which does not tell), `chain_seconds`
+    simulated in a second, and the greatest `position_error` [m] and `velocity_error` [m/s] of a link after
+    `COMPARED_TIME`. An `InputError` says that there is no such device, a `RuntimeError` that a flight ended early.
     """
     methods = [name for name in method_names() if find_method(name).runs_on_gpus or not on_gpu(device)]
     starts, chains = {n: flying(n, device) for n in links}, CHAINS_ON_GPU if on_gpu(device) else 1
@@ -104,14 +94,9 @@ def flying(links: int, device: str = "cpu") -> State:
 
 
 def fly(start: State, method: str, chains: int, device: str) -> tuple[State, float, int, int]:
-    """Carry identical chains of a batch through the air.
+    """Carry identical chains of a batch through the air; a `RuntimeError` says that one did not come to the end.
 
-    Returns:
-        State of a chain after `COMPARED_TIME`; from then on: wall time [s], accepted and rejected steps of a chain.
-
-    Raises:
-        InputError: There is no such device.
-        RuntimeError: A chain did not come to the end.
+    The state of a chain after `COMPARED_TIME`; from then on wall time [s], accepted and rejected steps of a chain.
     """
     worlds, links = range(chains), len(start[0])
     with gpu_turn([device]):

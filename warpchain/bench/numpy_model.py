@@ -7,11 +7,9 @@ shares no code with the kernels.
 import time
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.parameters import Parameters
-
-Array = NDArray[np.float64]
 
 STAGES = 12
 """Evaluations of the equations in an attempted step of DOP853."""
@@ -53,11 +51,7 @@ def fly(
 ) -> tuple[tuple[Array, Array], float, float]:
     """Integrate a chain in flight by SciPy's DOP853, at a tolerance that is absolute (SI units) and relative.
 
-    Returns:
-        Position and velocity after the duration [s], wall time [s], and attempted steps, accepted or not.
-
-    Raises:
-        RuntimeError: SciPy failed.
+    Position and velocity after the duration [s], wall time [s], and attempted steps, accepted or not.
     """
     from scipy.integrate import solve_ivp
 

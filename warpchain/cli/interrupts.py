@@ -26,11 +26,9 @@ def interrupts_heard() -> Iterator[Callable[[], bool]]:
 
     Outside of the main thread, and where somebody else handles or ignores the signal, nothing is changed.
     """
-    if threading.current_thread() is not threading.main_thread():
-        yield lambda: False
-        return
     usual_handler, usual_hook = signal.getsignal(signal.SIGINT), sys.unraisablehook
-    if usual_handler is not signal.default_int_handler:
+    is_main = threading.current_thread() is threading.main_thread()
+    if not is_main or usual_handler is not signal.default_int_handler:
         yield lambda: False
         return
     heard = False

@@ -54,20 +54,26 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 
 def _refuse_for(error: Exception) -> None:
     """Print what was refused or failed, and exit; return if the error is a defect of the program."""
-    from warpchain.inputs.validation import DamagedFileError, InputError
+    from warpchain.inputs.validation import DamagedFileError, InputError, one_line
     from warpchain.run.workers import LostWorkersError
 
+    problems, status = [str(error)], REFUSED
     if isinstance(error, typer.TyperException):
         context = getattr(error, "ctx", None)
         command = context.command_path if context is not None else "warpchain"
         remedy = FORMER_OPTIONS.get(getattr(error, "option_name", ""), f"see {command} --help")
-        _refuse([f"{error.format_message().rstrip('.')}; {remedy}"], error.exit_code)
-    if isinstance(error, OSError):
-        _refuse([str(error)], FAILED if error.errno in DISK_FAILURES else REFUSED)
-    if isinstance(error, InputError):
-        _refuse(error.args, FAILED if isinstance(error, DamagedFileError) else REFUSED)
-    if isinstance(error, LostWorkersError):
-        _refuse([str(error)], FAILED)
+        problems, status = [f"{error.format_message().rstrip('.')}; {remedy}"], error.exit_code
+    elif isinstance(error, OSError):
+        status = FAILED if error.errno in DISK_FAILURES else REFUSED
+    elif isinstance(error, InputError):
+        problems, status = [*error.args], FAILED if isinstance(error, DamagedFileError) else REFUSED
+    elif isinstance(error, LostWorkersError):
+        status = FAILED
+    else:
+        return
+    for problem in problems:
+        print(one_line(problem, "error: "), file=sys.stderr)
+    sys.exit(status)
 
 
 @contextlib.contextmanager
@@ -86,15 +92,6 @@ def _warnings_on_one_line() -> Iterator[None]:
 
         warnings.showwarning = show
         yield
-
-
-def _refuse(problems: Sequence[str], status: int = REFUSED) -> NoReturn:
-    """Print each problem on a line of its own and exit."""
-    from warpchain.inputs.validation import one_line
-
-    for problem in problems:
-        print(one_line(problem, "error: "), file=sys.stderr)
-    sys.exit(status)
 
 
 def _print_version(wanted: bool) -> None:

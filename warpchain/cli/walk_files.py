@@ -21,10 +21,7 @@ _PICTURES: Final = (*(f"{kind}.png" for kind in get_args(Kind)), "walk.gif")
 
 
 def saved(path: Path, wanted: str) -> "WalkResult | SweepResult":
-    """The walk or the sweep of a file or a folder; an `OSError` if it cannot be read.
-
-    If it is neither, an `InputError` says what is `wanted` in its place.
-    """
+    """The walk or the sweep of a file or a folder; else an `InputError` says what is `wanted` in its place."""
     from warpchain.hdf5_files import kind_of_hdf5
     from warpchain.store.sweep_result import KIND, load
     from warpchain.walks.walk_result import load_walk
@@ -35,10 +32,7 @@ def saved(path: Path, wanted: str) -> "WalkResult | SweepResult":
 
 
 def try_walk_folder(folder: Path) -> None:
-    """Check before a walk that all its files can be written to a folder; nothing is left there.
-
-    If one cannot, an `OSError` of one line names it or the folder.
-    """
+    """Check before a walk that all its files can be written to a folder, by an `OSError`; nothing is left there."""
     nearest = folder.absolute()
     with naming(folder):
         while True:
@@ -57,8 +51,7 @@ def try_walk_folder(folder: Path) -> None:
 def write_walk(result: "WalkResult", folder: Path) -> Iterator[Path]:
     """Write the record, then its film strip, whole or not at all; yield the path of each.
 
-    Figures and film of an earlier walk are deleted: they do not belong to this record. An `OSError` says that a file
-    cannot be written.
+    Figures and film of an earlier walk, which do not belong to this record, are deleted.
     """
     make_folder(folder)
     result.save(folder / RECORD)
@@ -69,10 +62,7 @@ def write_walk(result: "WalkResult", folder: Path) -> Iterator[Path]:
 
 
 def draw_figures(walk: "WalkResult", folder: Path, kinds: Iterable[Kind]) -> Iterator[Path]:
-    """Draw figures into a folder; yield the path of each, and say on stderr which a walk has nothing for, and why.
-
-    An `OSError` says that a file cannot be written.
-    """
+    """Draw figures into a folder; yield the path of each, and say on stderr which a walk has nothing for, and why."""
     from warpchain.pictures.style import save_figure
 
     for kind in kinds:

@@ -15,6 +15,7 @@ from warpchain.engine.devices import Gpu, start_device
 from warpchain.engine.kernel_choice import block_threads, step_kernel
 from warpchain.engine.mirror import Mirror
 from warpchain.engine.tallies import COUNTS, EXTREMES, LOSSES
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.floor import Floor
 from warpchain.inputs.link_values import LinkValues, alternating
 from warpchain.inputs.options import Options
@@ -28,8 +29,6 @@ from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.functions import board_rows
 from warpchain.kernels.types import LOADING_TIME, Drive, Model, Record, State
 from warpchain.status import Status
-
-Array = NDArray[np.float64]
 
 FIRST_STEP = 1e-7  # s; it may grow fivefold per step
 LANES = 3
@@ -72,15 +71,11 @@ _BEGINNING = _beginning()
 
 
 class Recorded(NamedTuple):
-    """What launches have recorded of a chain of n links: t samples and f frames.
+    """What launches have recorded of a chain of n links: t samples and f frames, see :mod:`warpchain.kernels.layout`.
 
-    Attributes:
-        samples: shape (t, SAMPLE_COLUMNS), or ALL_COLUMNS if planes are kept, see :mod:`warpchain.kernels.layout`.
-        times: of the frames [s], shape (f,).
-        frames: joints x, y [m], shape (f, n, 2).
-        loads: force x, y [N] and moment [N m] of each joint on the link before it, shape (f, n, 3); f is 0 if they
-            are not kept.
-        planes: of the frames, shape (f, PLANE_VALUES); f is 0 if they are not kept.
+    Samples are (t, SAMPLE_COLUMNS), or ALL_COLUMNS if planes are kept; of the frames there are times [s], (f,), joints
+    x, y [m], (f, n, 2), loads: force x, y [N] and moment [N m] of each joint on the link before it, (f, n, 3), and
+    planes, (f, PLANE_VALUES). Of loads and planes that are not kept f is 0.
     """
 
     samples: Array
@@ -93,24 +88,12 @@ class Recorded(NamedTuple):
 _STRUCTS: dict[str, Any] = {"model": Model, "drive": Drive, "state": State, "record": Record}
 
 
-def _struct(group: str, arrays: Mapping[str, wp.array]) -> Any:
-    """A struct of kernels with the arrays of its name."""
-    filled = _STRUCTS[group]()
-    for name in _STRUCTS[group].vars:
-        setattr(filled, name, arrays[f"{group}/{name}"])
-    return filled
-
-
 class Batch:
     """W chains on one device, each with its own parameters, state and statistics.
 
-    The host may read and change any world between launches.
-
-    Attributes:
-        host: Arrays of the structs in :mod:`warpchain.kernels.types` by name, such as ``state/time``.
-        threads: That carry a chain.
-        bytes: Memory that they take on the device.
-        records: Whether samples or frames are kept.
+    The host may read and change any world between launches: `host` has the arrays of the structs in
+    :mod:`warpchain.kernels.types` by name, such as ``state/time``. So many `threads` carry a chain, `bytes` is the
+    memory of all on the device, and `records` says whether samples or frames are kept.
     """
 
     def __init__(
@@ -126,18 +109,11 @@ class Batch:
         tilts: bool = False,
         faces: int = 1,
     ) -> None:
-        """Allocate a batch. All worlds are idle (status FINISHED) until a chain is loaded.
+        """Allocate a batch of so many worlds, which are idle (status FINISHED) until a chain is loaded.
 
-        Args:
-            worlds: Number of chains W.
-            longest: Greatest number of links of a chain that will be loaded.
-            options: Shared by all worlds.
-            keeps_samples: Keep the time series.
-            frame_every: Keep all joint positions at every so many samples; None keeps none.
-            frame_interval: Time [s] between the frames of chains that are loaded with frame marks of their own.
-            keeps_loads: Keep force and moment of every joint with each frame.
-            tilts: Keep the plane of the chain with samples and frames.
-            faces: Most faces of a floor.
+        Chains have at most `longest` links, floors at most so many faces. Kept are the time series, joint positions at
+        every so many samples (None: no frames) or, of chains with frame marks of their own, at an interval [s], and
+        with each frame force and moment of every joint; if planes tilt, these with samples and frames.
         """
         self.options = options
         self.device = start_device(options.device)
@@ -179,8 +155,12 @@ class Batch:
         parts = [{name: fields.pop(name) for name in recorded}, fields]
         self._recorded, self._numbers = (Mirror(part, self.device, self._stream) for part in parts)
         self.host, arrays = self._numbers.host | self._recorded.host, self._numbers.arrays | self._recorded.arrays
-        self._worlds = arrays["worlds"]
-        self.model, self.drive, self.state, self.record = (_struct(group, arrays) for group in _STRUCTS)
+        self._worlds = arrays.pop("worlds")
+        structs = {group: struct() for group, struct in _STRUCTS.items()}
+        for path, array in arrays.items():
+            group, _, name = path.partition("/")
+            setattr(structs[group], name, array)
+        self.model, self.drive, self.state, self.record = structs.values()
         self.host["state/status"][:] = int(Status.FINISHED)
 
         self.control = control_of(options)
@@ -203,15 +183,7 @@ class Batch:
     def set_chain(
         self, world: int, parameters: Parameters, links: int, own: LinkValues | None = None, scene: Scene | None = None
     ) -> None:
-        """Set parameters and number of links of a world's chain.
-
-        Args:
-            world: Index.
-            parameters: The chain's parameters.
-            links: Number of links.
-            own: What each link and joint has of its own; None: inner and outer links alternate.
-            scene: Of its walk; None: there is no sprocket.
-        """
+        """Set a world's chain; without values of its own, links alternate, and without a scene there is no sprocket."""
         own = own or alternating(parameters, links)
         self.links[world] = links
         self.host["model/chains"][world] = constants_of(parameters, own, scene)
@@ -238,15 +210,9 @@ class Batch:
     ) -> None:
         """Set the state of a world's chain and start its clock at zero; its statistics and watches start anew.
 
-        Args:
-            world: Index.
-            position: (n, 3): x, y [m], θ [rad].
-            velocity: (n, 3), their rates.
-            stop_time: Time [s] at which the run ends, exactly.
-            stop_status: Status it ends with.
-            attempts_before: Attempts of earlier phases, which count towards the option `step_limit`.
-            softness: Softness of the joints, see :mod:`warpchain.kernels.events.softening`.
-            has_frame_marks: Whether frames are `frame_interval` apart, instead of taken with samples.
+        Position, (n, 3), is x, y [m], θ [rad], velocity their rates. The run ends exactly at the stop time [s], with
+        the stop status. Attempts of earlier phases count towards the option `step_limit`. Softness is that of joints,
+        see :mod:`warpchain.kernels.events.softening`. Frames are taken with samples, or at `frame_interval`.
         """
         marks = 0 if has_frame_marks else -1
         self.set_state(world, **_BEGINNING, next_frame=marks, softness=softness, attempts_before=attempts_before)
@@ -301,12 +267,9 @@ class Batch:
         return ATTEMPTS["cpu" if self._gpu is None else "gpu"]
 
     def run(self, worlds: Sequence[int], features: Features, after_launch: Callable[[], None] | None = None) -> None:
-        """Carry worlds on until none of them is running. Results do not depend on how a run is cut into launches.
+        """Carry worlds on until none of them is running; after each launch the record may be drained.
 
-        Args:
-            worlds: Indices.
-            features: What the kernel is compiled for.
-            after_launch: Called after each launch, to drain the record.
+        Results do not depend on how a run is cut into launches.
         """
         while active := [world for world in worlds if self.statuses()[world] == Status.RUNNING]:
             self.launch(active, features)
@@ -383,23 +346,15 @@ class Batch:
 
     def counts(self, world: int) -> dict[str, int]:
         """Counters since loading."""
-        row = self.host["state/counts"][world]
-        return {name: int(value) for name, value in zip(COUNTS, row, strict=True)}
-
-    def attempts(self, world: int) -> int:
-        """Attempted steps since loading, accepted or not."""
-        counts = self.counts(world)
-        return counts["accepted"] + counts["rejected"]
+        return dict(zip(COUNTS, self.host["state/counts"][world].tolist(), strict=True))
 
     def extremes(self, world: int) -> dict[str, float]:
         """Greatest joint opening and depths [m] since loading."""
-        row = self.host["state/extremes"][world]
-        return {name: float(value) for name, value in zip(EXTREMES, row, strict=True)}
+        return dict(zip(EXTREMES, self.host["state/extremes"][world].tolist(), strict=True))
 
     def losses(self, world: int) -> dict[str, float]:
         """Energy [J] lost since loading, by cause."""
-        row = self.host["state/losses"][world]
-        return {name: float(value) for name, value in zip(LOSSES, row, strict=True)}
+        return dict(zip(LOSSES, self.host["state/losses"][world].tolist(), strict=True))
 
     def first_sample(self, world: int) -> Array:
         """The sample taken when the run began: (SAMPLE_COLUMNS,), see :mod:`warpchain.kernels.layout`."""

@@ -10,13 +10,7 @@ from warpchain.kernels.types import CHAIN_NUMBERS
 
 
 def constants_of(parameters: Parameters, own: LinkValues, scene: Scene | None) -> NDArray[np.void]:
-    """An element of :attr:`Model.chains`.
-
-    Args:
-        parameters: Each fills the field of its name, if there is one.
-        own: What each link and joint has of its own.
-        scene: Says what else kernels need to know through all of a walk; None: nothing.
-    """
+    """An element of :attr:`Model.chains`; parameters fill the fields of their names, a scene adds what it decides."""
     half = parameters.link_length / 2
     values = vars(parameters) | {
         "link_count": len(own.mass),

@@ -9,13 +9,13 @@ import sys
 import tempfile
 import threading
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import warp as wp
 
 from warpchain.engine.fibers import HeldStream
-from warpchain.engine.kernel_cache import cache_refusal, load_checked
+from warpchain.engine.kernel_cache import cache_refusal
 from warpchain.inputs.options import FIBERS, on_gpu
 from warpchain.inputs.validation import InputError
 from warpchain.version import package_versions
@@ -30,34 +30,17 @@ _gpu_users: list[int] = []
 
 
 class Device:
-    """A CPU: a launch carries on its chains one after the other, in one thread each.
-
-    Attributes:
-        warp: What Warp calls the device.
-    """
+    """A CPU: a launch carries on its chains one after the other, in one thread each."""
 
     def __init__(self, warp: wp.Device) -> None:
-        """Prepare to use it."""
+        """Prepare to use what Warp has for it."""
         self.warp = warp
-
-    def prepare(self) -> None:
-        """Make what the first use would make, before several threads use it at once."""
-
-    def host_array(self, shape: tuple[int, ...], dtype: Any) -> wp.array:
-        """An array of zeros on the host, from and to which the device can copy."""
-        return wp.zeros(shape, dtype=dtype, device="cpu")
-
-    def load(self, entry: wp.Kernel, make: Callable[[], wp.Module]) -> None:
-        """Load the kernel of an entry; it is made and compiled if the cache does not have it."""
-        load_checked(entry.module, self.warp, make)
 
 
 class Gpu(Device):
     """A GPU: a block of threads carries on a chain; copies and launches wait in streams."""
 
-    def prepare(self) -> None:
-        """Make Warp's streams of the device."""
-        _ = self.warp.stream
+    pins_memory = True  # of the host, so that copies wait in streams as well
 
     @property
     def multiprocessors(self) -> int:
@@ -71,12 +54,8 @@ class Gpu(Device):
 
     @property
     def filling(self) -> Any:
-        """The stream in which new arrays are filled."""
+        """The stream in which new arrays are filled; Warp makes it when it is first asked for."""
         return self.warp.stream
-
-    def host_array(self, shape: tuple[int, ...], dtype: Any) -> wp.array:
-        """As on a CPU, but in pinned memory, so that copies wait in streams as well."""
-        return wp.zeros(shape, dtype=dtype, device="cpu", pinned=True)
 
     def stream(self) -> Any:
         """A new stream."""
@@ -101,6 +80,7 @@ class Fibers(Gpu):
     The host does all that it does for a GPU. What waits in a stream is done when the host waits for it.
     """
 
+    pins_memory = False  # which takes CUDA
     multiprocessors = 1
     free_memory = 2**28
     filling = HeldStream()  # arrays on a CPU are filled at once
@@ -109,13 +89,6 @@ class Fibers(Gpu):
         """Let Warp run blocks of several threads on a CPU."""
         super().__init__(warp)
         wp.config.enable_cpu_blocks = True
-
-    def prepare(self) -> None:
-        """There is nothing to make."""
-
-    def host_array(self, shape: tuple[int, ...], dtype: Any) -> wp.array:
-        """As on a CPU: memory cannot be pinned without CUDA."""
-        return Device.host_array(self, shape, dtype)
 
     def stream(self) -> HeldStream:
         """A new stream."""
@@ -136,11 +109,7 @@ class Fibers(Gpu):
 
 
 def start_device(device: str) -> Device:
-    """Start Warp and return the device.
-
-    Raises:
-        InputError: This machine has no such device.
-    """
+    """Start Warp and return the device; an `InputError` says that this machine has none of that name."""
     with _start_lock:
         return _started(device)
 
@@ -174,17 +143,13 @@ def start_early(device: str) -> None:
 
     def start() -> None:
         with gpu_turn([device]):
-            start_device(device).prepare()
+            _ = start_device(device).warp.stream  # Warp makes it when it is first asked for
 
     concurrent.futures.ThreadPoolExecutor(1).submit(start)
 
 
 def gpu_count() -> int:
-    """Number of GPUs that this process may use, from 1 on.
-
-    Raises:
-        InputError: There is none.
-    """
+    """Number of GPUs that this process may use, from 1 on; an `InputError` says that there is none."""
     start_device("cuda")
     return int(wp.get_cuda_device_count())
 
@@ -195,14 +160,8 @@ def gpu_turn(devices: Iterable[str], stop: threading.Event | None = None) -> Ite
 
     Warp's CUDA runtime has no locks (its issue 1491): a process in which two threads make and free streams and arrays
     may crash. So whatever is on a GPU must be made and freed within a turn. An error that ends it loses the local
-    variables of its frames, which would keep arrays beyond the turn.
-
-    Args:
-        devices: Where the work is done.
-        stop: When set, a thread that still waits for its turn does so no longer.
-
-    Raises:
-        CancelledError: `stop` was set before the turn came.
+    variables of its frames, which would keep arrays beyond the turn. A thread that still waits for its turn when `stop`
+    is set gets a `CancelledError`.
     """
     if not any(map(on_gpu, devices)):
         yield

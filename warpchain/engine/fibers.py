@@ -17,7 +17,7 @@ class HeldStream:
     def __init__(self) -> None:
         """Begin without work."""
         self._held: deque[Callable[[], Any]] = deque()
-        self._done = 0
+        self.done = 0  # pieces of work
 
     def hold(self, work: Callable[[], Any]) -> None:
         """Add work."""
@@ -25,7 +25,7 @@ class HeldStream:
 
     def record_event(self) -> "HeldEvent":
         """An event after the work so far."""
-        return HeldEvent(self, self._done + len(self._held))
+        return HeldEvent(self, self.done + len(self._held))
 
     def wait_event(self, event: "HeldEvent") -> None:
         """Let later work wait for an event of another stream."""
@@ -37,13 +37,9 @@ class HeldStream:
 
     def advance(self, count: int) -> None:
         """Do the first pieces of work, so many in all, if they are not done yet."""
-        while self._done < count:
-            self._done += 1
+        while self.done < count:
+            self.done += 1
             self._held.popleft()()
-
-    def has_done(self, count: int) -> bool:
-        """Whether the first pieces of work, so many in all, are done."""
-        return self._done >= count
 
 
 class HeldEvent:
@@ -59,7 +55,7 @@ class HeldEvent:
         self._asked += 1
         if self._asked == QUESTIONS:
             self.reach()
-        return self._stream.has_done(self._count)
+        return self._stream.done >= self._count
 
     def reach(self) -> None:
         """Do the work before this place."""

@@ -27,19 +27,25 @@ LONGEST_WAIT = 120.0
 
 
 def load_checked(module: wp.Module, device: wp.Device, make: Callable[[], wp.Module]) -> None:
-    """Load a module for blocks of its threads; what is missing or does not fit its checksum is compiled.
+    """Load a module of entries for blocks of its threads; what is missing or does not fit its checksum is compiled.
 
-    Args:
-        module: Module with entries, without a hash in its names.
-        device: Where to load it.
-        make: Makes the module of the same name that is compiled.
-
-    Raises:
-        InputError: the folder of the cache cannot be used.
-        OSError: its disk is full or broken.
+    `make` makes the module of the same name that is compiled. An `InputError` says that the folder of the cache cannot
+    be used, an `OSError` that its disk is full or broken.
     """
+    folder = Path(wp.config.kernel_cache_dir, module.get_module_identifier())
     try:
-        _load_checked(module, device, make)
+        with _locked(folder.with_name(f"{folder.name}.sha256")) as record:
+            recorded = _recorded(record)
+            if not _checksums(folder).items() <= recorded.items():
+                shutil.rmtree(folder)
+            try:
+                wp.load_aot_module(module, device, module_dir=folder)
+            except FileNotFoundError:
+                wp.compile_aot_module(make(), device, module_dir=folder)
+                wp.load_aot_module(module, device, module_dir=folder)
+            if (now := _checksums(folder)) != recorded:
+                os.truncate(record, 0)
+                os.pwrite(record, json.dumps(now).encode(), 0)  # cut short by a kill, it fits nothing
     except OSError as error:
         raise cache_refusal(error) from error
 
@@ -51,22 +57,6 @@ def cache_refusal(error: OSError) -> Exception:
     folder = wp.config.kernel_cache_dir or os.environ.get("WARP_CACHE_PATH", "the folder of Warp's cache")
     text = f"WARP_CACHE_PATH: {folder}: {error.strerror or error}; name a folder for kernels that can be written to"
     return InputError(text)
-
-
-def _load_checked(module: wp.Module, device: wp.Device, make: Callable[[], wp.Module]) -> None:
-    folder = Path(wp.config.kernel_cache_dir, module.get_module_identifier())
-    with _locked(folder.with_name(f"{folder.name}.sha256")) as record:
-        recorded = _recorded(record)
-        if not _checksums(folder).items() <= recorded.items():
-            shutil.rmtree(folder)
-        try:
-            wp.load_aot_module(module, device, module_dir=folder)
-        except FileNotFoundError:
-            wp.compile_aot_module(make(), device, module_dir=folder)
-            wp.load_aot_module(module, device, module_dir=folder)
-        if (now := _checksums(folder)) != recorded:
-            os.truncate(record, 0)
-            os.pwrite(record, json.dumps(now).encode(), 0)  # cut short by a kill, it fits nothing
 
 
 @contextlib.contextmanager

@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 import warp as wp
 
 from warpchain.engine.devices import Device, Gpu
+from warpchain.engine.kernel_cache import load_checked
 from warpchain.engine.kernel_entries import kernel_entry, step_module
 from warpchain.engine.processors import processors
 from warpchain.kernels.features import Features
@@ -55,15 +56,11 @@ def step_kernel(device: Device, features: Features, threads: int) -> wp.Kernel:
 
 
 def load_kernels(wanted: Iterable[tuple[Device, Features, int]]) -> None:
-    """Load kernels, several at a time, and compile those that are not in the cache yet.
-
-    Args:
-        wanted: Device, features and threads of a block of each kernel; on a CPU 1.
-    """
+    """Load kernels by device, features and threads of a block, on a CPU 1; compile those that are not in the cache."""
 
     def load(key: tuple[Device, Features, int], entry: wp.Kernel) -> None:
         device, features, threads = key
-        device.load(entry, lambda: step_module(features, threads, _registers(device, threads)))
+        load_checked(entry.module, device.warp, lambda: step_module(features, threads, _registers(device, threads)))
 
     with _loading:
         entries = {
@@ -72,7 +69,8 @@ def load_kernels(wanted: Iterable[tuple[Device, Features, int]]) -> None:
             if (device, features, threads) not in _loaded
         }
         for device, _, _ in entries:
-            device.prepare()
+            if isinstance(device, Gpu):
+                _ = device.filling  # Warp makes its streams now, before several threads ask for them
         with ThreadPoolExecutor(processors()) as pool:
             list(pool.map(load, entries, entries.values()))
         _loaded.update(entries)

@@ -52,12 +52,7 @@ def kernel_entry(features: Features, threads: int, registers: int | None) -> wp.
     """The entry of a step kernel, in a module of its own.
 
     The name of the module stands for source files, features, options of the compiler, Python and Warp; the processor or
-    the GPU's generation is in the names of files that Warp compiles.
-
-    Args:
-        features: What the kernel is compiled for.
-        threads: Of a block.
-        registers: Most registers of a thread on a GPU; None: a kernel for CPUs.
+    the GPU's generation is in the names of files that Warp compiles. A kernel for CPUs has no bound on registers.
     """
     module = wp.Module("", None)
     options = {"block_dim": threads, "strip_hash": True, "cpu_compiler_flags": COMPILER_FLAGS}
@@ -69,11 +64,7 @@ def kernel_entry(features: Features, threads: int, registers: int | None) -> wp.
 
 
 def step_module(features: Features, threads: int, registers: int | None) -> wp.Module:
-    """The module with the step kernel that belongs to an entry, to be compiled.
-
-    Raises:
-        RuntimeError: Source files are not those from which the entry has its name.
-    """
+    """The module with the step kernel of an entry, to be compiled; a `RuntimeError` if sources changed meanwhile."""
     with _making:
         if registers is None:
             from warpchain.kernels.cpu.loop import make_advance

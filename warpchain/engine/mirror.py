@@ -19,28 +19,18 @@ ALIGNMENT = 64
 
 
 class Mirror:
-    """Arrays by name, which the host reads and changes through their copies between launches.
-
-    Attributes:
-        arrays: On the device.
-        host: The same on the host.
-        bytes: Memory that they take on the device.
-    """
+    """Arrays by name on the device, their copies on the host, and the bytes of memory that they take on the device."""
 
     def __init__(self, fields: Mapping[str, tuple[tuple[int, ...], Any]], device: Device, stream: Any) -> None:
-        """Begin with zeros.
-
-        Args:
-            fields: Name → shape, and type of Warp's or struct of them.
-            device: Where they lie.
-            stream: In which copies wait; None on a CPU.
-        """
+        """Begin with zeros; `fields`: name → shape, and type of Warp's or struct of them. A CPU has no stream."""
         sizes = [math.prod(shape) * wp.types.type_size_in_bytes(dtype) for shape, dtype in fields.values()]
         firsts = list(accumulate((-(-size // ALIGNMENT) * ALIGNMENT for size in sizes), initial=0))
         self.bytes = max(ALIGNMENT, firsts[-1])
         self._stream, self._gpu = stream, device if isinstance(device, Gpu) else None
         self._block = wp.zeros(self.bytes, dtype=wp.uint8, device=device.warp)
-        self._copy = device.host_array((self.bytes,), wp.uint8) if self._gpu else self._block
+        self._copy = self._block
+        if self._gpu:
+            self._copy = wp.zeros(self.bytes, dtype=wp.uint8, device="cpu", pinned=self._gpu.pins_memory)
         self.arrays: dict[str, wp.array] = {}
         self.host: dict[str, NDArray[Any]] = {}
         memory = self._copy.numpy()

@@ -8,9 +8,9 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpchain.engine.batch import Batch
+from warpchain.inputs.arrays import Array
 from warpchain.kernels import layout
 
-Array = NDArray[np.float64]
 Snapshot = Mapping[str, NDArray[Any]]
 """Name → one world's part of an array."""
 

@@ -3,26 +3,19 @@
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.sprocket_motion import Motion
 from warpchain.kernels import layout
-
-Array = NDArray[np.float64]
 
 BEYOND: Final = 1e30
 """Time [s] of the rows behind the last."""
 
 
 def motion_rows(motion: Motion, frequency: float, height: float) -> Array:
-    """The rows of `Drive.motion`, (MOTION_ROWS, MOTION_VALUES).
+    """The rows of `Drive.motion`, given frequency [Hz] and height of the sprocket's centre [m] at the release.
 
     The sprocket starts at rest; between rows it goes on monotone cubics (PCHIP), without overshoot.
-
-    Args:
-        motion: rows of time [s], place relative to that at the release [m], turns per second as in the drive [Hz].
-        frequency: at the release [Hz].
-        height: of the sprocket's centre at the release [m].
     """
     from scipy.interpolate import PchipInterpolator
 

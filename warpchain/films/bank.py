@@ -16,7 +16,8 @@ from typing import Final, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.films.film import CAREFUL, CLOCK, Array, Camera, Film, edges, summary
+from warpchain.films.film import CAREFUL, CLOCK, Camera, Film, edges, summary
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import InputError
 from warpchain.store.block_result import BlockResult

@@ -4,12 +4,10 @@ from dataclasses import dataclass, replace
 from typing import Final, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.validation import InputError
 from warpchain.walks.walk_result import WalkResult
-
-Array = NDArray[np.float64]
 
 GRAVITY: Final = 9.809
 """As of Table 1 [m/s²]."""

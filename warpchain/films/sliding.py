@@ -5,7 +5,8 @@ from typing import Final
 
 import numpy as np
 
-from warpchain.films.film import CAREFUL, CLOCK, GRAVITY, Array, Camera, Film
+from warpchain.films.film import CAREFUL, CLOCK, GRAVITY, Camera, Film
+from warpchain.inputs.arrays import Array
 
 RELEASE_SPEED: Final = 2e-3
 """Standard deviation of either speed of the centre of mass at the release [m/s]: links pass the sprocket one by one."""

@@ -9,7 +9,8 @@ from typing import Annotated, Final, Literal
 import numpy as np
 from pydantic import Field
 
-from warpchain.films.film import BEFORE, GRAVITY, Array, Film
+from warpchain.films.film import BEFORE, GRAVITY, Film
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.validation import InputError, Whole, checked, shown
 
 UNITS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001}

@@ -36,18 +36,10 @@ DRAWABLE: Final = (
 )
 """Quantities that can have a distribution, in the order of drawing."""
 
-_STANDARD: Final = NormalDist()
-
 
 @dataclass(frozen=True)
 class Uniform:
-    """Equally likely values between two ends; an unphysical value is drawn again.
-
-    Attributes:
-        lower: lower end, in the unit of the quantity.
-        upper: upper end.
-        bounds: least and greatest physical value.
-    """
+    """Equally likely values between two ends; a value outside the physical bounds is drawn again."""
 
     lower: float
     upper: float
@@ -83,10 +75,7 @@ class Uniform:
 class Gaussian:
     """A Gaussian truncated at the physical bounds; a value outside is drawn again, never clipped.
 
-    Attributes:
-        mean: mean of the whole Gaussian, in the unit of the quantity; None: the chain's own value, see `placed`.
-        sigma: standard deviation of the whole Gaussian.
-        bounds: least and greatest physical value.
+    Mean and standard deviation are those of the whole Gaussian; a mean of None is the chain's own value, see `placed`.
     """
 
     mean: float | None
@@ -109,7 +98,7 @@ class Gaussian:
         if lower > 0:  # by symmetry below the mean, where shares near 0 keep their digits
             lower, upper, fraction, scale = -upper, -lower, 1.0 - fraction, -scale
         first, last = _below(lower), _below(upper)
-        return self._placed_mean + scale * _STANDARD.inv_cdf(first + (last - first) * fraction)
+        return self._placed_mean + scale * NormalDist().inv_cdf(first + (last - first) * fraction)
 
     @property
     def _placed_mean(self) -> float:
@@ -172,10 +161,7 @@ def placed(distributions: Mapping[str, Distribution], setup: Setup) -> dict[str,
 
 
 def draw(distributions: Mapping[str, Distribution], rng: np.random.Generator) -> dict[str, float]:
-    """One value of each of the `placed` distributions, in their order; one outside its bounds is drawn again.
-
-    An `InputError` says that a quantity had no physical draw.
-    """
+    """A value of each of the `placed` distributions, in order, redrawn until in bounds; an `InputError` if none is."""
     drawn = {}
     for name, distribution in distributions.items():
         least, most = distribution.bounds

@@ -8,14 +8,13 @@ import math
 from typing import Annotated, Any, Final, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import AfterValidator, Discriminator, Field, Strict, Tag
 
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.parameters import FRACTION, FRICTION
 from warpchain.inputs.validation import InputError
 from warpchain.kernels import layout
-
-Array = NDArray[np.float64]
 
 MOST_POINTS: Final = 256
 """Most points of a profile; each takes time where a chain is near it."""
@@ -68,12 +67,9 @@ FloorField = Annotated[
 class Floor:
     """A floor, as all else knows it: points joined by straight lines, which go on beyond the first and the last point.
 
-    Nothing hangs over. Another kind of floor is a subclass with a body of its own and all that asks for the points.
-
-    Attributes:
-        body: Its name among the `BODIES` of `warpchain.kernels.contacts.fixed_body`; of two points a slope.
-        points: x and y [m], shape (f + 1, 2).
-        laws: Coefficients of restitution and friction of each of its f faces, shape (f, 2).
+    Nothing hangs over. Another kind of floor is a subclass with a body of its own and all that asks for the points. The
+    body is a name among the `BODIES` of `warpchain.kernels.contacts.fixed_body`, of two points a slope; points are x
+    and y [m], (f + 1, 2), laws coefficients of restitution and friction of the f faces, (f, 2).
     """
 
     def __init__(self, points: ArrayLike, laws: ArrayLike) -> None:
@@ -135,10 +131,7 @@ class Floor:
         return np.vstack([first, self.points[(x > left) & (x < right)], last])
 
     def check_above(self, position: Array, link_length: float, path: str) -> None:
-        """Check that the middle of no circle of links (n, 3) is below the floor, where it would never come out.
-
-        If one is, an `InputError` begins with `path`.
-        """
+        """Refuse links (n, 3) with the middle of a circle below the floor; an `InputError` that begins with `path`."""
         depth = -self.distances(circles_of(position, link_length))
         if depth.max() > 0:
             raise InputError(
@@ -149,10 +142,8 @@ class Floor:
     def raised_by(self, circles: Array, radius: Array, clearance: float) -> float:
         """How far links must be raised for the nearest to have a clearance from the floor [m].
 
-        Args:
-            circles: Their left circles, then their right ones, (2 n, 2); between them they are as broad.
-            radius: Of these, (2 n,).
-            clearance: Of the nearest place of a link [m]; above a corner it may be less by 3 % of a link's length.
+        Given are their left circles, then their right ones, (2 n, 2), and their radii, (2 n,); between them links are
+        as broad. Above a corner the clearance may be less by 3 % of a link's length.
         """
         begin, end = np.split(circles, 2)
         circles = np.concatenate([circles, *(begin + share * (end - begin) for share in (0.25, 0.5, 0.75))])

@@ -10,11 +10,9 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.parameters import Parameters
-
-Array = NDArray[np.float64]
 
 LEAST_INERTIA: Final = 0.5
 """Part of its rotary inertia that a link must keep under multiplied loads."""
@@ -24,12 +22,8 @@ LEAST_INERTIA: Final = 0.5
 class LinkValues:
     """Values of the n links of a chain and of its n joints, shape (n,) each; joint i is at the end of link i.
 
-    Attributes:
-        mass: of each link [kg].
-        inertia: moment of inertia of each link about its centre [kg m²].
-        viscous_friction: β of each joint [N m s].
-        coulomb_friction: τ_c of each joint [N m].
-        radius: of both circles of each link [m].
+    Mass [kg] and moment of inertia about its centre [kg m²] of each link, β [N m s] and τ_c [N m] of each joint, radius
+    of both circles of each link [m].
     """
 
     mass: Array

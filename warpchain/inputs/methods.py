@@ -4,15 +4,14 @@ The integrators are those of `warpchain.kernels`. Nothing heavy is imported here
 """
 
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Final
 
 from warpchain.kernels.methods.method import find_method, method_names
 
-METHODS: Final[Mapping[str, str]] = MappingProxyType({name: find_method(name).title for name in method_names()})
+METHODS: Final[Mapping[str, str]] = {name: find_method(name).title for name in method_names()}
 """Integrators, each described in a few words."""
 
-FORMER_METHODS: Final[Mapping[str, str]] = MappingProxyType({"rodas4p": "dp5", "rodas5p": "dp5"})
+FORMER_METHODS: Final[Mapping[str, str]] = {"rodas4p": "dp5", "rodas5p": "dp5"}
 """Integrators that were removed → what to write instead."""
 
 BURST_TOLERANCE: Final = 1e-4
@@ -29,13 +28,11 @@ _LOOSE: Final = {
     "soften_pile": True,
     "soften_drive": True,
 }
-METHODS_BY_NEED: Final[Mapping[str, Mapping[str, object]]] = MappingProxyType(
-    {
-        "standard": MappingProxyType({"method": "hybrid", **_LOOSE}),
-        "explicit": MappingProxyType({"method": "os32", **_LOOSE}),
-        "reference": MappingProxyType({"method": "rkf78", "tolerance": 1e-6}),
-    }
-)
+METHODS_BY_NEED: Final[Mapping[str, Mapping[str, object]]] = {
+    "standard": {"method": "hybrid", **_LOOSE},
+    "explicit": {"method": "os32", **_LOOSE},
+    "reference": {"method": "rkf78", "tolerance": 1e-6},
+}
 """One word for an integrator and its settings.
 
 The ensembles of `standard` and `explicit` could not be told from those of `reference`, which is the paper's. `standard`

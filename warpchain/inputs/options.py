@@ -59,21 +59,13 @@ class Options(Section):
     `method` is an integrator or a word of `METHODS_BY_NEED`. A word supplies its own defaults; an explicit `tolerance`
     also replaces its `soft_tolerance`. An integrator has the defaults below, except that the default `tolerance` of
     `hybrid` is `BURST_TOLERANCE`.
-
-    Raises:
-        pydantic.ValidationError: a value is unknown or out of bounds, the smallest step is not below the contact step,
-            the device is not supported, or the method does not run on it.
     """
 
     method: Annotated[str, AfterValidator(_known_method)] = Field(
         default="standard",
         json_schema_extra={"enum": [*METHODS_BY_NEED, *METHODS]},
-        description="; ".join(
-            [
-                f"{', '.join(METHODS_BY_NEED)}: an integrator with its settings",
-                *(f"{name}: {title}" for name, title in METHODS.items()),
-            ]
-        ),
+        description=f"{', '.join(METHODS_BY_NEED)}: an integrator with its settings; "
+        + "; ".join(f"{name}: {title}" for name, title in METHODS.items()),
     )
     tolerance: float = number_field(1e-6, "1", **TOLERANCES)
     """error allowed in a step, absolute (SI units) and relative; default of hybrid: 1e-4"""

@@ -45,13 +45,7 @@ _Numbers = Annotated[Annotated[tuple[Annotated[float, Field(ge=0, le=1e12)], ...
 
 
 class Scene(Section):
-    """What happens in one walk, from hanging on the sprocket to the end.
-
-    Raises:
-        pydantic.ValidationError: a value is unknown or out of bounds, the clearance is that of a hanging chain although
-            the chain never hangs, the release disturbs a plane that is fixed, a plane that tilts has no flat floor, or
-            a link or joint is none of the chain.
-    """
+    """What happens in one walk, from hanging on the sprocket to the end."""
 
     links: Whole = number_field(60, "1", symbol="n", ge=4, le=MOST_LINKS)
     """number of links around the loop, even where inner and outer links alternate"""
@@ -261,9 +255,8 @@ def contact_radius(scene: Scene, parameters: Parameters) -> float:
 def fewest_links(scene: Scene, parameters: Parameters) -> int:
     """Least even number of links whose loop can hang round the sprocket.
 
-    A link whose joints are both at least ρ from the centre is seen from there under an angle of at most
-    2 asin(ℓ / 2ρ), and a loop round the sprocket needs 2π in all: n ≥ π / asin(ℓ / 2ρ), with ρ of
-    `joint_radius`.
+    A link whose joints are both at least ρ, the `joint_radius`, from the centre is seen from there under an angle of at
+    most 2 asin(ℓ / 2ρ), and a loop round the sprocket needs 2π in all: n ≥ π / asin(ℓ / 2ρ).
     """
     sine = parameters.link_length / (2 * joint_radius(scene, parameters))
     around = math.ceil(math.pi / math.asin(sine)) if sine < 1 else 2
@@ -280,10 +273,7 @@ def check_links_on_gpu(links: int, device: str, field: str) -> None:
 
 
 def check_scene(scene: Scene, parameters: Parameters) -> None:
-    """Check what a scene and its parameters must fulfil together; else an `InputError`.
-
-    A scene that starts as an ellipse has no sprocket, so nothing is asked of that.
-    """
+    """Check what a scene and its parameters must fulfil together; else an `InputError`. Ellipses need no sprocket."""
     check_links(scene, parameters)
     check_parity(scene, parameters)
     if scene.start == "ellipse":

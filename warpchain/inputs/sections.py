@@ -21,10 +21,7 @@ SECTIONS: Final[Mapping[str, type[Section]]] = {"scene": Scene, "options": Optio
 def takes_fields(*sections: str, without: Container[str] = (), beside: Iterable[str] = ()) -> Callable[[F], F]:
     """Let the signature of a function name the fields that its ``**settings`` take, for notebooks to complete.
 
-    Args:
-        sections: keys of `SECTIONS`.
-        without: fields that it does not take; its own arguments are named anyhow.
-        beside: what it takes beside fields.
+    These are the fields of some `SECTIONS`, `without` those that it does not take, and what it takes `beside` them.
     """
 
     def named(function: F) -> F:
@@ -53,10 +50,7 @@ def by_section(settings: Mapping[str, object]) -> dict[str, dict[str, object]]:
 
 
 def dotted_name(written: str, path: str) -> str:
-    """Name of the field that is written as name or symbol, with or without its section: `parameters.mu_fc`.
-
-    An `InputError` that begins with `path` says that there is none.
-    """
+    """Name of the field written as name or symbol, with or without its section; `path` is for the `InputError`."""
     section, _, last = written.rpartition(".")
     name: str = validation.full_name(last)
     if name not in SECTION_OF or section not in ("", SECTION_OF[name]):

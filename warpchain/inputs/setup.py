@@ -37,16 +37,9 @@ def resolve(
 ) -> Setup:
     """Check a user's values, complete them, and draw the sample of a seed, if there is one.
 
+    Given are the fields that differ from defaults and preset, and whether joint forces of the walk will be recorded.
     From the seed's generator come first the parameters, then phase and clearance, of what is not given, as in the first
     walk of a sweep. An `InputError` has one line with the field's path and the remedy.
-
-    Args:
-        preset: name of the parameter preset to start from.
-        scene: fields of `Scene` that differ from their defaults.
-        options: fields of `Options` that differ from their defaults.
-        parameters: fields of `Parameters` that differ from the preset.
-        seed: of the sample.
-        records_loads: whether joint forces of the walk will be recorded.
     """
     checked = validated(Scene, scene, "scene")
     changed = parameter_preset(preset).with_values(parameters)

@@ -10,19 +10,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from warpchain.inputs.arrays import Array
 
 
 @dataclass(frozen=True)
 class Curve:
     """A family of closed curves P(s, size), clockwise in s.
 
-    Attributes:
-        points: Maps s, of shape (m,), and a size to P [m], ∂P/∂s, and ∂P/∂size at fixed s, each of shape (2, m).
-        period: Period of s as a function of size, and its derivative.
-        first_size: Starting value of size for Newton's method, given the chain's length [m].
+    `points` maps s, (m,), and a size to P [m], ∂P/∂s, and ∂P/∂size at fixed s, (2, m) each; `period` a size to the
+    period of s and its derivative; `first_size` the length of a chain [m] to a size for Newton's method to start from.
     """
 
     points: Callable[[Array, float], tuple[Array, Array, Array]]
@@ -82,20 +79,12 @@ def ellipse(aspect: float) -> Curve:
 def lay_chain(
     curve: Curve, links: int, link_length: float, speed: float = 0.0, phase: float = 0.0
 ) -> tuple[Array, Array]:
-    """Lay a closed chain along a curve.
+    """Lay the joints of a closed chain along a curve, the first at a phase, a fraction of the curve's period.
 
-    Args:
-        curve: Where the joints lie.
-        links: Number of links n.
-        link_length: ℓ [m].
-        speed: Mean speed of the joints along the curve, clockwise [m/s].
-        phase: Place of the first joint as a fraction of the curve's period.
+    They move clockwise at a mean speed [m/s]. A `ValueError` says that no closed chain of these links fits the curve.
 
     Returns:
         position (n, 3): x, y [m], θ [rad] of the links, numbered clockwise, and velocity (n, 3), their rates.
-
-    Raises:
-        ValueError: No closed chain of these links fits the curve.
     """
     size = curve.first_size(links * link_length)
     s = curve.period(size)[0] * (phase + np.arange(links) / links)
@@ -151,14 +140,9 @@ def _solve_loop(to_here: Array, to_following: Array, to_size: Array, right: Arra
 
 
 def links_between(joints: Array, joint_rate: Array) -> tuple[Array, Array]:
-    """Links that span the joints: link i from joint i − 1 to joint i.
+    """Links that span the joints, (n, 2) [m], link i from joint i − 1 to joint i: positions and velocities, (n, 3).
 
-    Args:
-        joints: (n, 2) [m].
-        joint_rate: (n, 2) [m/s], keeping all distances of neighbours.
-
-    Returns:
-        position (n, 3), velocity (n, 3).
+    The rates of the joints, (n, 2) [m/s], keep all distances of neighbours.
     """
     order = np.arange(len(joints)) - 1
     before, before_rate = joints[order], joint_rate[order]
@@ -175,5 +159,4 @@ def _spread_evenly(curve: Curve, size: float, s: Array) -> Array:
     fine = s[0] + np.linspace(0.0, curve.period(size)[0], 1024)
     speed = np.sqrt(np.sum(curve.points(fine, size)[1] ** 2, axis=0))
     arc = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(fine))])
-    spread: Array = np.interp(arc[-1] * np.arange(len(s)) / len(s), arc, fine)
-    return spread
+    return np.asarray(np.interp(arc[-1] * np.arange(len(s)) / len(s), arc, fine))

@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpchain.inputs.arrays import Array, checked_array
 from warpchain.inputs.floor import Floor, circles_of, floor_from
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters, preset
@@ -15,8 +16,6 @@ from warpchain.inputs.scene import Scene, check_parity, check_scene
 from warpchain.inputs.sections import SECTION_OF
 from warpchain.inputs.start_shapes import links_between
 from warpchain.inputs.validation import InputError, validated
-
-Array = NDArray[np.float64]
 
 DEFAULT_PRESET: Final = "paper"
 """Preset of a walk or a sweep that names none."""
@@ -30,13 +29,8 @@ WIDEST_MISFIT: Final = 0.5
 class Setup:
     """Everything that says what one walk is, checked and complete.
 
-    Attributes:
-        preset: name of the parameter preset that it started from.
-        parameters: of the chain, its sprocket and the floor.
-        scene: what happens.
-        options: how it is computed.
-        start: state that the walk begins from; None: it begins as the scene says. With a state, those values of the
-            scene that matter before the release are those of the walk that the state was taken from.
+    `preset` is the name of the one that the parameters started from. Without a `start` the walk begins as the scene
+    says; with one, the scene has values that matter before the release from the walk that the state was taken from.
     """
 
     preset: str
@@ -203,26 +197,6 @@ class State:
     def joints(self) -> Array:
         """Joints x, y [m], (n, 2), as the end of link i; if the plane tilts, in the plane."""
         return circles_of(self.position, self.parameters.link_length)[self.links :]
-
-
-def checked_array(given: object, path: str, *shape: int | str) -> Array:
-    """Anything like an array of finite real numbers as a new float64 array of this shape; a letter is any number.
-
-    Of anything else an `InputError` that begins with `path`.
-    """
-    wanted = f"({', '.join(map(str, shape))}{',' * (len(shape) == 1)})"
-    try:
-        if np.array(given).dtype.kind in "cSU":  # complex numbers and text would be converted without a word
-            raise TypeError
-        array = np.array(given, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{path}: not an array of numbers; give one of shape {wanted}") from None
-    sizes = zip(array.shape, shape, strict=False)
-    if array.ndim != len(shape) or any(size != each for size, each in sizes if isinstance(each, int)):
-        raise InputError(f"{path}: its shape is {array.shape}; give {wanted}")
-    if not np.isfinite(array).all():
-        raise InputError(f"{path}: holds a number that is not finite; give finite numbers")
-    return array
 
 
 def _setup(links: int, parameters: Parameters | str, field_name: str) -> Setup:

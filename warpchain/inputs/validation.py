@@ -70,13 +70,10 @@ class InputWarning(UserWarning):
 
 
 def number_field(default: Any, unit: str, description: str | None = None, **more: Any) -> Any:
-    """A pydantic field that holds a number.
+    """A pydantic field that holds a number: its default, `...` for none, SI unit, `DIMENSIONLESS` if pure, and meaning.
 
-    Args:
-        default: its default, in `unit`; `...` for none.
-        unit: SI unit, `DIMENSIONLESS` for pure numbers.
-        description: its meaning; that of a field of a section may stand below it.
-        more: limits `ge`, `gt`, `le`, `lt` in `unit`, as of `pydantic.Field`; anything else stands beside the unit.
+    The description of a field of a section may stand below it. `more` are limits `ge`, `gt`, `le`, `lt`, as of
+    `pydantic.Field`; anything else stands beside the unit.
     """
     limits = {name: more.pop(name) for name in _LIMITS if name in more}
     return Field(default, description=description, json_schema_extra={"unit": unit, **more}, **limits)
@@ -197,11 +194,8 @@ _OWN: Final = frozenset((float, int, str, bool, type(None)))
 def refusals(error: ValidationError, path: str, keys: Iterable[str] = (), unit: str = DIMENSIONLESS) -> list[str]:
     """A line for each of pydantic's errors, `MOST_PROBLEMS` at most: the field's path, the problem, and what was given.
 
-    Args:
-        error: pydantic's.
-        path: of the value that was validated.
-        keys: that may be meant by an unknown one, beside names of fields.
-        unit: of what is no field.
+    `path` is that of the value that was validated. By an unknown name one of the `keys` may be meant, beside fields;
+    `unit` is that of what is no field.
     """
     lines = []
     for problem in error.errors(include_url=False)[:MOST_PROBLEMS]:
@@ -276,11 +270,8 @@ def _adapter(kind: Any) -> TypeAdapter[Any]:
 def checked(value: object, path: str, kind: Any, unit: str = DIMENSIONLESS) -> Any:
     """A value that is no field, such as an argument of a function, in Python's own types; else an `InputError`.
 
-    Args:
-        value: of the user.
-        path: its name, for errors.
-        kind: an annotation that pydantic can check, such as `bool` or `Annotated[float, Field(gt=0)]`.
-        unit: of a number.
+    `kind` is an annotation that pydantic can check, such as `bool` or `Annotated[float, Field(gt=0)]`; `path`, the name
+    of the value, and the unit of a number are for errors.
     """
     try:
         return _adapter(kind).validate_python(plain(value, path))

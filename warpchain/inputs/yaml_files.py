@@ -14,10 +14,7 @@ LARGEST_FILE: Final = 100_000
 
 
 def read_yaml(path: str | os.PathLike[str]) -> object:
-    """Content of a YAML file, see `parse_yaml`.
-
-    An `InputError` says that it cannot be read, is no regular file, too large or no such YAML.
-    """
+    """Content of a regular YAML file that is not too large, see `parse_yaml`; else an `InputError`."""
     path = checked_path(path, "file")
     try:
         found = os.stat(path)

@@ -18,12 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.hdf5_files import Stored, stored_fields
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.link_values import mean_value
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import joint_radius, link_values
 from warpchain.inputs.setup import Setup
-
-Array = NDArray[np.float64]
 
 BEFORE: Final = "before_release"
 """Name of the motion before the release, among the arrays of a walk and in its file."""
@@ -127,8 +126,7 @@ class StationaryLoop:
     @property
     def is_free(self) -> NDArray[np.bool_]:
         """Points of the free part, shape (g,)."""
-        inside: NDArray[np.bool_] = (self.s >= self.free[0]) & (self.s <= self.free[1])
-        return inside
+        return np.asarray((self.s >= self.free[0]) & (self.s <= self.free[1]))
 
     @property
     def bottom_curvature(self) -> float:
@@ -143,15 +141,9 @@ class StationaryLoop:
 
 
 def average_loop(setup: Setup, before: BeforeRelease | None, center: Array | None) -> StationaryLoop:
-    """The mean loop of a walk in the last moments before its release.
+    """The mean loop of a walk just before its release, given the sprocket's centre x, y [m] at the release, (2,).
 
-    Args:
-        setup: parameters, scene and options of the walk.
-        before: the motion on the sprocket just before the release; None if it was not kept.
-        center: the sprocket's centre x, y [m] at the release, shape (2,); None without one.
-
-    Raises:
-        ValueError: the walk has kept nothing of that time, or too little.
+    A `ValueError` says that the walk has no sprocket, or has kept nothing of that time or too little.
     """
     if before is None or center is None:
         if not setup.has_drive:
@@ -172,17 +164,9 @@ def average_loop(setup: Setup, before: BeforeRelease | None, center: Array | Non
 def average_frames(
     before: BeforeRelease, parameters: Parameters, mass: float, center: Array, radius: float
 ) -> StationaryLoop:
-    """The mean loop of frames.
+    """The mean loop of frames; a `ValueError` if they are too few, or if the loop does not run clockwise.
 
-    Args:
-        before: frames of a loop that runs clockwise.
-        parameters: parameters of the chain.
-        mass: m̄, mean mass of its links [kg].
-        center: the sprocket's centre x, y [m].
-        radius: distance of joints on the sprocket from its centre [m].
-
-    Raises:
-        ValueError: there are too few frames, or the loop does not run clockwise.
+    Given are the mean mass m̄ of the links [kg], the sprocket's centre x, y [m], and how far from it joints ride [m].
     """
     joints = before.frame_joints - center
     frames, links = joints.shape[:2]
@@ -248,8 +232,7 @@ def _moved(joints: Array) -> Array:
     links = joints.shape[1]
     turning = np.exp(2j * np.pi * np.arange(links) / links)
     first = np.mean((joints[..., 0] + 1j * joints[..., 1]) * turning, axis=1)
-    moved: Array = -np.unwrap(np.angle(first)) * links / (2 * np.pi)
-    return moved
+    return np.asarray(-np.unwrap(np.angle(first)) * links / (2 * np.pi))
 
 
 class _Harmonics:
@@ -271,8 +254,7 @@ class _Harmonics:
     def at(self, order: int) -> Array:
         """The derivative of some order with respect to q, at POINTS_PER_LINK n even points from q = 0 on, (…, c)."""
         spectrum, points = self._spectrum * (2j * np.pi * self._waves[:, None]) ** order, POINTS_PER_LINK
-        values: Array = points * np.fft.irfft(spectrum, points * self._links, axis=0)
-        return values
+        return np.asarray(points * np.fft.irfft(spectrum, points * self._links, axis=0))
 
     def at_joints(self, order: int, moved: Array) -> Array:
         """The same where the joints are in frames, until which the loop has moved (f,) [links], shape (f, n, c)."""

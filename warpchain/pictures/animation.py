@@ -21,14 +21,13 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpchain.files import checked_output, replacing, write_whole
+from warpchain.inputs.arrays import Array
 from warpchain.pictures import chain
 from warpchain.pictures.style import BLUE, GROUND, INK, tidy
 from warpchain.pictures.walk_shape import center_in_room, checked_joints, headline
 
 if TYPE_CHECKING:
     from warpchain.walks.walk_result import WalkResult
-
-Array = NDArray[np.float64]
 
 WIDTH, TALLEST = 960, 560
 """Greatest width and height of a picture [pixels]."""
@@ -161,8 +160,8 @@ def player(walk: "WalkResult", slow: float = 4.0) -> str:
         "places": _whole(places[~np.isnan(places[:, 0])]),
         "view": _whole(box.ravel()),
         "marks": marks,
-        "heights": _whole(np.array(chain.floor_height(walk, np.array(marks)))),
-        "floor": _whole(chain.floor_line(walk, *ends)),
+        "heights": _whole(np.array(walk.setup.floor.heights(np.array(marks)))),
+        "floor": _whole(walk.setup.floor.line(*ends)),
         "stretches": [[color, label, _whole(faces)] for color, label, faces in chain.stretches(walk, *ends)],
         "slow": slow,
         "colors": {"inner": INNER, "outer": OUTER, "edge": EDGE},
@@ -196,11 +195,7 @@ def side_box(walk: "WalkResult", joints: Array) -> Array:
 
 
 class Film:
-    """Draws the frames of one walk; dashed is where the sprocket was at the release.
-
-    Attributes:
-        figure: the picture of the frame that was drawn last; an even number of pixels wide and high, for video.
-    """
+    """Draws frames of a walk, dashed where the sprocket was at the release; even pixels wide and high, for video."""
 
     def __init__(self, walk: "WalkResult") -> None:
         """Fit the walk and the floor below it into the picture; a `ValueError` if frames are none or broken."""
@@ -228,7 +223,7 @@ class Film:
         self._axes = self.figure.add_axes((*share[0], *(1 - share.sum(axis=0))), xlim=box[0], ylim=box[1])
         chain.draw_release(self._axes, walk, self._view)
         if not self._tilts:
-            chain.draw_ground(self._axes, walk, chain.floor_line(walk, *box[0]), box[1, 0])
+            chain.draw_ground(self._axes, walk, walk.setup.floor.line(*box[0]), box[1, 0])
             self._axes.set(yticks=[], xticks=floor_marks(*box[0]))
             self._axes.set_xlabel("$x$ / m", loc="right")
             labels = self._axes.get_legend_handles_labels()
@@ -268,8 +263,7 @@ class Film:
 
     def _project(self, points: Array) -> Array:
         """Points x, y, z [m], shape (p, 3), in the picture: to the right and up [m], shape (2, p)."""
-        projected: Array = self._view[:2] @ points.T
-        return projected
+        return np.asarray(self._view[:2] @ points.T)
 
     def _draw_floor(self, low: Array, high: Array) -> None:
         """The floor with a square grid, and what its squares measure."""

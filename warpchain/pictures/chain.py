@@ -12,16 +12,14 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_hex
 from matplotlib.patches import Circle, Patch, Polygon
-from numpy.typing import NDArray
 
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.scene import link_values
 from warpchain.inputs.sprocket_motion import sprocket_places
 from warpchain.pictures.style import DASHES, FAINT, GROUND, INK
 
 if TYPE_CHECKING:
     from warpchain.walks.walk_result import WalkResult
-
-Array = NDArray[np.float64]
 
 SIDE: Final = np.eye(3)
 ABOVE: Final = np.eye(3)[[0, 2, 1]]
@@ -34,14 +32,9 @@ def circle_radii(walk: "WalkResult") -> Array:
 
 
 def link_outlines(joints: Array, radius: Array | float) -> Array:
-    """Outlines of the links of one chain in a picture: two circles and a waist between them.
+    """Outlines of links between joints, (n, 2) [m], in a picture: two circles of a radius [m] and a waist between them.
 
-    Args:
-        joints: joint positions [m], shape (n, 2); link i reaches from joint i − 1 to joint i.
-        radius: of the circles of all links, or of each, shape (n,) [m].
-
-    Returns:
-        Corners of a polygon for each link [m], anticlockwise, shape (n, c, 2).
+    Each is a polygon with corners [m], anticlockwise, (n, c, 2); link i reaches from joint i − 1 to joint i.
     """
     half = (joints - np.roll(joints, 1, axis=0)) / 2
     middle = joints - half
@@ -67,14 +60,8 @@ def draw_chain(
 ) -> PolyCollection:
     """Draw one chain, its rearmost link first; odd links, the outer ones, cover their neighbours.
 
-    Args:
-        axes: where to draw.
-        joints: joints in the room [m], shape (n, 3).
-        radius: of the circles of each link [m], shape (n,).
-        view: where the viewer is.
-        colors: of inner links, of outer links and of edges.
-        edge: width of the edges [points].
-        halo: whether to draw white around the chain, over what is behind it.
+    Given are joints in the room [m], (n, 3), the radius of the circles of each link [m], (n,), colours of inner links,
+    of outer links and of edges, and the width of these [points]. A halo is white, over what is behind the chain.
     """
     right, up, depth = view @ joints.T
     outlines = link_outlines(np.stack([right, up], axis=1), radius)
@@ -106,7 +93,7 @@ def draw_release(axes: Axes, walk: "WalkResult", view: Array) -> None:
     if circle is None:
         return
     middle = circle[:-1].mean(axis=0)
-    upright = np.stack([middle, [middle[0], floor_height(walk, middle[0]), middle[2]]])
+    upright = np.stack([middle, [middle[0], walk.setup.floor.heights(middle[0]), middle[2]]])
     if view is ABOVE:  # from its edge the circle is a line
         circle = np.stack([circle.min(axis=0), circle.max(axis=0)])
     title = "sprocket until release" if walk.setup.scene.release is None else "sprocket at the release"
@@ -140,18 +127,8 @@ def walk_box(walk: "WalkResult", joints: Array) -> tuple[Array, Array]:
         moved = sprocket_centers(walk, walk.frame_time)
         low[:2] = np.fmin(low[:2], np.fmin.reduce(moved) - walk.sprocket_radius)
         high[:2] = np.fmax(high[:2], np.fmax.reduce(moved) + walk.sprocket_radius)
-    low[1] = floor_line(walk, low[0], high[0])[:, 1].min()
+    low[1] = walk.setup.floor.line(low[0], high[0])[:, 1].min()
     return low, high
-
-
-def floor_line(walk: "WalkResult", left: float, right: float) -> Array:
-    """The floor's profile from one x to another [m], shape (p, 2)."""
-    return walk.setup.floor.line(left, right)
-
-
-def floor_height(walk: "WalkResult", x: Any) -> Any:
-    """Height of the floor at x [m]."""
-    return walk.setup.floor.heights(x)
 
 
 def stretches(walk: "WalkResult", left: float, right: float) -> list[tuple[str, str, Array]]:
@@ -175,10 +152,9 @@ def stretches(walk: "WalkResult", left: float, right: float) -> list[tuple[str, 
 
 
 def draw_ground(axes: Axes, walk: "WalkResult", line: Array, bottom: float) -> None:
-    """The floor along its `floor_line`, from the side, down to `bottom` [m], with labelled `stretches`."""
+    """The floor along its `Floor.line`, from the side, down to `bottom` [m], with labelled `stretches`."""
     axes.add_patch(Polygon([(line[0, 0], bottom), *line, (line[-1, 0], bottom)], facecolor=GROUND, zorder=3))
     axes.plot(*line.T, color=INK, linewidth=1.0, zorder=3)
     for color, label, faces in stretches(walk, line[0, 0], line[-1, 0]):
-        axes.add_collection(
-            LineCollection(list(faces), colors=color, linewidths=3.5, label=label, zorder=3), autolim=False
-        )
+        lines = LineCollection(list(faces), colors=color, linewidths=3.5, label=label, zorder=3)
+        axes.add_collection(lines, autolim=False)

@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
+from warpchain.inputs.arrays import Array
 from warpchain.pictures import chain
 from warpchain.pictures.inline import InlineFigure
 from warpchain.pictures.style import DOTS, GROUND, INK, tidy
@@ -22,8 +22,6 @@ from warpchain.status import Status
 
 if TYPE_CHECKING:
     from warpchain.walks.walk_result import WalkResult
-
-Array = NDArray[np.float64]
 
 _WIDTH: Final = 10.0
 _HIGHEST: Final = 4.6
@@ -41,20 +39,14 @@ _HALO: Final = (withStroke(linewidth=2.5, foreground="white"),)
 
 
 def film_strip(walk: "WalkResult", figure: Figure | None = None) -> Figure:
-    """The chain along its walk, drawn to scale, and close-ups of up to four moments.
+    """The chain along a walk with frames, drawn to scale, and close-ups of up to four moments.
 
     In the strip the centre of mass moves equally far from each instant to the next. Above each chain stands its time;
     outer links are darker than inner ones. The close-ups show the first touch of the floor, the first self-contact, the
     collapse and the end, if they happen. A sprocket that goes on after the release is a circle in the chain's colour;
     stretches of the floor with coefficients of their own are thick and have labels. A chain whose plane tilts is seen
-    from above instead, to the same scale: z grows downwards.
-
-    Args:
-        walk: a walk with frames.
-        figure: an empty figure to draw into; by default a new one that suits the walk.
-
-    Raises:
-        ValueError: the walk has no frames or broken ones.
+    from above instead, to the same scale: z grows downwards. A figure to draw into is empty; by default a new one suits
+    the walk. A `ValueError` says that the walk has no frames or broken ones.
     """
     joints = checked_joints(walk)
     tilts = walk.joints_in_room is not None
@@ -78,7 +70,7 @@ def film_strip(walk: "WalkResult", figure: Figure | None = None) -> Figure:
     side = panel(left, bottom, width, height)
     side.set(xlim=(low[0], high[0]), ylim=(low[1] - depth, high[1] + top), xlabel="x / m", ylabel="y / m")
     views = [(setting(walk), side, chain.SIDE)]
-    chain.draw_ground(side, walk, chain.floor_line(walk, low[0], high[0]), low[1] - depth)
+    chain.draw_ground(side, walk, walk.setup.floor.line(low[0], high[0]), low[1] - depth)
     _draw_distance(side, walk, low[1], 0.5 * depth)
     if tilts:
         z = (low[2] + high[2]) / 2 + np.array([0.5, -0.5]) * broad
@@ -103,7 +95,7 @@ def film_strip(walk: "WalkResult", figure: Figure | None = None) -> Figure:
     for number, (frame, title, spot) in enumerate(moments):
         axes = panel(_LEFT + number * close_up_width, _FOOT + 0.5, close_up_width - 0.1, lower - 0.5)
         half = 0.5 * _CLOSE_UP_LINKS * walk.setup.parameters.link_length
-        line = chain.floor_line(walk, spot[0] - half, spot[0] + half)
+        line = walk.setup.floor.line(spot[0] - half, spot[0] + half)
         half_height = half / _CLOSE_UP_ASPECT
         bottom = max(spot[1] - half_height, line[:, 1].min() - 0.2 * half_height)
         chain.draw_chain(axes, joints[frame], radius, chain.SIDE, _link_colors(colors[frame]), edge=0.6)
@@ -152,7 +144,7 @@ def _draw_distance(axes: Axes, walk: "WalkResult", low: float, depth: float) -> 
         return
     slope = walk.setup.scene.slope
     x = walk.center[-1, 0] - np.array([walk.dx * np.cos(np.radians(slope)), 0.0])
-    floor = chain.floor_height(walk, x)
+    floor = walk.setup.floor.heights(x)
     y = (floor if slope != 0 else low) - depth + 0 * x
     arrow = {"arrowstyle": "<|-|>", "color": INK, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", (x[1], y[1]), (x[0], y[0]), arrowprops=arrow, zorder=4)
@@ -181,7 +173,7 @@ def _moments(walk: "WalkResult") -> list[tuple[int, str, Array]]:
             found[frame] = title, spot_of(joints[frame])
     middle = np.median(joints[last, :, 0])
     title = "rest" if walk.status is Status.AT_REST else "end"
-    found[last] = title, np.array([middle, chain.floor_height(walk, middle)])
+    found[last] = title, np.array([middle, walk.setup.floor.heights(middle)])
     return [(frame, *found[frame]) for frame in sorted(found)]
 
 

@@ -77,17 +77,10 @@ def draw_grid(
 ) -> Figure | SubFigure:
     """Draw a quantity over the grids of one block or several.
 
-    Lines have bars of one standard error; a single line has lighter ones of one standard deviation, too. A red cross
-    on the x axis, or a dot in a map, says that walks failed there.
-
-    Args:
-        blocks: name of each block → the statistics of its cells.
-        quantity: name of the quantity, for labels.
-        x: as `figure`, what is returned and errors, see `SweepResult.plot`.
-        figure: see there.
-
-    Raises:
-        NothingToShow: no block has an axis of several values, or there is no mean.
+    Lines have bars of one standard error; a single line has lighter ones of one standard deviation, too. A red cross on
+    the x axis, or a dot in a map, says that walks failed there. `blocks`: name of each → the statistics of its cells;
+    the name of the quantity is for labels; all else is as of `SweepResult.plot`. A `NothingToShow` says that no block
+    has an axis of several values, or that there is no mean.
     """
     panels, left_out = _all_panels(blocks, x)
     label = with_unit(labels.quantity_text(quantity), next(iter(blocks.values())).unit)

@@ -96,10 +96,6 @@ def quantity_label(name: str) -> str:
     return with_unit(quantity_text(name), unit_text(name))
 
 
-DISTANCE: Final = with_unit(quantity_text("dx"), "m")
-FREQUENCY: Final = quantity_label("frequency")
-
-
 def cell_values(axes: Mapping[str, NDArray[Any]], place: Iterable[int]) -> dict[str, Any]:
     """Value of each axis in the cell at a place along the axes."""
     return {name: values[i] for (name, values), i in zip(axes.items(), place, strict=True)}

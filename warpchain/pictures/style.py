@@ -1,9 +1,8 @@
 """How all figures look: colours, axes, resolution; and a figure with its caption."""
 
 import os
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 from warpchain.files import write_whole
 from warpchain.inputs.validation import InputError
@@ -37,15 +36,8 @@ class NothingToShow(InputError):  # noqa: N818 - no error of the program: the sw
     """A sweep lacks the blocks, or does not have the walks yet, that a figure or a number needs."""
 
 
-@dataclass(frozen=True)
-class Picture:
-    """A figure with its caption.
-
-    Attributes:
-        name: short name, used as the name of a file.
-        caption: one or more sentences.
-        figure: the figure.
-    """
+class Picture(NamedTuple):
+    """A figure with its caption, and a short name, used as the name of a file."""
 
     name: str
     caption: str
@@ -77,17 +69,9 @@ def tidy(axes: "Axes", *, grid: Literal["x", "y", "both"] | None = None) -> None
 def panel_grid(
     figure: "Figure | SubFigure", count: int, columns: int, *, sharex: bool, sharey: bool = True
 ) -> "tuple[list[Axes], list[Axes]]":
-    """Put panels into a figure, by rows.
+    """Put panels into an empty figure, by rows: the panels, and the axes that stay empty, which show nothing.
 
-    Args:
-        figure: an empty figure.
-        count: number of panels.
-        columns: number of columns.
-        sharex: whether the panels have a common x axis, with numbers below the lowest panel of each column.
-        sharey: whether they have a common y axis.
-
-    Returns:
-        The panels, and the axes that stay empty, which show nothing.
+    A common x axis has numbers below the lowest panel of each column.
     """
     grid = list(figure.subplots(-(-count // columns), columns, sharex=sharex, sharey=sharey, squeeze=False).flat)
     for axes in grid[count:]:

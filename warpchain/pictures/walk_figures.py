@@ -3,7 +3,7 @@
 Figures are made without pyplot: nothing is global, no display is needed, the caller owns what is returned.
 """
 
-from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+from typing import TYPE_CHECKING, Any, Final, get_args
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,8 +12,9 @@ from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from warpchain.inputs.arrays import Array
 from warpchain.loop.stationary_loop import StationaryLoop
-from warpchain.pictures.chain import floor_height, stretches
+from warpchain.pictures.chain import stretches
 from warpchain.pictures.film_strip import film_strip
 from warpchain.pictures.inline import InlineFigure
 from warpchain.pictures.style import BLUE, DASHES, DOTS, FAINT, GREEN, GROUND, INK, RED, tidy
@@ -70,7 +71,7 @@ def _height_and_speed(walk: "WalkResult", figure: Figure) -> None:
     if walk.setup.scene.is_level:
         height.set_ylim(bottom=0.0)
     else:
-        x, floor = walk.center[:, 0], floor_height(walk, walk.center[:, 0])
+        x, floor = walk.center[:, 0], walk.setup.floor.heights(walk.center[:, 0])
         height.plot(walk.time, floor, color=FAINT, linewidth=0.8)
         for color, label, faces in stretches(walk, x.min(), x.max()):
             is_above = ((faces[:, 0, 0, None] <= x) & (x < faces[:, 1, 0, None])).any(axis=0)
@@ -159,13 +160,13 @@ def _loop(walk: "WalkResult", figure: Figure) -> None:
 
     reach = 1.6 * max(BOTTOM, abs(kink.dip_at))
     low, high = max(-reach, loop.free[0] - 0.03), min(reach, loop.free[1] + 0.03)
-    _draw_line(bend, "curvature", loop, (loop.s >= low) & (loop.s <= high))
+    _draw_line(bend, loop.curvature, loop, (loop.s >= low) & (loop.s <= high))
     _mark(bend, kink.dip_at, kink.dip, f"kink: ${kink.dip:.1f}$ m$^{{-1}}$ at ${100 * kink.dip_at:.1f}$ cm")
     bend.set(xlim=(low, high), ylabel="curvature $\\kappa$ / m$^{-1}$")
 
     inset = IN_LINKS * loop.parameters.link_length
     inside = (loop.s > loop.free[0] + inset) & (loop.s < loop.free[1] - inset)
-    _draw_line(pull, "effective_tension", loop, inside)
+    _draw_line(pull, loop.effective_tension, loop, inside)
     carried = loop.density * loop.speed**2
     pull.set_title(f"$\\rho v^2$ = {carried:.2f} N", fontsize="small", loc="left")
     pull.set(xlim=(loop.free[0] - 0.03, loop.free[1] + 0.03), ylabel="tension $T - \\rho v^2$ / N")
@@ -191,16 +192,13 @@ def _draw_shape(axes: Axes, loop: StationaryLoop, sprocket_radius: float) -> Non
     axes.margins(0.12, 0.03)
 
 
-def _draw_line(
-    axes: Axes, name: Literal["curvature", "effective_tension"], loop: StationaryLoop, shown: NDArray[np.bool_]
-) -> None:
+def _draw_line(axes: Axes, values: Array, loop: StationaryLoop, shown: NDArray[np.bool_]) -> None:
     """A function of the arc length where it is to be shown; the sprocket is shaded."""
     for first, last in ((-loop.length, loop.free[0]), (loop.free[1], loop.length)):
         axes.axvspan(first, last, color=GROUND, linewidth=0.0)
-    values = getattr(loop, name)[shown]
-    axes.plot(loop.s[shown], values, label="simulation, mean", **SIMULATED)
-    room = 0.2 * float(np.ptp(values))
-    axes.set_ylim(values.min() - room, values.max() + room)
+    axes.plot(loop.s[shown], values[shown], label="simulation, mean", **SIMULATED)
+    room = 0.2 * float(np.ptp(values[shown]))
+    axes.set_ylim(values[shown].min() - room, values[shown].max() + room)
     tidy(axes, grid="both")
 
 

@@ -7,12 +7,11 @@ import math
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
+
+from warpchain.inputs.arrays import Array
 
 if TYPE_CHECKING:
     from warpchain.walks.walk_result import WalkResult
-
-Array = NDArray[np.float64]
 
 Kind = Literal["film_strip", "height_and_speed", "loop", "energy", "tilt"]
 """Figures of a walk; `tilt` only of one whose plane tilts."""

@@ -5,8 +5,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.distributions import random_generator
 from warpchain.pictures.labels import cell_text, cell_values, quantity_text
 from warpchain.pictures.style import BLUE, INK, LINE_COLORS, RED, NothingToShow, Picture, panel_grid, tidy
@@ -15,23 +15,16 @@ from warpchain.store.block_result import BlockResult
 from warpchain.store.sweep_result import SweepResult
 from warpchain.sweeps.designs import sobol_indices, walks_per_sample
 
-Array = NDArray[np.float64]
-
 CONFIDENCE: Final = 0.95
 """Confidence level of bootstrap intervals."""
 _RESAMPLES: Final = 1000
 
 
 class Sensitivity(NamedTuple):
-    """Sobol' indices of the distance in one cell, for its d drawn quantities.
+    """Sobol' indices of the distance in one cell, which a text describes, for d drawn quantities of some names.
 
-    Attributes:
-        cell: values of the axes.
-        names: of the quantities.
-        indices: share of the variance that each causes by itself, and together with others, shape (2, d).
-        intervals: bootstrap intervals of these, shape (2, d, 2).
-        samples: how many, of d + 2 walks each.
-        lost: how many were left out, because one of their walks failed or has not been run yet.
+    Indices are the share of the variance that each causes by itself, and together with others, (2, d); intervals are
+    bootstrap intervals of these, (2, d, 2). Samples have d + 2 walks each; lost are those that are not complete.
     """
 
     cell: str

@@ -13,17 +13,14 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
 from warpchain.pictures.grid_figure import draw_grid
-from warpchain.pictures.labels import COUNTS, DISTANCE, FREQUENCY, cell_values, lost_note, quantity_name
+from warpchain.pictures.labels import COUNTS, cell_values, lost_note, quantity_label, quantity_name, quantity_text
 from warpchain.pictures.style import BLUE, FAINT, GREEN, INK, LINE_COLORS, RED, NothingToShow, Picture, panel_grid, tidy
 from warpchain.reports.sensitivity import sensitivity
 from warpchain.store.block_result import BlockResult
 from warpchain.store.sweep_result import SweepResult
 from warpchain.walks.rows import quantity_of
-
-Array = NDArray[np.float64]
 
 _STARTS: Final = {
     "rest": ("started at rest", RED, "o"),
@@ -41,14 +38,7 @@ def figures(result: SweepResult, quantity: str = "dx") -> Iterator[Picture]:
     """Every figure that the sweep has the walks for, the paper's Figure 6 first.
 
     What no special figure shows has one of its grid: one for all blocks that vary one quantity, and one for each set of
-    several axes.
-
-    Args:
-        result: a sweep.
-        quantity: a column of numbers; for any other than ``dx`` there are just its figures over grids.
-
-    Raises:
-        InputError: there is no such column.
+    several axes. A column other than ``dx`` has just these; an `InputError` says that there is none of that name.
     """
     statistics, shown = result.cell_statistics(quantity), set[str]()
     for draw in (figure6, sensitivity) if quantity == "dx" else ():
@@ -139,8 +129,8 @@ def figure6(result: SweepResult) -> Picture:
         used[0].set_xticks(frequencies, [f"{frequency:g}" for frequency in frequencies])
     used[0].set_xlim(frequencies[0] - 0.6 * gap, frequencies[-1] + 0.6 * gap)
     used[0].set_ylim(bottom=min(0.0, 1.05 * float(np.nanmin(rows[:, 1] - 2 * np.nan_to_num(rows[:, 2])))))
-    figure.supxlabel(FREQUENCY, fontsize="medium")
-    figure.supylabel(DISTANCE, fontsize="medium")
+    figure.supxlabel(quantity_label("frequency"), fontsize="medium")
+    figure.supylabel(f"{quantity_text('dx')} / m", fontsize="medium")
     handles: list[Any] = [Line2D([], [], linestyle="", label=label, **look) for label, look in looks.items()]
     handles += [
         Patch(facecolor=(FAINT, 0.2), edgecolor=FAINT, label="± 1 standard deviation"),

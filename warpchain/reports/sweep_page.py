@@ -6,6 +6,7 @@ the software; on demand also one walk in motion. The same folder always gives th
 
 import math
 import os
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from itertools import chain, repeat
@@ -42,18 +43,15 @@ _MOST_LISTED: Final = 100
 
 _DPI: Final = 160
 
-_HEAD: Final = """<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="generator" content="warpchain report">
-"""
+_PAGE: Final = Path(__file__).with_name("sweep_page.html").read_text(encoding="utf-8")
+"""The page, whose policy makes the browser refuse to load anything; `_page` fills in what stands in double braces."""
+_HEAD: Final = _PAGE[: _PAGE.index('<meta name="viewport"')].encode()
 """What a report begins with."""
 
 
 def _is_report(path: Path) -> bool:
     with path.open("rb") as content:
-        return content.read(len(_HEAD)) == _HEAD.encode()
+        return content.read(len(_HEAD)) == _HEAD
 
 
 REPORTS: Final = Kind("page that warpchain report has written", _is_report)
@@ -63,13 +61,10 @@ REPORTS: Final = Kind("page that warpchain report has written", _is_report)
 def write_report(
     directory: Folder, path: str | os.PathLike[str], *, animation_of: int | None = None, device: str | None = None
 ) -> None:
-    """Write the report of a sweep as one HTML page, whole or not at all; an older report is replaced.
+    """Write the report of a sweep, which may still be running, as one HTML page, whole or not at all.
 
-    Args:
-        directory: folder of the sweep, which may still be running.
-        path: the file to write.
-        animation_of: number of a walk to show in motion, from its frames in the sweep or else run again; None for none.
-        device: where that walk is run again; by default where the sweep says.
+    An older report is replaced. The walk of a number is shown in motion, from its frames in the sweep or else run again
+    on a device, by default where the sweep says.
 
     Raises:
         OSError: the folder cannot be read, the file cannot be written, or it is there and no report.
@@ -222,7 +217,8 @@ def _page(title: str, tiles: Mapping[str, tuple[int, str]], sections: Mapping[st
         links.append(f'<a href="#{anchor}">{heading}</a>')
         parts.append(f'<section id="{anchor}"><h2>{heading}</h2>\n{text}\n</section>')
     content = {"numbers": "".join(numbers), "links": " ".join(links), "sections": "\n".join(parts)}
-    return _HEAD + _PAGE.format(title=escape(title), style=_STYLE, **content)
+    content["title"] = escape(title)
+    return re.sub(r"{{(\w+)}}", lambda found: content[found[1]], _PAGE)
 
 
 def _picture(figure: "Figure", caption: str) -> str:
@@ -244,44 +240,3 @@ def _table(
     kinds = chain((" class=bad" if bad else "" for bad in marked), repeat(""))
     body = "\n".join(f"<tr{kind}>{cells('td', row)}</tr>" for row, kind in zip(rows, kinds, strict=False))
     return f'<div class="wide"><table>{top}<tbody>\n{body}\n</tbody></table></div>'
-
-
-_STYLE: Final = """
-:root { color-scheme: light; }
-body { margin: 0 auto; max-width: 62rem; padding: 1.5rem; color: #222; background: #fff;
-       font: 16px/1.5 system-ui, sans-serif; }
-h2 { margin-top: 2.5rem; border-bottom: 1px solid #ccc; }
-p { max-width: 46rem; }
-a { color: #0072b2; margin-right: 1rem; }
-dl { display: flex; flex-wrap: wrap; gap: .75rem; }
-dl div { padding: .5rem 1rem; min-width: 6rem; background: #f3f4f5; border-left: 4px solid #0072b2; }
-dl .bad { border-color: #d55e00; }
-dd { margin: 0; font-size: 1.4rem; }
-figure { margin: 1.5rem 0 2.5rem; }
-figure img { max-width: 100%; display: block; }
-figcaption { max-width: 46rem; color: #555; font-size: .9rem; }
-.wide { overflow-x: auto; }
-table { border-collapse: collapse; font-size: .9rem; }
-th, td { padding: .2rem .8rem .2rem 0; vertical-align: top; border-bottom: 1px solid #e3e3e3;
-         font-variant-numeric: tabular-nums; }
-tr.bad td, p.bad { color: #a84a00; }
-iframe { width: 100%; border: 1px solid #ccc; }
-pre { max-height: 30rem; overflow: auto; padding: 1rem; background: #f3f4f5; font-size: .8rem; line-height: 1.35; }
-@media print { nav, iframe { display: none; } figure, tr { break-inside: avoid; } }
-"""
-
-# The policy makes the browser refuse to load anything.
-_PAGE: Final = """<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta http-equiv="Content-Security-Policy"
-      content="default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'">
-<title>{title}</title>
-<style>{style}</style>
-</head>
-<body>
-<h1>{title}</h1>
-<dl>{numbers}</dl>
-<nav>{links}</nav>
-{sections}
-</body>
-</html>
-"""

@@ -19,13 +19,10 @@ ORPHANED: Final = 1
 
 @contextlib.contextmanager
 def gpu_workers(count: int) -> Iterator[ProcessPoolExecutor]:
-    """Worker processes, each of which sees only one GPU and runs a sweep with the device ``cuda``.
+    """Worker processes, each of which sees only one of the first GPUs and runs a sweep with the device ``cuda``.
 
-    An exception, such as that of Ctrl-C, ends them at once, for a task may take minutes; the shards that they have
-    written are whole.
-
-    Args:
-        count: Number of GPUs, of those that there are; the first ones, in the order of CUDA_VISIBLE_DEVICES if set.
+    GPUs are in the order of CUDA_VISIBLE_DEVICES if that is set. An exception, such as that of Ctrl-C, ends the
+    processes at once, for a task may take minutes; the shards that they have written are whole.
     """
     context = multiprocessing.get_context("spawn")  # CUDA does not survive a fork
     free = context.SimpleQueue()

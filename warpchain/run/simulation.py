@@ -11,15 +11,14 @@ from pydantic import Field
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import gpu_turn
 from warpchain.engine.tallies import LOST
+from warpchain.inputs.arrays import Array, checked_array
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene, check_links_on_gpu
 from warpchain.inputs.sections import takes_fields
-from warpchain.inputs.state import State, checked_array
+from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError, checked, plain, shown, validated
 from warpchain.status import Status
-
-Array = NDArray[np.float64]
 
 LONGEST = 1e9
 """Durations [s] from here on are refused."""
@@ -226,11 +225,7 @@ class Chains:
             self._batch.place(numbers, self.motions(numbers)[0], rates)
 
     def run(
-        self,
-        until: float,
-        chains: Sequence[int] | NDArray[np.integer[Any]] | None = None,
-        *,
-        to_rest: bool = False,
+        self, until: float, chains: Sequence[int] | NDArray[np.integer[Any]] | None = None, *, to_rest: bool = False
     ) -> None:
         """Carry on all chains that can go on, or those of some numbers.
 

@@ -134,11 +134,7 @@ def _checked_call(
     workers: int | None,
     part: str | None,
 ) -> tuple[Sweep, Path, tuple[int, int], int | None]:
-    """The sweep on its device, its folder, its part, and the number of workers.
-
-    Raises:
-        InputError: Something is refused; one line for each value.
-    """
+    """The sweep on its device, its folder, its part, and the number of workers; an `InputError` for all refused."""
     problems: list[str] = []
 
     def gathered(check: Callable[[], T]) -> T | None:
@@ -166,16 +162,10 @@ def _checked_call(
 
 
 def sweep_of_keywords(given: Mapping[str, object], out: str | os.PathLike[str] | None) -> Sweep:
-    """The sweep that keyword arguments describe.
+    """The sweep that keyword arguments describe; an `InputError` with a line for each value that is refused.
 
-    Args:
-        given: `KEYS`, and fields of a walk by name or symbol; a list or a range is an axis of the grid, behind those
-            given. Left out, the name is that of the folder, the seed 0, and the preset that of a walk, unless it is
-            an axis.
-        out: Folder of the results.
-
-    Raises:
-        InputError: Something is refused; one line for each value.
+    They are `KEYS`, and fields of a walk by name or symbol; a list or a range is an axis of the grid, behind those
+    given. Left out, the name is that of the folder, the seed 0, and the preset that of a walk, unless it is an axis.
     """
     usual = {"name": (Path(out).absolute().name if out is not None else "") or "sweep", "seed": 0, "version": VERSION}
     values = plain(given, "sweep")
@@ -216,7 +206,9 @@ def _run_in_folder(
     report: OnProgress,
 ) -> None:
     """Run what is missing in a folder."""
-    kinds, pulse, at_once = kinds_of(planned), None, workers or processors()
+    axes = (*Options.model_fields, "links", "start", "plane")  # along them kernels may differ
+    kinds = [setup for block in planned.blocks for setup in block.fixed_in(block.cells_along(axes))]
+    pulse, at_once = None, workers or processors()
     if executor is None:
         devices = {setup.options.device for setup in kinds}
         if has_gpu_turn() and any(map(on_gpu, devices)):
@@ -225,7 +217,7 @@ def _run_in_folder(
             start_device(device)  # refuses one that is not there before anything is written
         if all(map(on_gpu, devices)):
             at_once = 1  # the others would wait for it
-    size = shard_size(planned.walk_count)
+    size = max(1, min(SHARD_WALKS, planned.walk_count // SHARDS))  # by the sweep only: equal sweeps leave equal files
     with SweepFolder.open(folder, planned, fresh=fresh, shard_size=size, part=part) as store, ExitStack() as held:
         missing = store.missing()
         walks = sum(map(len, store.manifest.wanted))
@@ -251,10 +243,7 @@ def on_device(planned: Sweep, device: str) -> Sweep:
     """The same sweep on another device; a method that was named by need is what this means there.
 
     The canonical form, in which a folder keeps its sweep, names the method itself, so that the sweep is run again with
-    the same method on any device.
-
-    Raises:
-        InputError: The sweep's grid goes over devices.
+    the same method on any device. An `InputError` says that the sweep's grid goes over devices.
     """
     if any("device" in block.varied for block in planned.blocks):
         raise InputError(f"device: {device} is given, but the sweep's grid goes over devices; leave one of them out")
@@ -268,20 +257,11 @@ def on_device(planned: Sweep, device: str) -> Sweep:
     return moved
 
 
-def shard_size(walks: int) -> int:
-    """Walks per shard; it depends on the sweep only, so that equal sweeps leave equal files."""
-    return max(1, min(SHARD_WALKS, walks // SHARDS))
-
-
 def run_shards(planned: Sweep, directory: str, stamp: str, shards: Sequence[Shard], pulse: Pulse | None = None) -> None:
     """Run the walks of some shards and write each shard as soon as its walks are over; what a worker does.
 
-    Args:
-        planned: The sweep.
-        directory: The sweep's folder.
-        stamp: What the folder has to be, see `SweepFolder.stamp`.
-        shards: The shards.
-        pulse: Counts the walks that are over, and stops the work: unfinished shards are not written.
+    The folder has to have the stamp, see `SweepFolder.stamp`. The pulse counts the walks that are over, and stops the
+    work: unfinished shards are not written.
     """
     stop = None if pulse is None else pulse.stop
     walks = list(planned.undrawn(index for shard in shards for index in shard.walks.tolist()))
@@ -306,12 +286,6 @@ def run_shards(planned: Sweep, directory: str, stamp: str, shards: Sequence[Shar
                 motions[shard][row] = run.recorder.motion()
             if (rows[shard]["status"] != MISSING).all():
                 write_shard(directory, stamp, shard, rows.pop(shard), motions.pop(shard))
-
-
-def kinds_of(planned: Sweep) -> list[Setup]:
-    """Setups with all options, numbers of links and starts that walks of a sweep have, but not with all else."""
-    axes = (*Options.model_fields, "links", "start", "plane")
-    return [setup for block in planned.blocks for setup in block.fixed_in(block.cells_along(axes))]
 
 
 def _follow(

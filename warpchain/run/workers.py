@@ -17,9 +17,8 @@ def losses_named() -> Iterator[None]:
         yield
     except Exception as error:
         is_of_dask = type(error).__module__.partition(".")[0] == "distributed"  # which need not be installed
-        if not is_of_dask and not isinstance(
-            error, concurrent.futures.BrokenExecutor | concurrent.futures.CancelledError
-        ):
+        lost = concurrent.futures.BrokenExecutor | concurrent.futures.CancelledError
+        if not is_of_dask and not isinstance(error, lost):
             raise
         raise LostWorkersError(
             f"the workers ended before the sweep ({type(error).__name__}): killed, out of memory, or their scheduler "
@@ -28,12 +27,7 @@ def losses_named() -> Iterator[None]:
 
 
 class Pulse:
-    """What tasks in threads of this process and their sweep tell one another.
-
-    Attributes:
-        stop: Set when the work is to be abandoned.
-        over: Number of walks that are over.
-    """
+    """What threads of this process and their sweep tell each other: how many walks are over, when to stop the work."""
 
     def __init__(self) -> None:
         """Begin to count."""

@@ -110,8 +110,7 @@ class BlockResult:
     @property
     def is_there(self) -> NDArray[np.bool_]:
         """Whether a walk has been computed, shape `shape`."""
-        there: NDArray[np.bool_] = self.columns["status"] != MISSING
-        return there
+        return np.asarray(self.columns["status"] != MISSING)
 
     def filled_from(self, other: "BlockResult") -> "BlockResult":
         """The same block with the walks that only another result of it has."""
@@ -254,8 +253,7 @@ class BlockResult:
     @property
     def inaccurate(self) -> NDArray[np.bool_]:
         """Whether a walk has one of the `faults`, shape `shape`."""
-        found: NDArray[np.bool_] = np.any(list(self.faults.values()), axis=0)
-        return found
+        return np.asarray(np.any([*self.faults.values()], axis=0))
 
     def statistics(self, name: str = "dx") -> CellStatistics:
         """Statistics of a column in each cell, over the walks at rest that have a number there.

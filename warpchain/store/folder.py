@@ -53,11 +53,8 @@ _YAML_HEAD: Final = """\
 class SweepFolder(AbstractContextManager["SweepFolder"]):
     """The folder of a sweep, locked against other processes until `close` or the end of this process.
 
-    Attributes:
-        directory: the folder.
-        manifest: what it belongs to, and how its walks are laid out in shards.
-        lock: descriptor of the lock.
-        found: of each walk in the order of `Manifest.keys` whether it was there when the folder was opened.
+    `lock` is the descriptor of the lock; `found` says of each walk in the order of `Manifest.keys` whether it was there
+    when the folder was opened.
     """
 
     directory: Path
@@ -74,23 +71,16 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
     def open(
         cls, directory: Folder, sweep: Sweep, *, fresh: bool = False, shard_size: int, part: tuple[int, int] = (1, 1)
     ) -> Self:
-        """Begin a sweep in a folder, or go on with it, with more samples if the sweep has more than the folder.
+        """Begin a sweep in a folder, made if need be, or go on with it, with more samples if the sweep has more.
 
-        Args:
-            directory: the folder; made if need be.
-            sweep: the sweep that is to be in it.
-            fresh: delete what a sweep has left in the folder, and begin.
-            shard_size: number of walks in a shard of a new folder, or of the walks that are added to a folder; the
-                shards that a folder has keep their size.
-            part: see `Manifest.part`; a folder keeps the part that it was begun with.
+        `fresh` deletes what a sweep has left there, and begins. New shards have `shard_size` walks, those that are
+        there keep their size. A folder keeps the `Manifest.part` that it was begun with. An `InputWarning` says that a
+        shard was damaged: its walks are missing now.
 
         Raises:
             OSError: the folder cannot be made, locked, read or written.
             InputError: another process holds the folder, it belongs to another sweep or to something else, or a
                 shard is foreign. Nothing has been deleted, and nothing new is left.
-
-        Warns:
-            InputWarning: a shard was damaged; its walks are missing now.
         """
         path = given_path(directory)
         make_folder(path)
@@ -146,8 +136,7 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
             remove_output(description)
             write_whole(self.directory / "sweep.h5", self.manifest.image())
         if not description.exists():
-            sweep = self.manifest.sweep.canonical()
-            text = yaml.safe_dump(sweep, sort_keys=False, allow_unicode=True)
+            text = yaml.safe_dump(self.manifest.sweep.canonical(), sort_keys=False, allow_unicode=True)
             write_whole(description, _YAML_HEAD + text)
 
 
@@ -157,16 +146,8 @@ def read_rows(
     """For each block the rows of its walks, and of each what opens the file with its motion, and the group in there.
 
     Needs no lock, at any moment. Rows of walks that are not there yet are those of `missing_rows`; for a motion that is
-    not kept stands None.
-
-    Args:
-        directory: the folder.
-        manifest: what it holds.
-        damaged: takes the name of each damaged shard and what is wrong with it; None: that is an error.
-
-    Raises:
-        OSError: the folder or a shard cannot be read.
-        InputError: a shard is foreign, or damaged.
+    not kept stands None. `damaged` takes the name of each damaged shard and what is wrong with it; without it that is
+    an `InputError`, as is a foreign shard. An `OSError` says that the folder or a shard cannot be read.
     """
     tables, motions = [], []
     for number, block in enumerate(manifest.sweep.blocks):
@@ -223,10 +204,7 @@ def _prepared(folder: Path, sweep: Sweep, manifest: Manifest, fresh: bool) -> Ma
 
 
 def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
-    """The manifest of a folder that is to go on with a sweep, whose manifest in a new folder is given.
-
-    An `InputError` says that it holds another sweep, or one whose samples do not grow to those of this one.
-    """
+    """The manifest of a folder that is to go on with a sweep of this manifest; an `InputError` if it holds another."""
     found = read_manifest(folder)
     if found.numerics_version != NUMERICS_VERSION:
         raise InputError(

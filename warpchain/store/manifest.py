@@ -39,11 +39,7 @@ FIRST_SHARDS: Final = 32
 class Shard:
     """Some walks of a sweep that are computed together and kept in one file.
 
-    Attributes:
-        digest: see `Manifest.digest`.
-        kind: type of the rows.
-        keys: block, cell and sample of each walk, of type `KEYS`.
-        walks: number of each walk in the sweep.
+    `kind` is the type of the rows; `keys` of type `KEYS` and `walks` are of each walk its place and its number.
     """
 
     digest: str
@@ -65,12 +61,8 @@ class Shard:
 class Manifest:
     """What a folder holds.
 
-    Attributes:
-        sweep: the sweep.
-        shard_size: most walks in a shard; the first shards have fewer, see `_bounds`.
-        numerics_version: version of the numbers of its walks.
-        versions: the software that began the sweep.
-        part: (k, N), if the folder is only to have the k-th of N parts of the walks, 1 ≤ k ≤ N; more samples move none.
+    A shard has `shard_size` walks at most, the first ones fewer, see `_bounds`. `versions` are those of the software
+    that began the sweep. Of `part` (k, N), 1 ≤ k ≤ N, it only has the k-th of N parts; more samples move no walk.
     """
 
     sweep: Sweep
@@ -129,8 +121,8 @@ class Manifest:
 def _bounds(walks: int, most: int) -> list[int]:
     """Where the shards of some walks begin, and their end.
 
-    The first four have `FIRST_SHARDS` at most, and every four twice as many as those before: a sweep that is stopped in
-    its first minute has lost seconds.
+    The first four have `FIRST_SHARDS` at most, and every four twice as many as those before, so that a sweep that is
+    stopped in its first minute has lost seconds.
     """
     bounds = [0]
     while bounds[-1] < walks:
@@ -147,11 +139,7 @@ def stored_sweep(path: Folder, content: Mapping[str, object]) -> Sweep:
 
 
 def read_manifest(directory: Folder) -> Manifest:
-    """The manifest of a folder; an `OSError` if that cannot be read.
-
-    An `InputError` says that there is no sweep in it, or one of another version of warpchain, a `DamagedFileError` that
-    its sweep.h5 is damaged.
-    """
+    """The manifest of a folder; an `OSError` if unreadable, an `InputError` if it holds no sweep of this version."""
     path = Path(directory) / "sweep.h5"
     if not os.path.lexists(path):
         if not os.path.exists(directory):

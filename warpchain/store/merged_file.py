@@ -59,10 +59,7 @@ def merge(sources: Folder | Sequence[Folder], path: str | os.PathLike[str]) -> N
 
 
 def _filled(folders: Sequence[Folder]) -> SweepResult:
-    """The result of the first folder, filled in with the walks of the others.
-
-    An `InputError` says that a walk is in two of the folders, or that they are not of one sweep.
-    """
+    """The result of all folders; an `InputError` if two have the same walk, or they are not of one sweep."""
     first, *others = folders
     whole = load(first)
     for folder in others:
@@ -80,10 +77,7 @@ def _filled(folders: Sequence[Folder]) -> SweepResult:
 
 
 def _is_merged(path: Path) -> bool:
-    """Whether `merge` has written this file, and nothing has damaged it since; an `OSError` if it cannot be read.
-
-    Pipes and devices are none.
-    """
+    """Whether `merge` has written this file, and nothing has damaged it since; an `OSError` if it cannot be read."""
     try:
         return not path.is_symlink() and path.is_file() and kind_of_hdf5(path, WANTED) == KIND
     except InputError:

@@ -47,16 +47,11 @@ def stamp(directory: Folder) -> str:
 def write_shard(
     directory: Folder, expected: str, shard: Shard, rows: Rows, motions: Mapping[int, Mapping[str, Any]]
 ) -> None:
-    """Write a shard; needs no lock, so that workers can call it.
+    """Write a shard into a folder that is open in the process that runs the sweep; workers need no lock for it.
 
     Two workers may write the same shard at the same time: both write the same bytes, and one file replaces the other.
-
-    Args:
-        directory: folder of the sweep, opened before by the process that runs the sweep.
-        expected: `stamp` of the folder when its walks were planned.
-        shard: the shard.
-        rows: rows of its walks, all ended.
-        motions: row → arrays, see `write_motion`, of those of the walks whose motion the sweep keeps.
+    `expected` is the `stamp` of the folder when the walks were planned; all have ended. `motions` has the arrays of
+    `write_motion` by rows, of walks whose motion the sweep keeps.
 
     Raises:
         OSError: the file cannot be written; the folder is as it was.
@@ -95,10 +90,7 @@ def rows_of(file: "h5py.File", kind: np.dtype[np.void]) -> Rows:
 
 
 def shard_files(directory: Folder) -> list[str]:
-    """Names of all files of shards, sorted; hidden files are ignored.
-
-    An `OSError` says that the folder cannot be read, an `InputError` that there is a file that is none.
-    """
+    """Names of all files of shards, sorted; an `InputError` names one that is none, but for hidden files."""
     folder = Path(directory) / "shards"
     try:
         names = sorted(name for name in os.listdir(folder) if not name.startswith("."))
@@ -114,10 +106,7 @@ def shard_files(directory: Folder) -> list[str]:
 
 @contextmanager
 def opened_shard(directory: Folder, name: str, digest: str) -> "Iterator[h5py.File]":
-    """The shard of a sweep with a digest that was written under this name; an `OSError` if it cannot be read.
-
-    An `InputError` says that it is damaged or belongs to another sweep.
-    """
+    """The shard of this name and digest; an `OSError` if it is unreadable, an `InputError` if damaged or foreign."""
     path = Path(directory) / "shards" / name
     with reading_hdf5(path, KIND, "delete it and run the sweep again, which computes only its walks") as file:
         if (file.attrs["name"], file.attrs["digest"]) != (name, digest):

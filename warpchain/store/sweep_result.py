@@ -116,11 +116,7 @@ class SweepResult:
         return sum(int(block.inaccurate.sum()) for block in self.blocks.values())
 
     def unit(self, name: str) -> str:
-        """SI unit of a column or an axis of any block, "1" for pure numbers.
-
-        Raises:
-            KeyError: there is none of that name.
-        """
+        """SI unit of a column or an axis of any block, "1" for pure numbers; a `KeyError` if there is none."""
         first, *others = self.blocks.values()
         owner = next((block for block in others if name in block.columns or name in block.dims), first)
         return owner.unit(name)

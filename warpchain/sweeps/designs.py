@@ -10,15 +10,12 @@ A. Saltelli et al., Comput. Phys. Commun. 181 (2010) 259 (A, B and AB).
 """
 
 import functools
-from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.validation import InputError
-
-Array = NDArray[np.float64]
 
 SAMPLERS: Final = ("random", "sobol", "latin_hypercube", "saltelli")
 """Independent samples; a scrambled Sobol' sequence; a latin hypercube; a Sobol' sequence of twice the dimension, each
@@ -42,8 +39,7 @@ def walks_per_sample(sampler: str, dimensions: int) -> int:
 def check_design(sampler: str, samples: int, dimensions: int, path: str) -> None:
     """Check that a sampler can make a number of samples of so many drawn quantities.
 
-    An `InputError`, which begins with `path`, says that samples would all be equal, are too many, or break the balance
-    of a Sobol' sequence.
+    An `InputError`, which begins with `path`, says that samples would be equal, too many, or no balanced sequence.
     """
     if dimensions == 0:
         if sampler == "saltelli":
@@ -72,17 +68,9 @@ def check_design(sampler: str, samples: int, dimensions: int, path: str) -> None
 
 @functools.lru_cache(maxsize=4)
 def design_points(sampler: str, seed: int, cell: int, samples: int, dimensions: int) -> Array:
-    """The points of a cell, the same for every caller; the last few cells are kept.
+    """Points inside (0, 1) of N samples of d quantities in a cell, given its stream: (N, d), for `saltelli` (N, 2d).
 
-    Args:
-        sampler: `sobol`, `latin_hypercube` or `saltelli`.
-        seed: seed of the sweep.
-        cell: number of the cell's stream.
-        samples: number of rows N.
-        dimensions: number of drawn quantities d.
-
-    Returns:
-        Read-only points inside (0, 1), shape (N, d), for `saltelli` (N, 2d).
+    They are read-only, the same for every caller; the last few cells are kept.
     """
     from scipy.stats import qmc  # takes longer to import than all else
 
@@ -97,30 +85,11 @@ def design_points(sampler: str, seed: int, cell: int, samples: int, dimensions: 
     return points
 
 
-def saltelli_points(first: Mapping[str, float], second: Mapping[str, float]) -> list[dict[str, float]]:
-    """The d + 2 points of one `saltelli` sample, in the order of its walks.
-
-    Args:
-        first: row of the matrix A, name → value.
-        second: row of the matrix B, the same names.
-
-    Returns:
-        The row of A, that of B, and for each quantity in turn that of A with this one value taken from B.
-    """
-    return [dict(first), dict(second), *({**first, name: second[name]} for name in first)]
-
-
 def sobol_indices(samples: Array) -> tuple[Array, Array]:
-    """First-order and total Sobol' indices, by the estimators of Saltelli et al. (2010), table 2 (b) and (f).
+    """First-order and total Sobol' indices, (d,) each, by estimators of Saltelli et al. (2010), table 2 (b) and (f).
 
-    The same numbers as `scipy.stats.sobol_indices`, which takes powers of two of samples only.
-
-    Args:
-        samples: results of the d + 2 walks of each `saltelli` sample, in their order, shape (N, d + 2), all finite.
-
-    Returns:
-        First-order and total index of each drawn quantity, shape (d,) each; NaN where all results are equal or
-        there is none.
+    Given are finite results of the d + 2 walks of each `saltelli` sample, in their order, (N, d + 2); NaN where all are
+    equal or there is none. The same numbers as `scipy.stats.sobol_indices`, which takes powers of two of samples only.
     """
     first, second, crossed = samples[:, 0], samples[:, 1], samples[:, 2:].T
     pooled = np.concatenate([first, second])

@@ -28,7 +28,7 @@ from warpchain.inputs.sections import SECTIONS
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.validation import InputError
 from warpchain.sweeps.block import Block
-from warpchain.sweeps.designs import design_points, saltelli_points, walks_per_sample
+from warpchain.sweeps.designs import design_points, walks_per_sample
 from warpchain.sweeps.recording import Recording
 from warpchain.sweeps.sweep_file import VERSION, read_sweep
 from warpchain.walks.motion import Keep
@@ -42,15 +42,9 @@ LEAST_SHARE: Final = 0.05
 
 @dataclass(frozen=True)
 class PlannedWalk:
-    """One walk of a sweep.
+    """One walk of a sweep: its number, that of its block, its cell along every axis of that, its number in the cell.
 
-    Attributes:
-        index: its number in the sweep.
-        block: number of its block.
-        cell: its place along every axis of the block.
-        sample: its number in its cell.
-        setup: everything that says what it is.
-        drawn: name → value of what was drawn for it, in the order of drawing.
+    The setup is everything that says what it is; what was drawn for it stands in the order of drawing, too.
     """
 
     index: int
@@ -205,7 +199,10 @@ class Sweep:
             fractions = iter(matrix[row].tolist())
             makers = [lambda: {name: each.quantile(next(fractions)) for name, each in distributions.items()}, *makers]
         for point in makers:
-            points = saltelli_points(point(), point()) if block.sampler == "saltelli" else [point()]
+            points = [point()]
+            if block.sampler == "saltelli":  # rows of A and B, and A with one value of B, of each quantity in turn
+                first, second = points[0], point()
+                points = [first, second, *({**first, name: second[name]} for name in first)]
             try:
                 return points, [fixed.with_drawn(point) for point in points]
             except InputError as error:

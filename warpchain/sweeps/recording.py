@@ -47,10 +47,7 @@ class Series(BaseModel):
         return self.samples == "all" or sample in self.samples
 
     def steps(self, options: Options, path: str) -> int:
-        """The interval in units of `options.record_interval`.
-
-        If it is no whole multiple, an `InputError` begins with `path`, where the choice was given.
-        """
+        """The interval in units of `options.record_interval`, if whole; else an `InputError` beginning with `path`."""
         ratio = self.interval / options.record_interval
         steps = round(ratio)
         if steps < 1 or abs(ratio - steps) > 1e-6 * ratio:

@@ -21,10 +21,7 @@ def shipped_sweeps() -> list[str]:
 
 
 def sweep_path(source: str | os.PathLike[str]) -> Path:
-    """Path of a sweep file; a bare name that is no file is that of a sweep that comes with the package.
-
-    An `InputError` says that it is no path, or a bare name that is neither a file nor a sweep of the package.
-    """
+    """Path of a sweep file, or of a sweep of the package by its bare name; an `InputError` if it is neither."""
     path = checked_path(source, "sweep")
     name = str(path)
     if os.path.isfile(path) or not re.fullmatch(r"[A-Za-z0-9_-]+", name):
@@ -36,10 +33,7 @@ def sweep_path(source: str | os.PathLike[str]) -> Path:
 
 
 def write_new_sweep(path: Path) -> None:
-    """Write a small sweep file whose comments explain its keys.
-
-    An `InputError` says that there is such a file already, an `OSError` that it cannot be written.
-    """
+    """Write a small sweep file whose comments explain its keys; an `InputError` if there is a file already."""
     text = _TEMPLATE.read_text(encoding="utf-8")
     if os.path.lexists(path):
         raise InputError(f"--new: {path} exists; give another name")

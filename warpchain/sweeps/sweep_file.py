@@ -263,10 +263,7 @@ def _checked(model: type[ModelT], content: object, path: str, source: object) ->
 
 
 def read_walk_file(path: str | os.PathLike[str]) -> tuple[str | None, dict[str, dict[str, Any]]]:
-    """Preset, None if there is none, and values by section and full names, of the YAML file of a walk.
-
-    An `InputError` has a line for each problem: the file cannot be read, or something in it is refused.
-    """
+    """Preset or None, and values by section and full names, of the YAML file of a walk; else an `InputError`."""
     file = _checked(WalkKeys, read_yaml(path), "", path)
     return file.preset, {section: getattr(file, section) for section in SECTIONS}
 
@@ -289,8 +286,15 @@ def read_sweep(
         blocks = [_block("main", "sweep", None, file)]
     else:
         blocks = [_block(each.name, f"sweep.blocks[{i}]", file, each) for i, each in enumerate(file.blocks)]
-    same = _same_samples_along(file.same_samples_along, {name for block in blocks for name in block.axes})
-    return file.name, file.seed, same, tuple(_numbered(blocks, same)), file.record
+    same, known = (
+        {*map(validation.full_name, file.same_samples_along)},
+        {name for block in blocks for name in block.axes},
+    )
+    for name in same - known:
+        remedy = validation.suggestion(name, sorted(known))
+        raise InputError(f"sweep.same_samples_along: {shown(name)} is no axis of any block; {remedy}")
+    along = tuple(sorted(same))
+    return file.name, file.seed, along, tuple(_numbered(blocks, along)), file.record
 
 
 def _block(name: str, path: str, outer: BlockKeys | None, inner: BlockKeys) -> Block:
@@ -338,15 +342,6 @@ def _drawn(
             raise InputError(f"{path}.{name}: {name} also has a value in {home}; leave one out, or give fixed")
         drawn[name] = distribution
     return drawn
-
-
-def _same_samples_along(written: list[str], known: set[str]) -> tuple[str, ...]:
-    """The axes along which the same samples are used, sorted."""
-    names = {validation.full_name(name) for name in written}
-    for name in names - known:
-        remedy = validation.suggestion(name, sorted(known))
-        raise InputError(f"sweep.same_samples_along: {shown(name)} is no axis of any block; {remedy}")
-    return tuple(sorted(names))
 
 
 def _numbered(blocks: list[Block], same_samples_along: tuple[str, ...]) -> Iterator[Block]:

@@ -2,18 +2,14 @@
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from warpchain.engine.control import SOFT, SOFTEST
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.link_values import LinkValues, mean_value
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import joint_radius, loop_speed, settling_time
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.start_shapes import lay_chain, stadium
-
-Array = NDArray[np.float64]
 
 HOLD_STRAIN = 3e-4
 """Greatest strain of a held loop on softened joints by its speed."""
@@ -44,12 +40,7 @@ BY_ITSELF = -1.0
 
 
 def drive_of(setup: Setup, links: LinkValues) -> tuple[tuple[Array, Array], dict[str, float]]:
-    """Position and velocity (n, 3) of a chain on its sprocket, about the origin, and fields of `Drive` by name.
-
-    Args:
-        setup: Of the walk.
-        links: What each of its links has.
-    """
+    """Position and velocity (n, 3) of a chain on its sprocket, about the origin, and fields of `Drive` by name."""
     scene, parameters, options = setup.scene, setup.parameters, setup.options
     from_rest = scene.start == "rest"
     radius = joint_radius(scene, parameters)
@@ -91,13 +82,7 @@ def drive_of(setup: Setup, links: LinkValues) -> tuple[tuple[Array, Array], dict
 
 
 def _softness(parameters: Parameters, tension: float, strain: float) -> float:
-    """Softness of joints, from 1 for soft ones to 2 for the softest, that a tension [N] stretches by so much.
-
-    Args:
-        parameters: The chain's parameters.
-        tension: T, which stretches the joints by T/k.
-        strain: Greatest T/k, in link lengths.
-    """
+    """Softness of joints, from 1 for soft ones to 2 for the softest, that a tension [N] strains by so many lengths."""
     wanted = tension / (strain * parameters.link_length)
     soft = min(parameters.joint_stiffness, SOFT.joint_stiffness)  # as no joint becomes stiffer than its own
     softest = SOFTEST.joint_stiffness

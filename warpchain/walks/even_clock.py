@@ -7,27 +7,16 @@ to an eighth of the jump times the time between the samples.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpchain.inputs.arrays import Array
 from warpchain.kernels import layout
 
-Array = NDArray[np.float64]
-
-_PLACES = (
-    (layout.CENTER_X, layout.CENTER_U),
-    (layout.CENTER_Y, layout.CENTER_V),
-    (layout.CENTER_Z, layout.CENTER_W),
-)
+_PLACES = ((layout.CENTER_X, layout.CENTER_U), (layout.CENTER_Y, layout.CENTER_V), (layout.CENTER_Z, layout.CENTER_W))
 """Columns of a sample: a place, and its velocity."""
 
 
 def between(samples: Array, times: Array) -> Array:
-    """Rows at some times within a series of at least two samples; one at the time of a sample is that sample.
-
-    Args:
-        samples: shape (t, columns of a sample), times rising.
-        times: [s], rising.
-    """
+    """Rows at rising times [s] within two samples or more, (t, columns); one at the time of a sample is that sample."""
     clock = samples[:, layout.TIME]
     later = np.clip(np.searchsorted(clock, times), 1, len(samples) - 1)
     first, second = samples[later - 1], samples[later]
@@ -45,12 +34,9 @@ def between(samples: Array, times: Array) -> Array:
 
 
 def even_rows(samples: Array, interval: float, after: float | None = None) -> Array:
-    """Rows at whole multiples of an interval from the first to the last of some samples, and these two as they are.
+    """Rows at whole multiples of an interval [s] from the first to the last of some samples, and these two as they are.
 
-    Args:
-        samples: shape (t, columns of a sample), times rising.
-        interval: time [s] between two marks.
-        after: time [s] in a walk that goes on, to which the first sample does not belong: marks begin after it.
+    To a walk that goes on `after` a time [s] the first sample does not belong: marks begin after that.
     """
     clock = samples[:, layout.TIME]
     if not len(samples):

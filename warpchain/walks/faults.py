@@ -39,11 +39,7 @@ def least(value: Any) -> float:
 def faults(energy_error: Any, opening: Any, penetration: Any, lengths: Mapping[str, Any]) -> dict[str, Any]:
     """Whether walks have each of `FAULTS`: of numbers or arrays; NaN is no fault.
 
-    Args:
-        energy_error: see `energy_error`.
-        opening: greatest of a joint [m].
-        penetration: greatest of a circle [m].
-        lengths: the `least` of each of `LENGTHS` [m].
+    Given are the greatest opening of a joint and penetration of a circle [m], and the `least` of each of `LENGTHS` [m].
     """
     link_length, circle_radius, link_radii, charm_radius = (lengths[name] for name in LENGTHS)
     radius = np.minimum(charm_radius, np.where(np.isinf(link_radii), circle_radius, link_radii))

@@ -3,15 +3,13 @@
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.floor import slope_points
 from warpchain.inputs.scene import link_values
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.validation import InputError
 from warpchain.kernels import layout
-
-Array = NDArray[np.float64]
 
 RELEASE: Final = {
     "center_x": "x of the centre of mass",

@@ -8,31 +8,26 @@ way that the chain walks.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.scene import link_values
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.state import State
 from warpchain.kernels import layout
-
-Array = NDArray[np.float64]
 
 
 def released_plane(setup: Setup, position: Array) -> Array:
     """The plane of a chain at its release, (PLANE_VALUES,).
 
     It is tilted about a line along the room's X axis. Its lowest point stays at its height, and the centre of mass
-    stays above z = 0 and moves sideways at the scene's lateral speed.
-
-    Args:
-        setup: of the walk.
-        position: x, y [m], θ [rad] of the links in the upright plane, shape (n, 3).
+    stays above z = 0 and moves sideways at the scene's lateral speed. The position, (n, 3), is in the upright plane.
     """
     scene, parameters = setup.scene, setup.parameters
     links = link_values(scene, parameters)
     masses = links.mass
     center_x, center_y, _ = masses @ position / masses.sum()
-    lowest = lowest_point(position, parameters.link_length, links.radius)
+    ends = position[:, 1] - parameters.link_length / 2 * np.abs(np.sin(position[:, 2]))  # the lower ones of all links
+    lowest = float(np.min(ends - links.radius))
     sine, cosine = math.sin(scene.tilt), math.cos(scene.tilt)
     turn_x, turn_y = -scene.tilt_rate, scene.yaw_rate
     plane = np.zeros(layout.PLANE_VALUES)
@@ -43,12 +38,6 @@ def released_plane(setup: Setup, position: Array) -> Array:
     raised = lowest * (1 - cosine) + parameters.half_width * abs(sine)
     plane[layout.ORIGIN : layout.ORIGIN + 3] = 0.0, raised, center_y * sine
     return plane
-
-
-def lowest_point(position: Array, link_length: float, radius: Array) -> float:
-    """Height [m] of the lowest point of a chain's circles; position (n, 3), radius (n,)."""
-    ends = position[:, 1] - link_length / 2 * np.abs(np.sin(position[:, 2]))
-    return float(np.min(ends - radius))
 
 
 def angles(planes: Array) -> tuple[Array, Array]:
@@ -83,11 +72,5 @@ def plane_of_state(state: State) -> Array:
 
 
 def in_room(joints: Array, origin: Array, axes: Array) -> Array:
-    """Places in the room, shape (f, n, 3), of points of planes.
-
-    Args:
-        joints: x, y [m] in the plane, shape (f, n, 2).
-        origin: of the plane [m], shape (f, 3).
-        axes: e1 and e2, shape (f, 2, 3).
-    """
+    """Places in the room [m], (f, n, 3), of joints in planes, (f, n, 2), of an origin, (f, 3), and axes, (f, 2, 3)."""
     return origin[:, None, :] + joints @ axes

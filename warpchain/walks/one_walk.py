@@ -72,7 +72,8 @@ def run_walk(
 
     def watch(run: WalkRun) -> None:
         if on_progress is not None:
-            on_progress(Progress(run.phase, run.walk_time or run.simulated_time, run.speed, run.attempts))
+            attempts = run.counts["accepted"] + run.counts["rejected"]
+            on_progress(Progress(run.phase, run.walk_time or run.simulated_time, run.speed, attempts))
 
     with gpu_turn([setup.options.device]):
         if on_progress is not None:

@@ -3,16 +3,14 @@
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpchain.engine.batch import Batch, Recorded
+from warpchain.inputs.arrays import Array
 from warpchain.kernels import layout
 from warpchain.loop.stationary_loop import BEFORE, BeforeRelease
 from warpchain.walks.even_clock import even_rows
 from warpchain.walks.motion import Keep
 from warpchain.walks.moving_plane import angles, frame_axes
-
-Array = NDArray[np.float64]
 
 SERIES: Final[dict[str, int | list[int]]] = {
     "time": layout.TIME,
@@ -28,22 +26,10 @@ SERIES: Final[dict[str, int | list[int]]] = {
 
 
 class Recorder:
-    """Samples and frames of one walk since its release, and of the last moments before if they are to be kept.
-
-    Attributes:
-        before: What is kept of the time before the release; None: nothing.
-        keep: Which of the samples and frames are kept.
-    """
+    """Samples and frames of one walk since its release, and of the last moments before if they are to be kept."""
 
     def __init__(self, batch: Batch, world: int, keep: Keep, tilts: bool = False) -> None:
-        """Begin with nothing.
-
-        Args:
-            batch: Where the walk runs; whether it takes samples and frames, and how often, was decided with it.
-            world: Index.
-            keep: Which of the samples are kept, and whether frames are.
-            tilts: Whether the plane of the chain moves; the batch then keeps it.
-        """
+        """Begin with nothing; how often samples and frames are taken, and whether planes are, the batch has decided."""
         self.before: BeforeRelease | None = None
         self._batch, self._world, self.keep, self._tilts = batch, world, keep, tilts
         self._drive: list[tuple[float, Recorded]] = []  # with the time at which the launch ended [s]
@@ -70,10 +56,8 @@ class Recorder:
     def release(self, moment: float, raised: float, earliest: float) -> None:
         """Keep what was recorded in the last moments of the drive, all of which has been drained.
 
-        Args:
-            moment: Of the release, by the clock of the drive [s].
-            raised: Height [m] by which the chain was raised at the release.
-            earliest: When the loop was last given its own loads [s]; nothing older is kept.
+        The chain was raised by so much [m] at the moment of the release, by the clock of the drive [s]. Nothing is kept
+        from before the earliest, when the loop was last given its own loads.
         """
         if not self._drive:
             return

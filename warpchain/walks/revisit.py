@@ -19,18 +19,11 @@ FINER = 8
 
 
 def state_at(setup: Setup, t: object, end: float) -> State:
-    """The state of a walk at the end of its first step at or after a time, see `WalkResult.state`.
+    """The state of a walk at the end of its first step at or after a time [s], see `WalkResult.state`.
 
     Launches that go past that step are undone and shortened, down to one attempt: so the walk makes the steps that it
-    always makes, and none for this time.
-
-    Args:
-        setup: of the walk.
-        t: time since the release [s].
-        end: when it ended [s]; NaN if it did before its release.
-
-    Raises:
-        InputError: there is no such time, or the walk, run again, ends before.
+    always makes, and none for this time. Its end [s] is NaN if it came before the release. An `InputError` says that
+    there is no such time, or that the walk, run again, ends before.
     """
     time: float = checked(t, "t", float, "s")
     first = setup.scene.release[-1][0] if setup.scene.release is not None else 0.0  # then the sprocket vanishes

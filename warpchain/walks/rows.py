@@ -26,19 +26,13 @@ MISSING: Final = -1
 _DRAWN: Final = "_drawn"
 _PREFIXES: Final = {"greatest_penetration": "penetration"}
 """Field that is a dictionary → how the names of its columns begin, if not with its own."""
-_ONLY_OF_A_WALK: Final = ("wall_time",)
-"""Fields that are no columns: a number of a sweep is the same however its walk was computed."""
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a sweep.
+    """A column of a sweep: its type in NumPy's notation, SI unit ("1" for pure numbers) and meaning.
 
-    Attributes:
-        kind: its type in NumPy's notation.
-        unit: SI unit, "1" for pure numbers.
-        meaning: one line saying what the numbers are.
-        path: field of `WalkResult` that it is of, and key in that field, if it is a dictionary; none for others.
+    The path is the field of `WalkResult` that it is of, and the key in a field that is a dictionary; others have none.
     """
 
     kind: str
@@ -51,7 +45,7 @@ def _stored_columns() -> Iterator[tuple[str, Column]]:
     """The columns of the fields of `WalkResult`."""
     types = {item.name: get_args(item.type) for item in fields(WalkResult)}
     for name, stored in NUMBERS.items():
-        if name in _ONLY_OF_A_WALK:
+        if name == "wall_time":  # a number of a sweep is the same however its walk was computed
             continue
         kind = "<i8" if types[name][0] in (int, dict[str, int]) else "<f8"
         for key, meaning in (stored.keys or {"": stored.meaning}).items():
@@ -76,17 +70,12 @@ COLUMNS: Final = {
 }
 """Columns of every sweep; behind them comes one for each quantity that the sweep draws, see `drawn_column`.
 
-What is missing, or does not exist (the distance of a walk that failed), is NaN in a column of floats and −1 in one of
-integers.
+What is missing, or does not exist (the distance of a walk that failed), is NaN among floats and −1 among integers.
 """
 
 
 def row_type(drawn: Iterable[str]) -> np.dtype[np.void]:
-    """Type of a row.
-
-    Args:
-        drawn: quantities that some block of the sweep draws, in any order.
-    """
+    """Type of a row, given the quantities that some block of the sweep draws, in any order."""
     names = set(drawn)
     stored = [("status", "<i1"), *((name, column.kind) for name, column in STORED_COLUMNS.items())]
     return np.dtype([*KEYS.descr, *stored, *((drawn_column(name), "<f8") for name in DRAWABLE if name in names)])
@@ -101,13 +90,7 @@ def missing_rows(kind: np.dtype[np.void], keys: Rows) -> Rows:
 
 
 def fill_row(row: Any, outcome: Mapping[str, Any], drawn: Mapping[str, float]) -> None:
-    """Write a walk into its row, which has its keys already.
-
-    Args:
-        row: one of `missing_rows`.
-        outcome: of the walk, see `WalkRun.outcome`.
-        drawn: name → value of what was drawn for it.
-    """
+    """Write the `WalkRun.outcome` of a walk, and what was drawn for it, into one of `missing_rows`."""
     row["status"] = outcome["status"]
     for name, column in STORED_COLUMNS.items():
         row[name] = reduce(getitem, column.path, outcome)
@@ -143,8 +126,7 @@ def quantity_of(column: str) -> str:
 def field_column(name: str) -> Column:
     """Unit and meaning of an axis or of the column of a drawn quantity, as a column of floats.
 
-    Raises:
-        KeyError: there is no such field of `Parameters`, `Scene` or `Options`, and it is not `preset`.
+    A `KeyError` says that there is no such field of `Parameters`, `Scene` or `Options`, and that it is not `preset`.
     """
     if name == "preset":
         return Column("<f8", "1", "named set of parameters that others are changed from")
@@ -156,11 +138,9 @@ def field_column(name: str) -> Column:
 def faults_of_columns(
     columns: Mapping[str, NDArray[Any]], lengths: Mapping[str, NDArray[Any]]
 ) -> dict[str, NDArray[np.bool_]]:
-    """Whether each walk has each of `warpchain.walks.faults.FAULTS`.
+    """Whether each walk in columns of a sweep has each of `warpchain.walks.faults.FAULTS`.
 
-    Args:
-        columns: of a sweep, by name.
-        lengths: the least of each of `LENGTHS` [m] before anything was drawn, along the axes of the columns.
+    Lengths are the least of each of `LENGTHS` [m] before anything was drawn, along the axes of the columns.
     """
     own = dict(lengths)
     for name in own:

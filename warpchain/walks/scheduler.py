@@ -56,8 +56,7 @@ def run_setups(
     Args:
         setups: The walks, samples drawn; with ``draw``, options and links suffice.
         draw: Called with the place of a walk when it begins; returns its setup, with options and links of ``setups``.
-        keeps: What is kept of the motion of each, for ``run.recorder``; None: nothing. Walks of equal options keep
-            frames equally often.
+        keeps: What is kept of the motion of each; None: nothing. Walks of equal options keep frames equally often.
         slots: Number of chains that run at the same time. Default: on a GPU as many as fill it; on a CPU, where one
             core does a launch, one, which stays in the cache.
         stop: When set, the walks are abandoned after the launch that is under way.
@@ -94,10 +93,7 @@ def _groups(setups: Sequence[Setup], walks: int) -> list[list[int]]:
 
 
 def _batches(setups: Sequence[Setup], keeps: Sequence[Keep], slots: int | None) -> tuple[list[Batch], int]:
-    """Batches for walks of equal options, and how many chains would fill the device.
-
-    On a CPU it is one batch, on a GPU several, with as many worlds in all as are of use and fit.
-    """
+    """Batches for walks of equal options, on a CPU one, on a GPU several; and how many chains would fill the device."""
     options, scenes = setups[0].options, [setup.scene for setup in setups]
     intervals = {keep.frame_interval for keep in keeps if keep.frame_interval > 0}
     if len(intervals) > 1:
@@ -125,7 +121,7 @@ def _batches(setups: Sequence[Setup], keeps: Sequence[Keep], slots: int | None) 
 def most_worlds(longest: int, **kept: Any) -> int:
     """Chains that a GPU should carry on together: enough to fill it that fit into half of the free memory.
 
-    The other half is left to others, such as batches of other threads. Arguments as of a `Batch`.
+    The other half is left to others, such as batches of other threads.
     """
     one = Batch(1, longest, **kept)
     assert isinstance(one.device, Gpu)
@@ -134,12 +130,7 @@ def most_worlds(longest: int, **kept: Any) -> int:
 
 
 def compile_kernels(setups: Sequence[Setup], walks: int | None = None) -> None:
-    """Load every kernel that these walks need, and compile it if need be, before anybody waits for it alone.
-
-    Args:
-        setups: The walks, or one of each kind.
-        walks: Their number; None: that of the setups.
-    """
+    """Load the kernels of all walks, or of one of each kind and their number; what is missing is compiled at once."""
     wanted: set[tuple[str, Features, int]] = set()
     for places in _groups(setups, len(setups) if walks is None else walks):
         device, links = setups[places[0]].options.device, max(setups[place].scene.links for place in places)
@@ -150,12 +141,7 @@ def compile_kernels(setups: Sequence[Setup], walks: int | None = None) -> None:
 
 
 class BatchRun:
-    """A batch and the walks on its worlds.
-
-    Attributes:
-        batch: The batch.
-        waiting: Places of the walks of its group that have not begun.
-    """
+    """A batch and the walks on its worlds; `waiting` are places of the walks of its group that have not begun."""
 
     def __init__(
         self,

@@ -19,7 +19,6 @@ _ARRAYS: Final = {
     "axes": ("1", "axes of x and y of the plane in the room"),
     "plane_rates": ("m/s, rad/s, rad/s", "speed across the plane, and its turning rates about x and y"),
 }
-_MEMORY: Final = ("1", "what else the walk had then")
 
 
 def write_state(file: "h5py.File", state: State) -> None:
@@ -29,7 +28,7 @@ def write_state(file: "h5py.File", state: State) -> None:
         if (values := getattr(state, name)) is not None:
             put(file, f"{_GROUP}/{name}", values, unit, meaning)
     for name, values in state.memory.items():
-        put(file, f"{_GROUP}/memory/{name}", values, *_MEMORY)
+        put(file, f"{_GROUP}/memory/{name}", values, "1", "what else the walk had then")
 
 
 def read_state(file: "h5py.File", setup: Setup) -> State | None:

@@ -7,6 +7,7 @@ the release.
 
 import math
 from collections.abc import Iterator, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from warpchain.engine.batch import Batch
 from warpchain.engine.snapshot import CACHES, change, restore, take_snapshot
 from warpchain.engine.sprocket_motion import motion_rows
 from warpchain.engine.tallies import CONTACTS, COUNTS, EXTREMES, LOST
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.floor import circles_of
 from warpchain.inputs.scene import joint_radius, link_values, settling_time
 from warpchain.inputs.setup import Setup
@@ -31,8 +33,6 @@ from warpchain.walks.motion import NOTHING, Keep
 from warpchain.walks.moving_plane import angles, plane_of_state, released_plane, state_of_plane
 from warpchain.walks.recorder import Recorder
 
-Array = NDArray[np.float64]
-
 _OF_THE_RUN = ("raised", "drive_time", "drift", "_at_full_speed", "_has_sprocket")
 """What a run knows of the time before its release."""
 _NO_FALL: Mapping[str, float] = {
@@ -42,16 +42,10 @@ _NO_FALL: Mapping[str, float] = {
 
 
 def phase_features(setup: Setup) -> dict[str, Features]:
-    """What kernels are compiled for in the phases of a walk: `driven`, `moving` (beside a sprocket that moves), `free`.
-
-    Only the phases that it has; `free` always.
-    """
+    """What kernels are compiled for in those phases that a walk has: `driven`, `moving` (beside a sprocket), `free`."""
     scene, options = setup.scene, setup.options
-
-    def features(body: str, **more: Any) -> Features:
-        columns = layout.padded_width(scene.links)
-        return Features(options.method, columns, body, self_contact=options.self_contact, **more)
-
+    columns = layout.padded_width(scene.links)
+    features = partial(Features, options.method, columns, self_contact=options.self_contact)
     body, tilts = setup.floor.body, scene.plane == "tilting"
     found = {"free": features(body, tilts=tilts)}
     if setup.has_drive:
@@ -65,15 +59,12 @@ class WalkRun:
     """One walk on a world, which :meth:`phases` takes from one phase to the next.
 
     Attributes:
-        setup: What the walk is.
         status: RUNNING until the run is over.
         raised: Height [m] by which the chain and its sprocket were raised at the release, and so the height of the
             sprocket's centre above the floor; NaN before the release.
         drive_time: Simulated time [s] before the release.
-        drift: How far the loop moved while it was last watched on its sprocket, relative to its height or width; NaN if
-            it was not watched.
+        drift: Of the loop on its sprocket, see `WalkResult.drift`.
         is_free: Whether the chain walks without a sprocket, and all that its start brings has been done.
-        recorder: What is kept of the motion since the release.
     """
 
     def __init__(self, batch: Batch, world: int, setup: Setup, keep: Keep = NOTHING) -> None:
@@ -93,6 +84,7 @@ class WalkRun:
         self._settled = settling_time(scene)
         self._tilts = scene.plane == "tilting"
         self._level = math.cos(math.radians(scene.slope))  # of a distance along the floor
+        self._farthest = (scene.distance_limit or 0.0) * self._level  # along x
 
     def phases(self) -> Iterator[Features]:
         """Set the world up for one phase after the other, and yield what its kernel must be compiled for.
@@ -200,12 +192,6 @@ class WalkRun:
         return dict(zip(EXTREMES, now.tolist(), strict=True))
 
     @property
-    def attempts(self) -> int:
-        """Attempted steps so far."""
-        counts = self.counts
-        return counts["accepted"] + counts["rejected"]
-
-    @property
     def walk_time(self) -> float:
         """Time [s] since the release."""
         return self._batch.time(self._world) if self._released else 0.0
@@ -269,10 +255,7 @@ class WalkRun:
     def _ending(self, moment: str, event: str, first: int) -> dict[str, Any]:
         """When an event came, after how many bounces begun, and how long after the last impulse on the floor.
 
-        Args:
-            moment: name of the field that says when.
-            event: as the names of the other two have it.
-            first: of the three entries of :attr:`State.watch`.
+        Given is the first of its three entries of :attr:`State.watch`.
         """
         at, bounces, flight = (
             self._batch.watched(self._world, row) if self._released else math.nan for row in range(first, first + 3)
@@ -287,13 +270,11 @@ class WalkRun:
         """Results of the walk apart from its motion, by the names of the fields of `WalkResult`."""
         counts, extremes = self.counts, self.extremes
         is_at_rest = self.status == Status.AT_REST
-        first = self._batch.first_sample(self._world)
+        first, last = self._batch.first_sample(self._world), self._batch.last_sample(self._world)
         # Δx is x of the centre of mass, because the sprocket's centre is at x = 0; on a slope, along the floor
         return {
             "status": self.status,
-            "dx": float(self._batch.last_sample(self._world)[layout.CENTER_X]) / self._level
-            if is_at_rest
-            else math.nan,
+            "dx": float(last[layout.CENTER_X]) / self._level if is_at_rest else math.nan,
             "walk_time": self.walk_time,
             "simulated_time": self.simulated_time,
             "hold_time": self.hold_time,
@@ -330,9 +311,8 @@ class WalkRun:
     def _go_on(self, start: State) -> float | None:
         """Place a chain as a state has it; if that was taken from a walk, go on with the walk.
 
-        Returns:
-            None, unless the state was changed. Then the world is to stop at once, and so make the sample with which
-            its new ledger begins; after that `State.first_area` is to be set to this.
+        If the state was changed, the world is to stop at once, and so make the sample with which its new ledger begins;
+        after that `State.first_area` is to be set to what is returned, else None.
         """
         batch, world, memory = self._batch, self._world, start.memory
         self._released = True
@@ -345,7 +325,7 @@ class WalkRun:
         is_kept, interval = start.is_placed_as_in(self.setup), self.recorder.keep.frame_interval
         restore(batch, world, {name: part for name, part in memory.items() if is_kept or name not in CACHES})
         batch.set_state(world, next_frame=np.floor(start.time / interval) if interval > 0 else -1)
-        self._set_farthest()
+        batch.set_drive(world, farthest=self._farthest)
         if is_kept and self._is_at(start):
             batch.resume(world, self._walk_end, Status.TIME_LIMIT)
             self.recorder.go_on(memory["state/last_sample"], start.time)
@@ -369,10 +349,6 @@ class WalkRun:
         length, radius = self.setup.parameters.link_length, self._links.radius
         return self.setup.floor.raised_by(circles_of(position, length), np.tile(radius, 2), clearance)
 
-    def _set_farthest(self) -> None:
-        """Set how far the chain may walk."""
-        self._batch.set_drive(self._world, farthest=(self.setup.scene.distance_limit or 0.0) * self._level)
-
     def _release(self, position: Array, velocity: Array, hanging: float = math.nan) -> None:
         """Begin the walk of a chain; ``hanging``: how far it must be raised as it hung on its sprocket at rest [m]."""
         scene = self.setup.scene
@@ -388,7 +364,7 @@ class WalkRun:
 
     def _load(self, position: Array, velocity: Array) -> None:
         """Begin the walk of a chain on its floor."""
-        self._set_farthest()
+        self._batch.set_drive(self._world, farthest=self._farthest)
         self._batch.load(
             self._world,
             position,

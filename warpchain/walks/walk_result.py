@@ -17,19 +17,11 @@ from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpchain.engine.tallies import COUNTS, DEPTHS, EXTREMES, IMPULSES, LOST
 from warpchain.files import write_whole
-from warpchain.hdf5_files import (
-    Stored,
-    hdf5_image,
-    put,
-    read_fields,
-    reading_hdf5,
-    stored_fields,
-    write_fields,
-)
+from warpchain.hdf5_files import Stored, hdf5_image, put, read_fields, reading_hdf5, stored_fields, write_fields
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene, contact_radius
@@ -51,8 +43,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from warpchain.loop.stationary_loop import StationaryLoop
-
-Array = NDArray[np.float64]
 
 KIND: Final = "warpchain walk"
 WANTED: Final = "give a saved walk; `walk --like SWEEP --index I` saves one"
@@ -169,8 +159,7 @@ class WalkResult:
         ),
     ]
     frame_moments: Annotated[
-        Array,
-        Stored("N m", "friction moment in each joint on the link that it ends", "f n", empty="if not recorded"),
+        Array, Stored("N m", "friction moment in each joint on the link that it ends", "f n", empty="if not recorded")
     ]
     center_z: Annotated[Array, Stored("m", "centre of mass z, to the right", "t", _FIXED)]
     tilt: Annotated[Array, Stored("rad", "tilt of the plane", "t", _FIXED)]

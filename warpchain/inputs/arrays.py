@@ -1,0 +1,25 @@
+"""Arrays: their type in annotations, and the check of those that a user gives."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpchain.inputs.validation import InputError
+
+Array = NDArray[np.float64]
+
+
+def checked_array(given: object, path: str, *shape: int | str) -> Array:
+    """Finite real numbers of any kind as a float64 array of a shape, letters for any size; else an `InputError`."""
+    wanted = f"({', '.join(map(str, shape))}{',' * (len(shape) == 1)})"
+    try:
+        if np.array(given).dtype.kind in "cSU":  # complex numbers and text would be converted without a word
+            raise TypeError
+        array = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{path}: not an array of numbers; give one of shape {wanted}") from None
+    sizes = zip(array.shape, shape, strict=False)
+    if array.ndim != len(shape) or any(size != each for size, each in sizes if isinstance(each, int)):
+        raise InputError(f"{path}: its shape is {array.shape}; give {wanted}")
+    if not np.isfinite(array).all():
+        raise InputError(f"{path}: holds a number that is not finite; give finite numbers")
+    return array
