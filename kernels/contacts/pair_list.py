@@ -57,9 +57,9 @@ def fills_links(chain: Chain, opening: wp.float64):
 
 
 @wp.func
-def are_joined(p: int, q: int, n: int):
-    """Whether a link joins the joints p < q."""
-    return q - p == 1 or q - p == n - 1
+def may_touch(p: int, q: int, n: int, fills: bool):
+    """Whether circles at the joints p < q may ever touch: unless they fill links, not those that a link joins."""
+    return fills or (q - p != 1 and q - p != n - 1)
 
 
 @wp.func

@@ -141,7 +141,8 @@ def make_advance(features: Features):
             place_ends(K, chain)
             plane.begin_run(K, P, chain)
             state.gap[world] = plane.gap(K, plane.at_start(P, chain), ground, still)
-            make_list(K, L, chain, state, world, control.skin, greatest_opening(K, chain), True)
+            L[wp.static(list_layout(columns).count)] = 0
+            make_list(K, L, chain, state, world, control.skin, greatest_opening(K, chain))
             state.has_first_stage[world] = 0
             state.is_fresh[world] = 0
         attempts = int(0)

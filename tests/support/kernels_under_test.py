@@ -83,7 +83,7 @@ def _contact_pass(columns: int) -> wp.Kernel:
     floor_gap, resolve_floor = fixed_contacts("floor")
     sprocket_gap, resolve_sprocket = fixed_contacts("sprocket")
     terrain_gap, resolve_terrain = fixed_contacts("terrain")
-    size, nearest = list_layout(columns).size, list_layout(columns).nearest
+    layout_of_list = list_layout(columns)
 
     @compiled
     def contact_pass(
@@ -103,7 +103,7 @@ def _contact_pass(columns: int) -> wp.Kernel:
         block = scratch[world]
         row = lists[world]
         plane = results[world]  # none of these bodies tilts
-        pairs = wp.array(ptr=row.ptr, shape=(wp.static(size),), dtype=wp.int32)
+        pairs = wp.array(ptr=row.ptr, shape=(wp.static(layout_of_list.size),), dtype=wp.int32)
         load_state(block, model, state, chain, world)
         place_ends(block, chain)
         opening = greatest_opening(block, chain)
@@ -115,10 +115,11 @@ def _contact_pass(columns: int) -> wp.Kernel:
         results[world, 1] = floor_gap(block, chain, ground, face)
         results[world, 2] = sprocket_gap(block, chain, ground, face)
         if (parts & 1) != 0:
-            fits = build_list(block, pairs, chain, skin, opening, (parts & 32) != 0)
+            pairs[wp.static(layout_of_list.count)] = wp.where((parts & 32) != 0, 0, 1)
+            fits = build_list(block, pairs, chain, skin, opening)
             results[world, 3] = wp.where(fits, wp.float64(1.0), wp.float64(0.0))
         results[world, 4] = greatest_displacement(block, chain)
-        results[world, 5] = list_slack(block, chain, pairs[wp.static(nearest)], opening)
+        results[world, 5] = list_slack(block, chain, pairs[wp.static(layout_of_list.nearest)], opening)
         if (parts & 2) != 0:
             results[world, 1] = floor_gap(block, chain, ground, face)
             results[world, 6] = wp.float64(resolve_floor(block, plane, chain, ground, face))

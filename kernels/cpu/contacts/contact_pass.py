@@ -67,8 +67,7 @@ def body_pass(features: Features, plane: Plane):
 def link_pass(features: Features, joints: Joints):
     """Warp functions of the contacts of a chain with itself; ``opening``: greatest |C| [m] of the placed links.
 
-    ``make_list(K, L, chain, state, world, skin, opening, is_far)`` makes the neighbour list, or ends the run if it
-    overflows; ``is_far``: nothing was listed before.
+    ``make_list(K, L, chain, state, world, skin, opening)`` makes the neighbour list, or ends the run if it overflows.
     ``meet_links(K, L, chain, state, control, world, opening)`` → number of impulses.
     """
     has_self = features.self_contact
@@ -77,18 +76,9 @@ def link_pass(features: Features, joints: Joints):
     lists = list_layout(features.columns)
 
     @wp.func
-    def make_list(
-        K: Rows,
-        L: Integers,
-        chain: Chain,
-        state: State,
-        world: int,
-        skin: wp.float64,
-        opening: wp.float64,
-        is_far: bool,
-    ):
+    def make_list(K: Rows, L: Integers, chain: Chain, state: State, world: int, skin: wp.float64, opening: wp.float64):
         if wp.static(has_self):
-            if not build_list(K, L, chain, skin, opening, is_far):
+            if not build_list(K, L, chain, skin, opening):
                 state.status[world] = LIST_OVERFLOW
             state.slack[world] = list_slack(K, chain, L[wp.static(lists.nearest)], opening)
 
@@ -101,7 +91,7 @@ def link_pass(features: Features, joints: Joints):
                 state.slack[world] = list_slack(K, chain, L[wp.static(lists.nearest)], opening)
             if not state.slack[world] > least_slack:
                 add_count(state, world, layout.LIST_BUILDS, wp.int64(1))
-                make_list(K, L, chain, state, world, skin, opening, L[wp.static(lists.count)] == 0)
+                make_list(K, L, chain, state, world, skin, opening)
             if L[wp.static(lists.count)] > 0:
                 hits, strands, lost, depth = resolve(K, L, chain, opening)
                 add_count(state, world, layout.SELF_IMPULSES, hits)

@@ -9,16 +9,9 @@ import functools
 
 import warp as wp
 
+from warpchain.kernels.contacts import pair_list
 from warpchain.kernels.contacts.list_layout import list_layout
-from warpchain.kernels.contacts.pair_list import (
-    are_joined,
-    bucket_of,
-    cell_width,
-    fills_links,
-    listing_reach,
-    slack_of,
-    square_distance,
-)
+from warpchain.kernels.contacts.pair_list import bucket_of, square_distance
 from warpchain.kernels.cpu.contacts.proximity import greatest_distance
 from warpchain.kernels.layout import LISTED_X, RIGHT_X, RIGHT_Y
 from warpchain.kernels.physics.geometry import put, two
@@ -55,14 +48,14 @@ def neighbour_list(columns: int):
         L[wp.static(lists.count)] = total
 
     @wp.func
-    def build(K: Rows, L: Integers, chain: Chain, skin: wp.float64, opening: wp.float64, is_far: bool):
-        """``is_far``: nothing was listed before; ``opening``: greatest |C| [m]."""
+    def build(K: Rows, L: Integers, chain: Chain, skin: wp.float64, opening: wp.float64):
+        """The list before tells whether the chain is far from itself; ``opening``: greatest |C| [m]."""
         n = chain.link_count
-        reach = listing_reach(chain, skin, opening)
-        width = cell_width(chain, reach, is_far)
+        reach = pair_list.listing_reach(chain, skin, opening)
+        width = pair_list.cell_width(chain, reach, L[wp.static(lists.count)] == 0)
         square = reach * reach
         nearest = width * width
-        of_all = fills_links(chain, opening)
+        fills = pair_list.fills_links(chain, opening)
         i = int(0)
         while i < wp.static(lists.table):
             L[wp.static(lists.bucket) + i] = -1
@@ -92,8 +85,8 @@ def neighbour_list(columns: int):
                 while q > p:
                     if L[wp.static(lists.cell_x) + q] == cell_x and L[wp.static(lists.cell_y) + q] == cell_y:
                         distance = square_distance(K, p, q)
-                        is_counted = of_all or not are_joined(p, q, n)
-                        if is_counted and distance < square:
+                        counts = pair_list.may_touch(p, q, n, fills)
+                        if counts and distance < square:
                             if total < wp.static(lists.capacity):
                                 # insertion keeps this joint's partners in ascending order
                                 k = total
@@ -105,7 +98,7 @@ def neighbour_list(columns: int):
                                 total += 1
                             else:
                                 fits = bool(False)
-                        elif is_counted:
+                        elif counts:
                             nearest = wp.min(nearest, distance)
                     q = L[wp.static(lists.next_joint) + q]
                 near += 1
@@ -120,4 +113,4 @@ def neighbour_list(columns: int):
 @wp.func
 def list_slack(K: Rows, chain: Chain, nearest: wp.int32, opening: wp.float64):
     """How far joints may still move [m], see :func:`contacts.pair_list.slack_of`."""
-    return slack_of(chain, nearest, opening, greatest_displacement(K, chain))
+    return pair_list.slack_of(chain, nearest, opening, greatest_displacement(K, chain))

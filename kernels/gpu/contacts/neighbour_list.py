@@ -7,15 +7,9 @@ import functools
 
 import warp as wp
 
+from warpchain.kernels.contacts import pair_list
 from warpchain.kernels.contacts.list_layout import list_layout
-from warpchain.kernels.contacts.pair_list import (
-    are_joined,
-    bucket_of,
-    cell_width,
-    fills_links,
-    listing_reach,
-    square_distance,
-)
+from warpchain.kernels.contacts.pair_list import bucket_of, square_distance
 from warpchain.kernels.gpu.stage import Run, constants
 from warpchain.kernels.gpu.threads import barrier, warp_greatest, warp_width
 from warpchain.kernels.layout import BOARD_LISTED_X, RIGHT_X, RIGHT_Y
@@ -29,11 +23,8 @@ def block_list(columns: int, block_dim: int):
     lists = list_layout(columns)
 
     @wp.func
-    def search_cells(K: Rows, L: Integers, p: int, links: int, square: wp.float64, furthest: wp.float64, of_all: bool):
-        """Lists a joint's pairs; the least squared distance of others in cells near by, at most ``furthest``.
-
-        ``of_all``: also pairs that a link joins.
-        """
+    def search_cells(K: Rows, L: Integers, p: int, n: int, square: wp.float64, furthest: wp.float64, fills: bool):
+        """Lists a joint's pairs; the least squared distance of others in cells near by, at most ``furthest``."""
         nearest = furthest
         near = int(0)
         while near < 9:
@@ -44,7 +35,7 @@ def block_list(columns: int, block_dim: int):
                 # a bucket may serve several cells
                 if q > p and L[wp.static(lists.cell_x) + q] == cell_x and L[wp.static(lists.cell_y) + q] == cell_y:
                     distance = square_distance(K, p, q)
-                    if of_all or not are_joined(p, q, links):
+                    if pair_list.may_touch(p, q, n, fills):
                         if distance < square:
                             slot = wp.atomic_add(L, wp.static(lists.count), 1)
                             if slot < wp.static(lists.capacity):
@@ -58,15 +49,12 @@ def block_list(columns: int, block_dim: int):
 
     @wp.func
     def build(run: Run, skin: wp.float64, opening: wp.float64, is_far: bool):
-        """For all threads; the board's rows RIGHT_X and RIGHT_Y are written, and a barrier has passed.
-
-        ``is_far``: nothing was listed before.
-        """
+        """For all threads; RIGHT_X and RIGHT_Y are on the board. ``is_far``: nothing was listed before."""
         K = run.K
         L = run.L
         lane = run.lane
-        reach = listing_reach(constants(K), skin, opening)
-        width = cell_width(constants(K), reach, is_far)
+        reach = pair_list.listing_reach(constants(K), skin, opening)
+        width = pair_list.cell_width(constants(K), reach, is_far)
         if lane == 0:
             L[wp.static(lists.count)] = 0
             L[wp.static(lists.nearest)] = wp.cast(wp.float32(width), wp.int32)
@@ -84,8 +72,8 @@ def block_list(columns: int, block_dim: int):
         barrier()
         nearest = width * width
         if lane < run.links:
-            of_all = fills_links(constants(K), opening)
-            nearest = search_cells(K, L, lane, run.links, reach * reach, nearest, of_all)
+            fills = pair_list.fills_links(constants(K), opening)
+            nearest = search_cells(K, L, lane, run.links, reach * reach, nearest, fills)
         bits = -warp_greatest(-wp.cast(wp.float32(wp.sqrt(nearest)), wp.int32))
         if lane % warp_width() == 0:
             wp.atomic_min(L, wp.static(lists.nearest), bits)

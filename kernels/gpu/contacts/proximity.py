@@ -15,7 +15,7 @@ from warpchain.kernels.gpu.stage import Proximity, Run, constants, felt_plane, r
 from warpchain.kernels.gpu.threads import block_maxima, vec4i
 from warpchain.kernels.layout import COSINE, INVERSE_INERTIA, INVERSE_MASS, RADIUS, SINE, U
 from warpchain.kernels.methods.controller import quick_quotient, quick_root
-from warpchain.kernels.physics.elementary import TWO, ZERO, from_order_key_single, order_bits_single, order_key_single
+from warpchain.kernels.physics.elementary import TWO, from_order_key_single, order_bits_single, order_key_single
 from warpchain.kernels.physics.geometry import Link, put
 from warpchain.kernels.types import Chain, Control, Drive, with_circles
 
@@ -138,11 +138,8 @@ def block_proximity(features: Features, block_dim: int):
 
 @functools.cache
 def block_contact(fixed_body: str):
-    """Warp function: applies the impulses between a body and this link on the board; returns their number.
-
-    Few links touch at a time: warps without one have nothing to do.
-    """
-    gap_of, meet = link_and_body(fixed_body)
+    """Warp function: applies the impulses between a body and this link on the board; returns their number."""
+    _gap_of, meet = link_and_body(fixed_body)
     face_of, face_at = BODIES[fixed_body].face, BODIES[fixed_body].motion
 
     @wp.func
@@ -150,10 +147,7 @@ def block_contact(fixed_body: str):
         K = run.K
         chain = with_circles(constants(K), K[RADIUS, run.lane])
         face = face_at(face_of(run.ground), drive, run.world, time)
-        link = touching_link(run, chain)
-        if gap_of(chain, run.ground, face, link) >= ZERO:
-            return int(0)
-        link = meet(chain, run.ground, face, link)
+        link = meet(chain, run.ground, face, touching_link(run, chain))
         put(K, U, run.lane, wp.vec3d(link.u, link.v, link.omega))
         K[layout.BOARD_LOST_FIXED, run.lane] = link.lost
         return int(link.hits)

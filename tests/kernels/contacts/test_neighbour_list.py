@@ -10,7 +10,7 @@ import warpchain
 from tests.oracle_model import contact_equations
 from tests.oracle_model.circular_loop import circular_loop
 from tests.support.folded_chains import chain_of_angles, folded_chain
-from tests.support.kernels_under_test import LIST, SELF, ContactPass, Placed
+from tests.support.kernels_under_test import FAR, LIST, SELF, ContactPass, Placed
 from tests.support.presets import PAPER, SOFT
 from warpchain import Status
 from warpchain.engine.batch import Batch
@@ -44,12 +44,13 @@ def assert_collides_as_reference(position, seed, skin=SKIN):
     Circles that all but share a centre have a normal of rounding errors, so joints must be open.
     """
     velocity = np.random.default_rng(seed).normal(size=position.shape) * [1.0, 1.0, 2 / LENGTH]
-    contact_pass = ContactPass([Placed(position, velocity, PAPER)], skin=skin)
-    (result,) = contact_pass.run(LIST | SELF)
-    assert result["fits"]
     expected, counts = contact_equations.resolve_contacts(position, velocity, PAPER, floor=False)
-    assert result["self"] == counts["self"]
-    assert_allclose(contact_pass.velocity(0), expected, rtol=0, atol=1e-7 * np.abs(velocity).max())
+    for far in (0, FAR):
+        contact_pass = ContactPass([Placed(position, velocity, PAPER)], skin=skin)
+        (result,) = contact_pass.run(LIST | SELF | far)
+        assert result["fits"]
+        assert result["self"] == counts["self"]
+        assert_allclose(contact_pass.velocity(0), expected, rtol=0, atol=1e-7 * np.abs(velocity).max())
     return counts["self"]
 
 
