@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 import warpchain
-from tests.oracle_model import contact_equations
+from tests.oracle_model import contact_equations, motion_equations
 from tests.oracle_model.circular_loop import circular_loop
 from tests.support.folded_chains import chain_of_angles, folded_chain
 from tests.support.kernels_under_test import FAR, LIST, SELF, ContactPass, Placed
@@ -78,6 +78,36 @@ def test_no_heap_misses_a_contact(n, seed, tilt, skin, opening, place):
     assert_collides_as_reference(
         folded_chain(n, seed, LENGTH, tilt=tilt, opening=opening)[0] + [*place, 0.0], seed, skin
     )
+
+
+@pytest.mark.parametrize("far", [0, FAR])
+@pytest.mark.parametrize("seed", range(6))
+def test_list_misses_no_contact_while_it_has_slack(seed, far):
+    """Folds that change bit by bit collide as if every pair were tried, until the list is stale."""
+
+    def fold(k):
+        return folded_chain(24, seed, LENGTH, tilt=1.5 + 3e-3 * k, opening=1e-6)
+
+    contact_pass = ContactPass([Placed(*fold(0), PAPER)], skin=SKIN)
+    slack = contact_pass.run(LIST | far)[0]["slack"]
+    joints = motion_equations.link_ends(fold(0)[0], PAPER)[1]
+    for k in range(100):
+        position, velocity = fold(k)
+        moved = np.linalg.norm(motion_equations.link_ends(position, PAPER)[1] - joints, axis=1).max()
+        if moved + 1e-5 > slack:  # joints are open by some micrometres
+            break
+        contact_pass.place([Placed(position, velocity, PAPER)])
+        _, counts = contact_equations.resolve_contacts(position, velocity, PAPER, floor=False)
+        assert contact_pass.run(SELF)[0]["self"] == counts["self"]
+    assert 1 < k < 99
+
+
+def test_list_of_a_wide_loop_lasts_longer():
+    """A chain far from itself may move by millimetres: half of what next joints but one are apart, less a radius."""
+    chain = Placed(*circular_loop(60, PAPER, 0.0), PAPER)
+    slack = {far: ContactPass([chain], skin=SKIN).run(LIST | far)[0]["slack"] for far in (0, FAR)}
+    assert slack[0] == pytest.approx(SKIN / 2, rel=1e-6)
+    assert slack[FAR] == pytest.approx(LENGTH * np.cos(np.pi / 60) - PAPER.circle_radius, rel=1e-3)
 
 
 # --- whole runs ---
