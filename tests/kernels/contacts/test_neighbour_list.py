@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import warpchain
 from tests.oracle_model import contact_equations, motion_equations
 from tests.oracle_model.circular_loop import circular_loop
+from tests.support.blocks_under_test import listed_pairs
 from tests.support.folded_chains import chain_of_angles, folded_chain
 from tests.support.kernels_under_test import FAR, LIST, SELF, ContactPass, Placed
 from tests.support.presets import PAPER, SOFT
@@ -81,25 +82,21 @@ def test_no_heap_misses_a_contact(n, seed, tilt, skin, opening, place):
 
 
 @pytest.mark.parametrize("far", [0, FAR])
-@pytest.mark.parametrize("seed", range(6))
-def test_list_misses_no_contact_while_it_has_slack(seed, far):
-    """Folds that change bit by bit collide as if every pair were tried, until the list is stale."""
-
-    def fold(k):
-        return folded_chain(24, seed, LENGTH, tilt=1.5 + 3e-3 * k, opening=1e-6)
-
-    contact_pass = ContactPass([Placed(*fold(0), PAPER)], skin=SKIN)
-    slack = contact_pass.run(LIST | far)[0]["slack"]
-    joints = motion_equations.link_ends(fold(0)[0], PAPER)[1]
-    for k in range(100):
-        position, velocity = fold(k)
-        moved = np.linalg.norm(motion_equations.link_ends(position, PAPER)[1] - joints, axis=1).max()
-        if moved + 1e-5 > slack:  # joints are open by some micrometres
-            break
-        contact_pass.place([Placed(position, velocity, PAPER)])
-        _, counts = contact_equations.resolve_contacts(position, velocity, PAPER, floor=False)
-        assert contact_pass.run(SELF)[0]["self"] == counts["self"]
-    assert 1 < k < 99
+@pytest.mark.parametrize("n", [6, 24, 60])
+def test_slack_is_that_of_the_nearest_pair_that_is_not_listed(n, far):
+    """All pairs within the reach are listed; joints may move by half of what the nearest other one is apart, less r."""
+    position, velocity = folded_chain(n, n, LENGTH, opening=1e-6)
+    contact_pass = ContactPass([Placed(position, velocity, PAPER)], skin=SKIN)
+    (result,) = contact_pass.run(LIST | far)
+    joints = motion_equations.link_ends(position, PAPER)[1]
+    distance = np.linalg.norm(joints[:, None] - joints, axis=2)
+    p, q = np.triu_indices(n, 2)
+    p, q = p[q - p < n - 1], q[q - p < n - 1]  # links keep the others apart
+    is_near = distance[p, q] < 2 * (PAPER.circle_radius + result["opening"]) + SKIN
+    assert listed_pairs(contact_pass) == set(zip(p[is_near].tolist(), q[is_near].tolist(), strict=True))
+    width = 2 * LENGTH if far else 2 * (PAPER.circle_radius + result["opening"]) + SKIN
+    nearest = min(width, distance[p, q][~is_near].min())
+    assert result["slack"] == pytest.approx(nearest / 2 - PAPER.circle_radius - result["opening"], abs=1e-8)
 
 
 def test_list_of_a_wide_loop_lasts_longer():
