@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Literal
 
 import numpy as np
 import typer
@@ -18,23 +18,20 @@ from numpy.typing import ArrayLike, NDArray
 from warpchain import InputError, Status
 
 Array = NDArray[Any]
-Block = Any
-"""A block of `warpchain.SweepResult.blocks`."""
-Columns = Mapping[str, Array]
-"""Columns of a table by name."""
+Block = Any  # A block of `warpchain.SweepResult.blocks`
+Columns = Mapping[str, Array]  # Columns of a table by name
 
-LINE_COLORS: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+LINE_COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Colours that people with any kind of colour vision can tell apart (Okabe and Ito, 2008)."""
 BLUE, RED, GREEN = LINE_COLORS[:3]
-INK: Final = "#222222"
-FAINT: Final = "#777777"
-GROUND: Final = "#E3E3E3"
-DASHES: Final[Any] = (0, (4, 3))
+INK = "#222222"
+FAINT = "#777777"
+GROUND = "#E3E3E3"
+DASHES = (0, (4, 3))
 
-DRAWN: Final = "_drawn"
-"""End of the names of columns with what a sample has drawn."""
-DISTANCE: Final = "distance walked $Δx$ / m"
-FREQUENCY: Final = "frequency of the sprocket $ν$ / Hz"
+DRAWN = "_drawn"  # End of the names of columns with what a sample has drawn
+DISTANCE = "distance walked $Δx$ / m"
+FREQUENCY = "frequency of the sprocket $ν$ / Hz"
 
 
 def run_study(*commands: Callable[..., None]) -> None:
@@ -82,6 +79,12 @@ def standard_error(values: ArrayLike) -> Any:
 def mean_where(chosen: Array, values: Array) -> Array:
     """Means over the samples of each cell of chosen walks; NaN without one."""
     return np.asarray(mean(np.where(chosen, values, np.nan)))
+
+
+def area_of(outlines: Array) -> Array:
+    """Area [m²] inside closed outlines of points x, y, (…, n, 2 or more)."""
+    x, y = outlines[..., 0], outlines[..., 1]
+    return np.abs(0.5 * np.sum(x * np.roll(y, -1, axis=-1) - y * np.roll(x, -1, axis=-1), axis=-1))
 
 
 @dataclass(frozen=True)
@@ -153,10 +156,19 @@ def drawn_terms(columns: Columns) -> list[Array]:
     return [np.sin(turn), np.cos(turn), *((values - values.mean()) / values.std() for values in plain)]
 
 
-def table(head: str | Iterable[str], rows: Iterable[Iterable[object]]) -> str:
-    """A table in Markdown; the head may be one text with strokes between its cells."""
+def table(head: str | Iterable[str], rows: Iterable[Iterable[object]], formats: str = "") -> str:
+    """A table in Markdown.
+
+    The head may be one text with strokes between its cells; formats of columns, with blanks between them, are those of
+    cells that are no texts.
+    """
     head = head.split(" | ") if isinstance(head, str) else list(head)
-    return "\n".join(f"| {' | '.join(map(str, line))} |" for line in (head, ["---"] * len(head), *rows))
+    kinds = formats.split() or [""] * len(head)
+    texts = (
+        [cell if isinstance(cell, str) else format(cell, kind) for cell, kind in zip(row, kinds, strict=True)]
+        for row in rows
+    )
+    return "\n".join(f"| {' | '.join(line)} |" for line in (head, ["---"] * len(head), *texts))
 
 
 def tidy(axes: Axes, title: str = "", grid: Literal["x", "y", "both"] | None = None, **settings: Any) -> None:

@@ -8,14 +8,12 @@ It prints the relative difference of the mean Δx of each cell with the standard
 cells their mean and χ², scatter and bounces; and how exact either is.
 """
 
-from typing import Final
-
 import numpy as np
 
 import warpchain
 from studies.common import Array, of_cells, over_cells, run_study
 
-LENGTHS: Final = ("penetration_floor", "penetration_self", "penetration_sprocket", "greatest_opening")
+LENGTHS = ("penetration_floor", "penetration_self", "penetration_sprocket", "greatest_opening")
 
 
 def cells(sweep: warpchain.SweepResult, column: str) -> dict[str, Array]:

@@ -7,7 +7,6 @@ The three loops of the figure are walked anew, in some seconds of a CPU.
 """
 
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,11 +16,9 @@ import warpchain
 from studies import common
 from studies.common import DISTANCE, LINE_COLORS, RED, Array, Block
 
-FOLDER: Final = Path(__file__).parent
-TIMES: Final = (0.0, 0.04, 0.08, 0.16, 0.32)
-"""Moments of the loops [s] since the release."""
-DRAWN: Final = (0.0, 0.02, 0.1)
-"""Masses of their charms [kg]."""
+FOLDER = Path(__file__).parent
+TIMES = (0.0, 0.04, 0.08, 0.16, 0.32)  # Moments of the loops [s] since the release
+DRAWN = (0.0, 0.02, 0.1)  # Masses of their charms [kg]
 
 
 def distances(block: Block) -> str:

@@ -2,17 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
 from studies.common import Array
 from warpchain import InputError, films
 
-Wanted = Mapping[tuple[int, float], int]
-"""Links and frequency of an experiment → number of films of it."""
+Wanted = Mapping[tuple[int, float], int]  # Links and frequency of an experiment → number of films of it
 
-CAMERA: Final = films.Camera()
+CAMERA = films.Camera()
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ The errors of the camera are drawn once for both films. Tables are written as Tr
 """
 
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
@@ -14,8 +13,8 @@ import warpchain
 from studies.common import run_study, write_text
 from warpchain import films
 
-FOLDER: Final = Path(__file__).parent / "hidden"
-CHAIN: Final = {
+FOLDER = Path(__file__).parent / "hidden"
+CHAIN = {
     "floor_friction": 0.231,
     "viscous_friction": 1.06e-4,
     "coulomb_friction": 9.4e-5,

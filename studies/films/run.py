@@ -9,7 +9,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
@@ -19,17 +18,16 @@ from studies.films.drawing import SYMBOLS, corner, coverage_figure, line_figure
 from studies.films.reduce import load
 from warpchain import films
 
-FOLDER: Final = Path(__file__).parent
+FOLDER = Path(__file__).parent
 FIVE, TWENTY = (60, 5.0), (60, 20.0)
-SETS: Final[dict[str, Wanted]] = {
+SETS: dict[str, Wanted] = {
     "1 film: 20 Hz": {TWENTY: 1},
     "2 films: 5, 20 Hz": {FIVE: 1, TWENTY: 1},
     "8 films: 4 of each": {FIVE: 4, TWENTY: 4},
 }
-PAIR: Final = SETS["2 films: 5, 20 Hz"]
-CALIPERS: Final = 5e-5
-"""Standard error of a roller's radius that was measured with calipers [m]."""
-EXACT: Final = replace(CAMERA, scale=1e-6, floor=1e-6, origin=1e-6, roll=1e-6, outline=1e-6, release=1e-6)
+PAIR = SETS["2 films: 5, 20 Hz"]
+CALIPERS = 5e-5  # Standard error of a roller's radius that was measured with calipers [m]
+EXACT = replace(CAMERA, scale=1e-6, floor=1e-6, origin=1e-6, roll=1e-6, outline=1e-6, release=1e-6)
 """A camera without errors other than noise, and those of the loop's speed."""
 
 

@@ -7,7 +7,6 @@ The numbers are printed, the figure is written beside the page.
 """
 
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -15,7 +14,7 @@ from matplotlib.figure import Figure
 import warpchain
 from studies.common import DISTANCE, LINE_COLORS, Array, Block, error_line, mean_where, publish, run_study, table, tidy
 
-FOLDER: Final = Path(__file__).parent
+FOLDER = Path(__file__).parent
 
 
 def furthest(block: Block) -> Array:

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,15 +17,13 @@ from studies.paper.impacts import impacts
 from studies.paper.statistics import Effect
 from warpchain import Parameters, SweepResult
 
-PALE: Final = "#BBBBBB"
-"""Dots of cells in which nothing is significant."""
+PALE = "#BBBBBB"  # Dots of cells in which nothing is significant
 
-REACH: Final = 1.0
-"""Greatest relative effect on the axis of the figure; greater ones stand at its edge."""
+REACH = 1.0  # Greatest relative effect on the axis of the figure; greater ones stand at its edge
 
-_CONTACT: Final = ("before the 1st bounce", "after the 1st", "after the 2nd", "after the 3rd", "later", "never")
-_SHADES: Final = LinearSegmentedColormap.from_list("contact", ["#053061", "#4393C3", "#D55E00", "#F4A582", "#E3E3E3"])
-_OUTLINES: Final = [(links, frequency) for links in (60, 120, 180) for frequency in (10.0, 20.0, 30.0)]
+_CONTACT = ("before the 1st bounce", "after the 1st", "after the 2nd", "after the 3rd", "later", "never")
+_SHADES = LinearSegmentedColormap.from_list("contact", ["#053061", "#4393C3", "#D55E00", "#F4A582", "#E3E3E3"])
+_OUTLINES = [(links, frequency) for links in (60, 120, 180) for frequency in (10.0, 20.0, 30.0)]
 """Links and frequencies of the loops whose outlines are drawn."""
 
 

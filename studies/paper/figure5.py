@@ -5,19 +5,16 @@ python -m studies.paper.figure5     # a minute → results/figure5.csv
 
 from itertools import pairwise
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
 import warpchain
 from studies.common import read_columns, table, write_rows
 
-RESULTS: Final = Path(__file__).parent / "results" / "figure5.csv"
-CELLS: Final = tuple((links, frequency) for links in (60, 90, 120, 150, 180) for frequency in (10.0, 15.0, 20.0, 30.0))
-NEAR: Final = 1e-3
-"""A chain whose lowest circle is nearer to the floor [m] is in an impact."""
-APART: Final = 0.01
-"""Impacts [s] less apart are one."""
+RESULTS = Path(__file__).parent / "results" / "figure5.csv"
+CELLS = tuple((links, frequency) for links in (60, 90, 120, 150, 180) for frequency in (10.0, 15.0, 20.0, 30.0))
+NEAR = 1e-3  # A chain whose lowest circle is nearer to the floor [m] is in an impact
+APART = 0.01  # Impacts [s] less apart are one
 
 
 def shape(links: int, frequency: float) -> dict[str, object]:

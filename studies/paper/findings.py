@@ -5,7 +5,7 @@ and, by name, what the words of the claim in claims.yaml need.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +19,8 @@ Numbers = Mapping[str, Any]
 Found = tuple[Verdict, Mapping[str, object]]
 Check = Callable[[Numbers], Found]
 
-LONG: Final = 150
-"""Chains of so many links or more are those that the paper's start from rest underestimates."""
-SYMBOLS: Final = {
+LONG = 150  # Chains of so many links or more are those that the paper's start from rest underestimates
+SYMBOLS = {
     **{"joint_stiffness": "k", "joint_damping": "b", "friction_smoothing": "ω_c", "tangential_restitution": "e_t"},
     **{"sprocket_restitution": "e_sc", "sprocket_friction": "μ_sc", "floor_restitution": "e_fc"},
     **{"inner_mass": "m_inner", "outer_mass": "m_outer", "inner_inertia": "I_inner", "outer_inertia": "I_outer"},

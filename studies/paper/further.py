@@ -1,6 +1,6 @@
 """Numbers of further sweeps: strands, what the paper leaves open, rest against long holds, its last sentences."""
 
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 import xarray
@@ -9,17 +9,16 @@ from scipy.stats import chi2, ks_2samp
 from studies.common import DRAWN, Array, Block, at_rest, mean
 from studies.paper.statistics import paired, spread, unpaired
 
-Cells = xarray.DataArray
-"""Values of walks at rest, axes links and frequency in front, samples last."""
+Cells = xarray.DataArray  # Values of walks at rest, axes links and frequency in front, samples last
 Numbers = dict[str, Any]
 
-EVENTS: Final = {
+EVENTS = {
     "crease": "bounces_before_self_contact",
     "strands": "bounces_before_strands_met",
     "collapse": "bounces_before_collapse",
 }
 """What happens to a loop: name → column with the number of bounces begun before it, −1 if it never does."""
-CELLS: Final = ("links", "frequency")
+CELLS = ("links", "frequency")
 
 
 def values_of(table: Cells, axis: str, reference: Any) -> list[Numbers]:
@@ -160,7 +159,7 @@ def same_loops(block: Block) -> Numbers:
 
 # --- links that pass through one another, and what else the paper leaves open ---
 
-REFERENCES: Final = {
+REFERENCES = {
     "sprocket_radius_is": "contact",
     "circle_radius": 4.2e-3,
     "clearance": 0.01,
@@ -214,10 +213,9 @@ def rest_and_hold(block: Block) -> Numbers:
 
 # --- further sentences ---
 
-FRICTION, DAMPING = 0.27, 1000.0
-"""Of the floor and of joints, in Table 1."""
-OWN_LENGTH: Final = "links_of_12_7_mm"
-LENGTHS: Final = {"links_of_11_mm": 11.0, "links_of_15_mm": 15.0, "links_of_18_mm": 18.0}
+FRICTION, DAMPING = 0.27, 1000.0  # Of the floor and of joints, in Table 1
+OWN_LENGTH = "links_of_12_7_mm"
+LENGTHS = {"links_of_11_mm": 11.0, "links_of_15_mm": 15.0, "links_of_18_mm": 18.0}
 """Blocks with links of other lengths [mm], with the masses and inertias of their length."""
 
 

@@ -4,18 +4,16 @@ Everything follows from the frames of walks that a sweep kept.
 """
 
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
 from studies.common import Array, Block
 
-Motion = Any
-"""The kept motion of a walk, as `Block.walk_motion` returns it."""
+Motion = Any  # The kept motion of a walk, as `Block.walk_motion` returns it
 
-TOUCH: Final = 3e-4
-"""A loop touches the floor while its lowest circle is less than this above it [m]."""
-APART: Final = 0.02
+TOUCH = 3e-4  # A loop touches the floor while its lowest circle is less than this above it [m]
+APART = 0.02
 """Touches less than this apart [s] are one impact: fast loops lose the floor for 10 ms while they roll over it."""
 
 

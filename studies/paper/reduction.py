@@ -7,7 +7,7 @@ import hashlib
 import json
 import re
 from collections.abc import Callable, Mapping
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -18,10 +18,9 @@ from studies.paper.impacts import impacts
 from studies.paper.statistics import paired, spread, unpaired
 from warpchain import InputError, Parameters, SweepResult, preset
 
-DIGITS: Final = 4
-"""Significant digits that are kept."""
+DIGITS = 4  # Significant digits that are kept
 
-DEFAULTS: Final = {"clearance": 0.01, "phase": 0.0}
+DEFAULTS = {"clearance": 0.01, "phase": 0.0}
 """Scene of a walk that is not told otherwise: height of the release [m] and part of a loop period."""
 
 
@@ -189,7 +188,7 @@ def text_of(content: Mapping[str, Any]) -> str:
     return re.sub(r"\[[^\[\]{}]*\]", lambda match: re.sub(r"\s+", " ", match[0]), text) + "\n"
 
 
-WHOLE: Final[dict[str, tuple[str, Callable[..., Any]]]] = {
+WHOLE: dict[str, tuple[str, Callable[..., Any]]] = {
     "paper_tolerance": ("tolerance", tolerance),
     "paper_shapes": ("impacts", first_impacts),
     "paper_strands": ("strands", further.strands),
@@ -205,5 +204,4 @@ WHOLE: Final[dict[str, tuple[str, Callable[..., Any]]]] = {
     "paper_distributions": ("distributions", further.distributions),
 }
 """Sweeps that one function reduces, of its blocks: name → key of its numbers, and the function."""
-SWEEPS: Final = ("paper_claims", "paper_joints", *WHOLE)
-"""Sweeps that the page is made of."""
+SWEEPS = ("paper_claims", "paper_joints", *WHOLE)  # Sweeps that the page is made of

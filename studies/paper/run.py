@@ -11,7 +11,7 @@ figures are made anew. Sweeps whose folder is not given keep their numbers.
 
 import json
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any
 
 import typer
 
@@ -21,9 +21,8 @@ from studies.paper.drawing import figures
 from studies.paper.reduction import SWEEPS, reduced, text_of
 from studies.paper.tables import page
 
-FOLDER: Final = Path(__file__).parent
-RESULTS: Final = Path("results/paper_claims.json")
-"""Where the numbers are, in the folder of the page."""
+FOLDER = Path(__file__).parent
+RESULTS = Path("results/paper_claims.json")  # Where the numbers are, in the folder of the page
 
 
 def make(folders: Annotated[list[Path] | None, typer.Argument()] = None, out: Path = FOLDER) -> None:

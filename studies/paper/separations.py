@@ -9,24 +9,20 @@ growth of an older one: no joint within 4 links of either has touched one within
 from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
 import warpchain
 from studies.common import Array, read_columns, table, write_rows
 
-RESULTS: Final = Path(__file__).parent / "results" / "separations.csv"
-LINKS: Final = (60, 90, 120, 150, 180)
-FREQUENCIES: Final = (10.0, 15.0, 20.0, 25.0, 30.0)
-RELEASES: Final = ((0.0, 0.008), (0.4, 0.0096))
-"""Phase and clearance [m]."""
-AROUND: Final = 4
-HIGH: Final = 0.04
-"""Height above the lowest joint [m] from which a touch is not one on the floor."""
-BINS: Final = ((2, 3), (4, 8), (9, 12), (13, 16), (17, 21), (22, 28), (29, 35), (36, 90))
-LEAST: Final = (2, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 30, 40)
-"""Values of m."""
+RESULTS = Path(__file__).parent / "results" / "separations.csv"
+LINKS = (60, 90, 120, 150, 180)
+FREQUENCIES = (10.0, 15.0, 20.0, 25.0, 30.0)
+RELEASES = ((0.0, 0.008), (0.4, 0.0096))  # Phase and clearance [m]
+AROUND = 4
+HIGH = 0.04  # Height above the lowest joint [m] from which a touch is not one on the floor
+BINS = ((2, 3), (4, 8), (9, 12), (13, 16), (17, 21), (22, 28), (29, 35), (36, 90))
+LEAST = (2, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 30, 40)  # Values of m
 
 
 def touches(walk: warpchain.WalkResult) -> Iterator[tuple[float, int, float]]:

@@ -7,7 +7,7 @@ NaN and take no part; what they leave is counted.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,8 +15,7 @@ from scipy.stats import t
 
 from studies.common import Array, OverCells, deviation, mean, over_cells, standard_error
 
-CONFIDENCE: Final = 0.95
-"""Confidence level of every test and interval."""
+CONFIDENCE = 0.95  # Confidence level of every test and interval
 
 
 @dataclass(frozen=True)

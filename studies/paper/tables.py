@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 import yaml
@@ -23,9 +23,9 @@ from studies.paper.statistics import Effect
 from studies.paper.verdicts import Bounds, Verdict, scaled
 from warpchain import Parameters
 
-SYMBOLS: Final = {"phase": "phase of the release", "clearance": "height of the release / m"}
+SYMBOLS = {"phase": "phase of the release", "clearance": "height of the release / m"}
 """Quantities that are none of Table 1."""
-NAMES: Final = {
+NAMES = {
     "sprocket_radius_is": "the sprocket's radius is that of",
     "circle_radius": "radius of the circles of links / m",
     "clearance": "height of the release / m",
@@ -34,7 +34,7 @@ NAMES: Final = {
     "ellipse_aspect": "aspect of the ellipse",
 }
 """What the paper leaves open, by field."""
-WORDS: Final = {"pitch": "where joints ride", "contact": "where circles touch"}
+WORDS = {"pitch": "where joints ride", "contact": "where circles touch"}
 
 
 def page(numbers: Numbers) -> str:
@@ -78,7 +78,7 @@ class Claim:
         return {Verdict.OPEN: "The numbers are missing.", Verdict.AGREES: ""}.get(verdict, "No reason is known.")
 
 
-CLAIMS: Final = tuple(
+CLAIMS = tuple(
     Claim(**given) for given in yaml.safe_load(Path(__file__).with_name("claims.yaml").read_text(encoding="utf-8"))
 )
 

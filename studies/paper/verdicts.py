@@ -5,7 +5,6 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Final
 
 
 @dataclass(frozen=True)
@@ -28,7 +27,7 @@ class Bounds:
     moderate: float = 0.2
 
 
-USUAL: Final = Bounds()
+USUAL = Bounds()
 _bounds: ContextVar[Bounds] = ContextVar("bounds", default=USUAL)
 
 

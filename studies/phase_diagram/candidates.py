@@ -6,7 +6,6 @@ the diagram share their deviations. Everything is of ln Δx, every cell counts a
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -16,16 +15,12 @@ from studies.common import table as markdown
 from studies.phase_diagram import laws, scales
 from studies.phase_diagram.laws import Points
 
-Prediction = Callable[[Points], Array]
-"""ln Δx of cells."""
-Fit = Callable[[Points], tuple[Array, Prediction]]
-"""Cells → the numbers of a law, and what it predicts."""
+Prediction = Callable[[Points], Array]  # ln Δx of cells
+Fit = Callable[[Points], tuple[Array, Prediction]]  # Cells → the numbers of a law, and what it predicts
 
-TIME: Final = scales.NORMAL_TIME
-"""τ = (R/g)^½ [s]."""
-BLOCKS: Final = ("links", "frequency")
-ROUNDS: Final = 40
-"""Samples of blocks."""
+TIME = scales.NORMAL_TIME  # τ = (R/g)^½ [s]
+BLOCKS = ("links", "frequency")
+ROUNDS = 40  # Samples of blocks
 
 
 @dataclass(frozen=True)
@@ -98,9 +93,9 @@ def residual(points: Points, candidate: Candidate) -> Array:
     return np.log(points.distance) - candidate.fit(points)[1](points)
 
 
-HANGING: Final = spline_of(lambda points: points.speed**2 / points.hanging, lambda points: points.hanging)
+HANGING = spline_of(lambda points: points.speed**2 / points.hanging, lambda points: points.hanging)
 """Of Δx/H over v²/(g H), H the height of the hanging loop."""
-CANDIDATES: Final = (
+CANDIDATES = (
     Candidate("a vτ + b (vτ)²/(nℓ)", 2, sum_of_powers(2.0)),
     Candidate("a vτ + b nℓ (vτ/nℓ)^p", 3, sum_of_powers(None)),
     Candidate("spline of Δx/(nℓ) over v/(nℓ)", laws.NUMBERS, spline(-1.0, 1.0)),

@@ -3,7 +3,6 @@
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
@@ -11,20 +10,17 @@ from studies.common import Array, Columns, deviation, mean, of_cells, standard_e
 from studies.phase_diagram.endings import Ending, endings
 from warpchain import InputError, Status, SweepResult
 
-Cell = tuple[int, float]
-"""Links, frequency [Hz]."""
+Cell = tuple[int, float]  # Links, frequency [Hz]
 
-CSV: Final = Path(__file__).parent / "results" / "cells.csv"
-MISSING: Final = -1
-"""Status of a walk that is not there yet, and any integer that is not known."""
-MOST_ENERGY_ERROR: Final = 0.05
-"""A walk with a greater energy error counts as inaccurate."""
-FAILURES: Final = tuple(code for code in Status if code not in (Status.RUNNING, Status.AT_REST, Status.FINISHED))
+CSV = Path(__file__).parent / "results" / "cells.csv"
+MISSING = -1  # Status of a walk that is not there yet, and any integer that is not known
+MOST_ENERGY_ERROR = 0.05  # A walk with a greater energy error counts as inaccurate
+FAILURES = tuple(code for code in Status if code not in (Status.RUNNING, Status.AT_REST, Status.FINISHED))
 """What a walk can end with instead of rest."""
-WAYS: Final = tuple(code for code in Ending if code != Ending.UNKNOWN)
-AVERAGED: Final = ("bounces", "walk_time", "hold_time", "collapsed_at")
+WAYS = tuple(code for code in Ending if code != Ending.UNKNOWN)
+AVERAGED = ("bounces", "walk_time", "hold_time", "collapsed_at")
 """Columns of the sweep of which the file has means over the walks at rest. NaNs are left out."""
-COLUMNS: Final = (
+COLUMNS = (
     *("status", "dx", "steps_accepted", "steps_rejected", "energy_error", "flight_before_collapse"),
     *("bounces_before_collapse", *AVERAGED),
 )

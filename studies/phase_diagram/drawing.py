@@ -1,6 +1,6 @@
 """Draws the maps and the master curves of the phase diagram."""
 
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,7 +14,7 @@ from studies.common import GROUND, INK, RED, Array, Columns, tidy
 from studies.phase_diagram import laws
 from studies.phase_diagram.endings import Ending
 
-COLORS: Final = {
+COLORS = {
     Ending.KEPT: "#999999",
     Ending.IN_FLIGHT: "#CC79A7",
     Ending.FIRST: "#000000",

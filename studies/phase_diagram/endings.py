@@ -5,14 +5,13 @@ release; `bounces_before_collapse` says in which bounce, counted from 1.
 """
 
 from enum import IntEnum
-from typing import Final
 
 import numpy as np
 
 from studies.common import Array, Columns
 from warpchain import Status
 
-IN_FLIGHT: Final = 0.01
+IN_FLIGHT = 0.01
 """Time since the last impulse on the floor [s] from which a chain is in flight; a later impulse begins a bounce."""
 
 
@@ -37,7 +36,7 @@ class Ending(IntEnum):
         return _MEANINGS[self]
 
 
-_MEANINGS: Final[dict[Ending, str]] = {
+_MEANINGS: dict[Ending, str] = {
     Ending.UNKNOWN: "not at rest, or missing",
     Ending.KEPT: "at rest without having lost its loop",
     Ending.IN_FLIGHT: "collapsed in flight",

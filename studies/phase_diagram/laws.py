@@ -7,7 +7,6 @@ residual of the law, in per cent of Δx.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -16,24 +15,18 @@ from scipy.optimize import minimize, minimize_scalar
 from studies.common import Array, Columns
 from warpchain import preset
 
-PARAMETERS: Final = preset("soft")
-LINK_LENGTH: Final = PARAMETERS.link_length
-GRAVITY: Final = PARAMETERS.gravity
-RADIUS: Final = PARAMETERS.sprocket_radius + PARAMETERS.circle_radius
-"""At which joints ride on the sprocket [m]."""
+PARAMETERS = preset("soft")
+LINK_LENGTH = PARAMETERS.link_length
+GRAVITY = PARAMETERS.gravity
+RADIUS = PARAMETERS.sprocket_radius + PARAMETERS.circle_radius  # At which joints ride on the sprocket [m]
 
-PIECES: Final = 6
-"""Of the spline."""
-NUMBERS: Final = PIECES + 3
-"""That a spline has."""
-FEWEST: Final = 3 * NUMBERS
-"""Cells that are enough for one."""
-MOST_FAILED: Final = 0.05
+PIECES = 6  # Of the spline
+NUMBERS = PIECES + 3  # That a spline has
+FEWEST = 3 * NUMBERS  # Cells that are enough for one
+MOST_FAILED = 0.05
 """Cells of which more walks failed are left out: those at rest may be another kind of walks than the rest."""
-FAST: Final = 12.0
-"""Frequency [Hz] from which most chains survive their second bounce."""
-PLACES: Final = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
-"""Turns of the loop per second at which a curve is described."""
+FAST = 12.0  # Frequency [Hz] from which most chains survive their second bounce
+PLACES = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # Turns of the loop per second at which a curve is described
 
 
 def in_papers_range(links: Array, frequency: Array) -> Array:

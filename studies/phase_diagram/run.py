@@ -11,7 +11,7 @@ Without a folder it takes one to two minutes.
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -22,9 +22,8 @@ from studies.phase_diagram import candidates, cells, drawing, laws, scales, stra
 from studies.phase_diagram.cells import FAILURES, WAYS
 from studies.phase_diagram.endings import Ending
 
-FOLDER: Final = Path(__file__).parent
-FEW: Final = 100
-"""Walks that each of two groups has in a cell in which they are compared, at least."""
+FOLDER = Path(__file__).parent
+FEW = 100  # Walks that each of two groups has in a cell in which they are compared, at least
 
 
 def table_of_cells(cells: Columns) -> str:

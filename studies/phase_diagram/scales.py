@@ -6,7 +6,6 @@ and links, and shows with which time τ all of its cells are on that very curve,
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -21,24 +20,20 @@ from warpchain import InputError, Status, SweepResult, preset
 Exponents = tuple[float, float, float]
 """Of gravity, of the radius at which joints ride on the sprocket, of the length of a link."""
 
-CSV: Final = Path(__file__).parent / "results" / "scaling.csv"
+CSV = Path(__file__).parent / "results" / "scaling.csv"
 
-TIMES: Final[Mapping[str, Exponents]] = {
+TIMES: Mapping[str, Exponents] = {
     "a constant": (0, 0, 0),
     "∝ g^-½": (-0.5, 0, 0),
     "(ℓ/g)^½": (-0.5, 0, 0.5),
     "(R/g)^½": (-0.5, 0.5, 0),
 }
 """Times that are tried, by name."""
-NORMAL: Final = (laws.GRAVITY, laws.RADIUS, laws.LINK_LENGTH)
-"""The three quantities in the phase diagram [SI units]."""
-NORMAL_TIME: Final = (laws.RADIUS / laws.GRAVITY) ** 0.5
-"""(R/g)^½ there [s]."""
-PLACES: Final = (0.1, 0.3, 1.0, 3.0)
-"""Turns in this time at which the curve is described."""
-ROUNDS: Final = 100
-"""Samples of the bootstrap over cells."""
-BLOCKS: Final = {"sprocket_radius": "radius of the sprocket", "gravity": "gravity", "links": "length of links"}
+NORMAL = (laws.GRAVITY, laws.RADIUS, laws.LINK_LENGTH)  # The three quantities in the phase diagram [SI units]
+NORMAL_TIME = (laws.RADIUS / laws.GRAVITY) ** 0.5  # (R/g)^½ there [s]
+PLACES = (0.1, 0.3, 1.0, 3.0)  # Turns in this time at which the curve is described
+ROUNDS = 100  # Samples of the bootstrap over cells
+BLOCKS = {"sprocket_radius": "radius of the sprocket", "gravity": "gravity", "links": "length of links"}
 """What is varied: first word of the names of the blocks → name."""
 
 

@@ -6,7 +6,6 @@ what is drawn held: Δx as a linear function of it, of sine and cosine of the ph
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
@@ -17,22 +16,16 @@ from studies.phase_diagram.cells import walks_by_cell
 from studies.phase_diagram.endings import Ending, endings
 from warpchain import Status, SweepResult
 
-CSV: Final = Path(__file__).parent / "results" / "strands.csv"
-EVENTS: Final = {"crease": "self_contact", "strands": "strands_met", "collapse": "collapse"}
+CSV = Path(__file__).parent / "results" / "strands.csv"
+EVENTS = {"crease": "self_contact", "strands": "strands_met", "collapse": "collapse"}
 """What happens to a loop: name → end of the name of its column."""
-BEGUN: Final = ("0", "1", "2", "3", "later", "never")
-"""Bounces begun before an event."""
-FEW: Final = 10
-"""Walks that each of two groups has in a cell in which they are compared, at least."""
-EARLY: Final = 2
-"""Strands that met by this bounce met early."""
-OTHERWISE: Final = (1, 3)
-"""Bounces by which they might be said to have met early instead."""
-WAYS: Final = (Ending.IN_FLIGHT, Ending.FIRST, Ending.SECOND, Ending.LATER)
-BEFORE: Final = ("a bounce or more before", "in that bounce", "not before")
-"""When strands met, of loops that collapse."""
-GROUPS: Final = ((30, 50), (60, 90), (100, 140), (150, 180), (190, 240))
-"""Numbers of links that are shown together."""
+BEGUN = ("0", "1", "2", "3", "later", "never")  # Bounces begun before an event
+FEW = 10  # Walks that each of two groups has in a cell in which they are compared, at least
+EARLY = 2  # Strands that met by this bounce met early
+OTHERWISE = (1, 3)  # Bounces by which they might be said to have met early instead
+WAYS = (Ending.IN_FLIGHT, Ending.FIRST, Ending.SECOND, Ending.LATER)
+BEFORE = ("a bounce or more before", "in that bounce", "not before")  # When strands met, of loops that collapse
+GROUPS = ((30, 50), (60, 90), (100, 140), (150, 180), (190, 240))  # Numbers of links that are shown together
 
 
 def reduced(parts: Sequence[SweepResult]) -> Iterator[dict[str, float | str]]:

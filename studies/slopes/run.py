@@ -5,7 +5,6 @@ python -m studies.slopes.run slopes
 """
 
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,9 +13,8 @@ import warpchain
 from studies import common
 from studies.common import DISTANCE, LINE_COLORS, Array, Block
 
-FOLDER: Final = Path(__file__).parent
-LIMIT: Final = 20.0
-"""`distance_limit` of the sweep [m]."""
+FOLDER = Path(__file__).parent
+LIMIT = 20.0  # `distance_limit` of the sweep [m]
 
 
 def share_without_end(block: Block) -> Array:

@@ -6,7 +6,7 @@ python -m studies.stationary_loop.starts FOLDER…     # sweeps steadiness, stea
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any
 
 import numpy as np
 import typer
@@ -18,12 +18,12 @@ from studies.common import DRAWN, Array
 Key = tuple[str, int, float, float]
 """Block, links, frequency [Hz], time for which the loop was held on [s], 0 where that is no axis."""
 
-CSV: Final = Path(__file__).parent / "results" / "starts.csv"
-PAGE: Final = Path(__file__).parent / "README.md"
-QUANTITIES: Final = ("dx", "release_center_x", "release_width", "release_height")
+CSV = Path(__file__).parent / "results" / "starts.csv"
+PAGE = Path(__file__).parent / "README.md"
+QUANTITIES = ("dx", "release_center_x", "release_width", "release_height")
 """Distance of the walk; place of the centre of mass, width and height of the loop at the release [m]."""
-STARTS: Final = ("spinning", "rest", "undamped")
-LOOPS: Final = {
+STARTS = ("spinning", "rest", "undamped")
+LOOPS = {
     "`rest`": (("rest", 0.0),),
     "`spinning`": (("spinning", 0.0), ("held_on", 0.0)),
     "held 30 s": (("undamped", 0.0), ("swing", 30.0)),
@@ -31,18 +31,16 @@ LOOPS: Final = {
     "held on": tuple(("held_on", time) for time in (5.0, 10.0, 20.0)),
 }
 """Loops of one kind: name → blocks, and times for which they held their loops on, of the same scene."""
-OURS: Final = ("`spinning`", "`rest`")
-COMPARED: Final = (
+OURS = ("`spinning`", "`rest`")
+COMPARED = (
     ("`rest`", "`spinning`"),
     ("`spinning`", "held 30 s"),
     ("`rest`", "held 30 s"),
     ("at once", "held on"),
     ("held 30 s", "held on"),
 )
-SLOW: Final = 10.0
-"""Frequency [Hz] at which loops hardly swing."""
-LONG: Final = 150
-"""Links from which loops are called long."""
+SLOW = 10.0  # Frequency [Hz] at which loops hardly swing
+LONG = 150  # Links from which loops are called long
 
 
 def reduced(paths: list[str]) -> list[dict[str, Any]]:

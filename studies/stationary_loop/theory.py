@@ -20,7 +20,7 @@ loops of 60 to 180 links at 10 to 30 Hz change by at most 0.1 mm and 0.05 1/m.
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_bvp
@@ -29,24 +29,18 @@ from scipy.optimize import brentq
 from studies.common import Array
 from warpchain import Parameters
 
-MeanLoop = Any
-"""What `walk.mean_loop()` returns."""
+MeanLoop = Any  # What `walk.mean_loop()` returns
 
-SMOOTHINGS: Final = (300.0, 100.0, 30.0, 10.0, 3.0, 1.0)
+SMOOTHINGS = (300.0, 100.0, 30.0, 10.0, 3.0, 1.0)
 """Smoothings ω_c [rad/s] for which the problem is solved before that of the chain."""
-LEAST_SMOOTHING: Final = 0.3
-"""Least smoothing ω_c [rad/s]."""
-TOLERANCE: Final = 1e-4
-"""Relative tolerance of the solver."""
-MOST_NODES: Final = 20_000
-"""Greatest number of nodes of the solver."""
-POINTS: Final = 801
-"""Number of points of a theoretical loop."""
-IN_LINKS: Final = 1.0
+LEAST_SMOOTHING = 0.3  # Least smoothing ω_c [rad/s]
+TOLERANCE = 1e-4  # Relative tolerance of the solver
+MOST_NODES = 20_000  # Greatest number of nodes of the solver
+POINTS = 801  # Number of points of a theoretical loop
+IN_LINKS = 1.0
 """The theory begins and ends this many links inside of the free part: averages near it include links that touch."""
 
-EDGE: Final = 4.0
-"""Links at either end of the free part that balances leave out: averages there include links on the sprocket."""
+EDGE = 4.0  # Links at either end of the free part that balances leave out: averages there include links on the sprocket
 
 
 class NoSolutionError(ValueError):

@@ -5,12 +5,11 @@ python -m studies.tilting_plane.run tilt      # → results/tilt.csv
 """
 
 from pathlib import Path
-from typing import Final
 
 from studies import common
 from studies.tilting_plane import taps
 
-FOLDER: Final = Path(__file__).parent
+FOLDER = Path(__file__).parent
 
 
 def table(rows: list[dict[str, str]]) -> str:

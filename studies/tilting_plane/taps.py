@@ -7,7 +7,7 @@ python -m studies.tilting_plane.taps          # that file → tables of the page
 
 import csv
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any
 
 import numpy as np
 import typer
@@ -15,12 +15,10 @@ import typer
 import warpchain
 from studies.common import Columns, mean, minus, over_cells, publish, run_study, standard_error, table, write_rows
 
-FOLDER: Final = Path(__file__).parent
-UNITS: Final = {"tilt": "rad", "tilt_rate": "rad/s", "lateral_speed": "m/s", "yaw_rate": "rad/s"}
-STRAIGHT: Final = (0.1, 0.2)
-"""Greatest |drift| over Δx of a walk that counts as straight."""
-FEW: Final = 3
-"""Walks of a cell that are enough for a mean."""
+FOLDER = Path(__file__).parent
+UNITS = {"tilt": "rad", "tilt_rate": "rad/s", "lateral_speed": "m/s", "yaw_rate": "rad/s"}
+STRAIGHT = (0.1, 0.2)  # Greatest |drift| over Δx of a walk that counts as straight
+FEW = 3  # Walks of a cell that are enough for a mean
 
 
 def reduced(folder: str, needed: str) -> tuple[warpchain.SweepResult, list[dict[str, str]]]:

@@ -14,7 +14,6 @@ keep their sense of rotation, because the loop bends there, do not feel it in sm
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import permutations
-from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,23 +26,17 @@ Factors = Callable[[Array, float], tuple[Array, Array, Array]]
 
 UPPER_BACKWARD, LOWER_BACKWARD, LOWER_FORWARD, UPPER_FORWARD = range(4)
 """Columns of `Waves.rate`: bands and directions. In the ring backward is the slow family, forward the fast one."""
-FRICTION_STEPS: Final = 64
-"""Friction rises from nothing in so many steps, while the branches are followed."""
-PHASE_STEP: Final = 1e-5
-"""Step of a central difference with respect to the phase [rad]."""
-ROUNDING: Final = 1e-12
-"""Damping below this part of a rate is rounding."""
+FRICTION_STEPS = 64  # Friction rises from nothing in so many steps, while the branches are followed
+PHASE_STEP = 1e-5  # Step of a central difference with respect to the phase [rad]
+ROUNDING = 1e-12  # Damping below this part of a rate is rounding
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Waves:
-    """Free waves of k phases, four each.
+    """Free waves of k phases κ [rad], four each, with their rates λ = −γ − iω [1/s] in the chain's frame, (k, 4).
 
-    Attributes:
-        phase: κ per link [rad], shape (k,).
-        rate: λ = −γ − iω [1/s] in the chain's frame, shape (k, 4); columns as `UPPER_BACKWARD` … `UPPER_FORWARD`,
-            which are sorted by frequency without friction and followed from there.
-        slope: dλ/dκ [1/s], shape (k, 4).
+    Columns are `UPPER_BACKWARD` … `UPPER_FORWARD`, sorted by frequency without friction and followed from there. Slopes
+    are dλ/dκ.
     """
 
     phase: Array
@@ -72,10 +65,7 @@ class Waves:
 
     @property
     def reach(self) -> Array:
-        """How far a packet runs along the chain until its amplitude is 1/e of what it was [links], shape (k, 4).
-
-        Infinite for waves whose damping is nothing but rounding.
-        """
+        """How far a packet runs until its amplitude is 1/e [links], (k, 4); infinite if its damping is rounding."""
         damped = self.damping > ROUNDING * np.abs(self.rate)
         return np.where(damped, np.abs(self.group_speed) / np.where(damped, self.damping, 1.0), np.inf)
 
@@ -89,7 +79,7 @@ def straight_waves(parameters: Parameters, tension: float, phase: ArrayLike) -> 
             np.stack([tension * parameters.link_length * s, 4 * friction * s**2, inertia * s + quarter * c], axis=-1)
             for s, c in (squares, squares[::-1])
         )
-        return first.astype(np.complex128), second.astype(np.complex128), np.asarray(squares[0] * squares[1])
+        return first, second, squares[0] * squares[1]
 
     inertia, quarter = _mean_inertia(parameters), _mean_mass(parameters) * parameters.link_length**2 / 4
     return _waves(parameters, np.asarray(phase, dtype=np.float64), factors)
@@ -99,14 +89,10 @@ def ring_waves(parameters: Parameters, links: int, speed: float, number: ArrayLi
     """Bending modes of a circulating ring without gravity, exact for rigid links and closed joints.
 
     Its N links, N even, move at `speed` [m/s]; `number` has whole wavelengths around it, from 2 to N/4, shape (k,).
-
-    Returns:
-        Rates in the frame that turns with the ring, at the phases 2πn/N.
+    Rates are those in the frame that turns with the ring, at the phases 2πn/N.
     """
-    mass, inertia = _mean_mass(parameters), _mean_inertia(parameters)
-    alpha, length = np.pi / links, parameters.link_length
-    spin = ring_spin(parameters, links, speed)
-    eighth = mass * length**2 / 8
+    inertia, eighth = _mean_inertia(parameters), _mean_mass(parameters) * parameters.link_length**2 / 8
+    alpha, spin = np.pi / links, ring_spin(parameters, links, speed)
 
     def factors(phases: Array, friction: float) -> tuple[Array, Array, Array]:
         forward, backward = phases / 2 + alpha, phases / 2 - alpha
@@ -126,15 +112,8 @@ def ring_waves(parameters: Parameters, links: int, speed: float, number: ArrayLi
 
 
 def continuous_ring(parameters: Parameters, links: int, speed: float, number: ArrayLike) -> Array:
-    """Rates of the continuous ring, slow and fast, in the frame that turns along: `ring_waves` for long waves.
-
-    The ring has the length Nℓ.
-
-    Returns:
-        λ [1/s], shape (k, 2).
-    """
-    n = np.asarray(number, dtype=np.float64)
-    length = parameters.link_length
+    """Rates λ [1/s] of the continuous ring of length Nℓ, slow and fast, (k, 2): `ring_waves` for long waves."""
+    n, length = np.asarray(number, dtype=np.float64), parameters.link_length
     density, radius = _mean_mass(parameters) / length, links * length / (2 * np.pi)
     spin, bend = speed / radius, (n**2 - 1) ** 2
     rotary = (_mean_inertia(parameters) / length - density * length**2 / 6) / (density * radius**2)
@@ -150,8 +129,7 @@ def band_gap(parameters: Parameters, tension: float) -> tuple[float, float]:
     length = parameters.link_length
     one = parameters.outer_mass + 4 * parameters.inner_inertia / length**2
     other = parameters.inner_mass + 4 * parameters.outer_inertia / length**2
-    low, high = (float(np.sqrt(4 * tension / (length * pick(one, other)))) for pick in (max, min))
-    return low, high
+    return tuple(float(np.sqrt(4 * tension / (length * mass))) for mass in sorted((one, other), reverse=True))
 
 
 def long_wave_speed(parameters: Parameters, tension: float) -> float:
@@ -173,7 +151,7 @@ def equivalent_friction(parameters: Parameters, amplitude: float) -> float:
     ratio = amplitude / parameters.friction_smoothing
     # tanh(ratio · cos φ) cos φ turns over in about 1/ratio from a quarter of the period on
     mean = 2 / np.pi * quad(lambda x: np.tanh(ratio * np.sin(x)) * np.sin(x), 0, np.pi / 2, points=[3 / ratio])[0]
-    return float(parameters.viscous_friction + 2 * parameters.coulomb_friction * mean / amplitude)
+    return parameters.viscous_friction + 2 * parameters.coulomb_friction * mean / amplitude
 
 
 def _mean_mass(parameters: Parameters) -> float:

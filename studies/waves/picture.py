@@ -1,8 +1,7 @@
 """The figure of waves along a chain: a quantity of its joints against time, in the chain's frame and in the room's."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -20,20 +19,14 @@ Colour = Literal["curvature", "velocity"]
 Place = Callable[[Array, int], Array]
 """Joint numbers at consecutive frames, and the first frame → places on a panel, wrapped around the loop."""
 
-FIRST_IMPACTS: Final = 3
-"""Number of impacts from which characteristics start."""
-AVERAGED: Final = 0.02
-"""Time [s] over which the mean tension is averaged for the wave speed; in an impact it swings to both sides."""
-MOST_COLUMNS: Final = 900
-"""Most instants of an image; each is the mean of its frames."""
-SHARE: Final = (2.0, 98.0)
-"""Percentiles of the image between which colours run; in impacts a few values are ten times greater."""
-_DASHES: Final[Any] = (0, (5, 3))
+FIRST_IMPACTS = 3  # Number of impacts from which characteristics start
+MOST_COLUMNS = 900  # Most instants of an image; each is the mean of its frames
+SHARE = (2.0, 98.0)  # Percentiles of the image between which colours run; in impacts a few values are ten times greater
+_DASHES = (0, (5, 3))
 
 
-@dataclass(frozen=True)
-class _Look:
-    """How a quantity is shown: label of its colours, colour map, colours of lines."""
+class _Look(NamedTuple):
+    """How a quantity is shown."""
 
     label: str
     cmap: str
@@ -42,7 +35,7 @@ class _Look:
     touch: str
 
 
-_LOOKS: Final[dict[Colour, _Look]] = {
+_LOOKS: dict[Colour, _Look] = {
     "curvature": _Look("curvature / m$^{-1}$", "viridis", "white", "black", "#F0602F"),
     "velocity": _Look("velocity across the chain, outwards / (m/s)", "RdBu_r", INK, "white", "#009E73"),
 }
@@ -56,14 +49,9 @@ def waves_figure(walk: WalkResult, *, colour: Colour = "curvature", window: tupl
     characteristics, along which small waves run at ±c relative to the chain; they start where each of the first impacts
     begins, and where it ends.
 
-    Args:
-        walk: a walk in a fixed plane with joint forces, in frames in which a wave runs at most half a link.
-        colour: what colours show: `curvature` [1/m], positive where the chain bends as its loop; `velocity` of the
-            joints across the chain, outwards, relative to the centre of mass [m/s].
-        window: times since the release between which is shown [s].
-
-    Raises:
-        ValueError: the walk lacks joint forces.
+    The walk has a fixed plane and joint forces, in frames in which a wave runs at most half a link. Colours show the
+    `curvature` [1/m], positive where the chain bends as its loop, or the `velocity` of the joints across the chain,
+    outwards, relative to the centre of mass [m/s]; the window is of times since the release [s].
     """
     if not len(walk.frame_forces):
         raise ValueError("walk: its joint forces were not recorded; run it again with record_loads")
@@ -71,8 +59,7 @@ def waves_figure(walk: WalkResult, *, colour: Colour = "curvature", window: tupl
     shown = (walk.frame_time >= window[0]) & (walk.frame_time <= window[1])
     time, joints, links, link = walk.frame_time[shown], walk.frame_joints[shown], scene.links, parameters.link_length
     masses, length = inertia_of(links, parameters)[:, 0], links * link
-    tension = fields.tensions(joints, walk.frame_forces[shown]).mean(axis=1)
-    speed = fields.wave_speeds(fields.moving_average(time, tension, AVERAGED), link, float(masses.mean()))
+    speed = fields.wave_speeds(time, joints, walk.frame_forces[shown], link, masses.mean())
     below = fields.joints_below(joints, masses)
     velocity = colour == "velocity"
     values = fields.normal_velocities(time, joints, masses) if velocity else fields.curvatures(joints, link)
@@ -90,8 +77,8 @@ def waves_figure(walk: WalkResult, *, colour: Colour = "curvature", window: tupl
 
     figure = Figure(figsize=(9.0, 8.0), layout="constrained")
     own, room = figure.subplots(2, 1, sharex=True)
-    style: dict[str, Any] = {"cmap": look.cmap, "vmin": low, "vmax": high, "aspect": "auto"}
-    style |= {"origin": "lower", "interpolation": "nearest"}
+    colors = {"cmap": look.cmap, "vmin": low, "vmax": high}
+    style = {"aspect": "auto", "origin": "lower", "interpolation": "nearest"} | colors
     for axes, image, place, low, high in (
         (own, still, as_joint, -0.5, links - 0.5),
         (room, moved, as_place, -length / 2, length / 2),
@@ -140,11 +127,11 @@ def _draw_contacts(axes: Axes, time: Array, touching: Array, place: Place, half:
 
 def _draw_legend(figure: Figure, look: _Look) -> None:
     """What marks and lines mean, below the panels."""
-    halo = [withStroke(linewidth=2.2, foreground=FAINT)]
     begins = "±c from beginning of impact, $c = \\sqrt{T\\ell/\\bar{m}}$"
+    wave = {"color": look.wave, "linewidth": 1.0, "path_effects": [withStroke(linewidth=2.2, foreground=FAINT)]}
     lines = [
-        Line2D([], [], color=look.wave, linewidth=1.0, path_effects=halo, label=begins),
-        Line2D([], [], color=look.wave, linewidth=1.0, linestyle=_DASHES, path_effects=halo, label="±c from its end"),
+        Line2D([], [], label=begins, **wave),
+        Line2D([], [], linestyle=_DASHES, label="±c from its end", **wave),
         Line2D([], [], color="black", linewidth=2.0, label="joint at the floor"),
         Line2D([], [], color=look.touch, linewidth=2.0, label="joint in self-contact"),
     ]

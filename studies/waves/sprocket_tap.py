@@ -6,8 +6,6 @@ The sprocket dips by 8 mm and comes back (`release`), 5 mm above a floor, and on
 both is the tap's alone. Places are counted along the loop from its lowest point, positive with the motion of the links.
 """
 
-from typing import Final
-
 import numpy as np
 
 import warpchain
@@ -15,16 +13,13 @@ from studies.common import table
 from studies.waves.fields import curvatures, in_room, joints_below, normal_velocities
 from studies.waves.wave_drag import inertia_of
 
-LINKS: Final = 120
-FREQUENCIES: Final = (15.0, 20.0, 25.0)
-DIP: Final = 0.008
-INTERVAL: Final = 2.5e-4
-TOUCHING: Final = 1e-4
-"""Height of the lowest circle above the floor that it touches, at most [m]."""
-LATER: Final = np.arange(0.012, 0.027, 0.001)
-"""Times after the first touch [s]: after the tap, before the sprocket is reached."""
-SPAN: Final = 7
-"""So many of these times next to one another give a speed."""
+LINKS = 120
+FREQUENCIES = (15.0, 20.0, 25.0)
+DIP = 0.008
+INTERVAL = 2.5e-4
+TOUCHING = 1e-4  # Height of the lowest circle above the floor that it touches, at most [m]
+LATER = np.arange(0.012, 0.027, 0.001)  # Times after the first touch [s]: after the tap, before the sprocket is reached
+SPAN = 7  # So many of these times next to one another give a speed
 
 
 def dipping(frequency: float, clearance: float) -> warpchain.WalkResult:
