@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from studies.common import BLUE, DASHES, DISTANCE, FAINT, FREQUENCY, GREEN, INK, LINE_COLORS, RED, tidy
-from studies.paper.findings import Numbers, of_start, steps
+from studies.paper.findings import Numbers, of_start
 from studies.paper.findings import effects as effects_of
 from studies.paper.impacts import impacts
 from studies.paper.statistics import Effect
@@ -70,7 +70,7 @@ def distances(numbers: Numbers) -> Figure:
 
 def effects(numbers: Numbers) -> Figure:
     """What each value of each quantity does to Δx: a dot for every cell, the mean over the cells with its interval."""
-    known = {name: steps(found) for name, found in effects_of(numbers).items() if name not in ("start", "tolerance")}
+    known = {name: found["values"] for name, found in effects_of(numbers).items() if name != "start"}
     names, heights = list(known), np.cumsum([len(found) + 0.5 for found in known.values()])
     half = int(np.argmax(heights > heights[-1] / 2 - 1.5))
     columns, longest = (names[: half + 1], names[half + 1 :]), max(heights[half], heights[-1] - heights[half])
@@ -93,13 +93,13 @@ def symbol_of(name: str) -> str:
     return f"${base}" + (f"_\\mathrm{{{index}}}$" if index else "$")
 
 
-def _draw_effects(axes: Axes, known: Mapping[str, Sequence[tuple[float, Effect]]]) -> None:
+def _draw_effects(axes: Axes, known: Mapping[str, Sequence[Effect]]) -> None:
     """The effects of some quantities, one line for each value."""
     rng = np.random.default_rng(0)
     y, places, texts = 0.0, [], []
     for number, (name, found) in enumerate(known.items()):
         top = y - 0.5
-        for value, effect in found:
+        for effect in found:
             sign = effect.sign[effect.known]
             relative = np.clip(effect.relative[effect.known], -REACH, REACH)
             height = y + rng.uniform(-0.25, 0.25, len(relative))
@@ -108,7 +108,7 @@ def _draw_effects(axes: Axes, known: Mapping[str, Sequence[tuple[float, Effect]]
             mean = float(np.clip(effect.cells.mean, -REACH, REACH))
             axes.errorbar(mean, y, xerr=1.96 * effect.cells.error, fmt="|", color=INK, markersize=9)
             places.append(y)
-            shortest = re.sub(r"e\+?(-?)0*(?=\d)", r"e\1", f"{value:.6g}")  # 1e-6 and not 1e-06
+            shortest = re.sub(r"e\+?(-?)0*(?=\d)", r"e\1", f"{effect.notes['value']:.6g}")  # 1e-6 and not 1e-06
             texts.append(f"{symbol_of(name)} = {shortest}")
             y += 1.0
         if number % 2:

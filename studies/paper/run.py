@@ -18,7 +18,7 @@ import typer
 import warpchain
 from studies.common import publish, run_study, write_text
 from studies.paper.drawing import figures
-from studies.paper.reduction import SWEEPS, reduced, text_of
+from studies.paper.reduction import SWEEPS, read, reduced, text_of
 from studies.paper.tables import page
 
 FOLDER = Path(__file__).parent
@@ -32,10 +32,11 @@ def make(folders: Annotated[list[Path] | None, typer.Argument()] = None, out: Pa
     known |= {name: reduced(sweep) for name, sweep in sweeps.items()}
     if missing := [name for name in SWEEPS if name not in known]:
         raise warpchain.InputError(f"{missing[0]}: no numbers of this sweep; give its folder")
-    numbers = {name: known[name] for name in SWEEPS}
+    text = text_of({name: known[name] for name in SWEEPS})
     if folders:
-        write_text(out / RESULTS, text_of(numbers))
-    write_text(out / "README.md", page(json.loads(text_of(numbers))))
+        write_text(out / RESULTS, text)
+    numbers = read(text)
+    write_text(out / "README.md", page(numbers))
     publish(out, {}, dict(figures(numbers, sweeps)))
 
 

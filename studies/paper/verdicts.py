@@ -1,13 +1,10 @@
 """Rules by which numbers become verdicts."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from contextvars import ContextVar
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 
 
-@dataclass(frozen=True)
+@dataclass
 class Bounds:
     """What the rules allow.
 
@@ -27,23 +24,7 @@ class Bounds:
     moderate: float = 0.2
 
 
-USUAL = Bounds()
-_bounds: ContextVar[Bounds] = ContextVar("bounds", default=USUAL)
-
-
-def bounds() -> Bounds:
-    """The bounds that hold now."""
-    return _bounds.get()
-
-
-@contextmanager
-def scaled(name: str, factor: float) -> Iterator[None]:
-    """Within it a bound is so many times as great."""
-    token = _bounds.set(replace(USUAL, **{name: factor * getattr(USUAL, name)}))
-    try:
-        yield
-    finally:
-        _bounds.reset(token)
+BOUNDS = Bounds()  # Those that hold now; the page tries others
 
 
 class Verdict(StrEnum):
@@ -59,9 +40,9 @@ def direction(with_claim: int, against: int, comparisons: int) -> Verdict:
     """A claim that something rises, or falls, from the significant comparisons with it and against it, and all."""
     if not comparisons:
         return Verdict.OPEN
-    if with_claim >= bounds().most * comparisons and against <= bounds().few * comparisons:
+    if with_claim >= BOUNDS.most * comparisons and against <= BOUNDS.few * comparisons:
         return Verdict.AGREES
-    in_part = with_claim > bounds().few * comparisons and with_claim >= against
+    in_part = with_claim > BOUNDS.few * comparisons and with_claim >= against
     return Verdict.PART if in_part else Verdict.DIFFERS
 
 
@@ -69,12 +50,12 @@ def share(fulfilled: int, cases: int) -> Verdict:
     """A claim about every case: agrees if nearly all fulfil it, in part if at least half do."""
     if not cases:
         return Verdict.OPEN
-    if fulfilled >= (1 - bounds().few) * cases:
+    if fulfilled >= (1 - BOUNDS.few) * cases:
         return Verdict.AGREES
-    return Verdict.PART if fulfilled >= bounds().most * cases else Verdict.DIFFERS
+    return Verdict.PART if fulfilled >= BOUNDS.most * cases else Verdict.DIFFERS
 
 
-def together(verdicts: list[Verdict]) -> Verdict:
+def together(*verdicts: Verdict) -> Verdict:
     """Verdict on a claim of several parts: theirs if they are the same, else in part."""
     kinds = set(verdicts) - {Verdict.OPEN}
     if not kinds:
