@@ -55,10 +55,10 @@ def at_rest(block: Block, quantity: str = "dx") -> xarray.DataArray:
     return xarray.DataArray(values, axes, block.dims).transpose("links", "frequency", ..., missing_dims="ignore")
 
 
-def of_cells(block: Block) -> Iterator[tuple[tuple[int, ...], list[float]]]:
+def of_cells(block: Block) -> Iterator[tuple[tuple[int, ...], dict[str, float]]]:
     """Place of each cell of a block, and the values of its axes there."""
     for place in np.ndindex(*map(len, block.axes.values())):
-        yield place, [values[number] for values, number in zip(block.axes.values(), place, strict=True)]
+        yield place, {name: block.axes[name][number] for name, number in zip(block.axes, place, strict=True)}
 
 
 def mean(values: ArrayLike) -> Any:

@@ -19,11 +19,11 @@ LENGTHS = ("penetration_floor", "penetration_self", "penetration_sprocket", "gre
 def cells(sweep: warpchain.SweepResult, column: str) -> dict[str, Array]:
     """Values (samples,) of a column, by block and cell."""
     return {
-        ", ".join([name, *(f"{axis} {value:g}" for axis, value in zip(block.axes, values, strict=True))]): np.asarray(
+        ", ".join([name, *(f"{axis} {value:g}" for axis, value in at.items())]): np.asarray(
             block.columns[column][place], dtype=np.float64
         )
         for name, block in sweep.blocks.items()
-        for place, values in of_cells(block)
+        for place, at in of_cells(block)
     }
 
 

@@ -26,10 +26,11 @@ def distances(block: Block) -> str:
     cells, rest = block.statistics(), block.columns["status"] == warpchain.Status.AT_REST
     time, bounces = (common.mean_where(rest, block.columns[name]) for name in ("walk_time", "bounces"))
     rows = []
-    for place, values in common.of_cells(block):
+    for place, at in common.of_cells(block):
         numbers = f"{cells.mean[place]:.3f} ± {cells.standard_error[place]:.3f}", f"{cells.sd[place]:.3f}"
         shown = (*numbers, f"{time[place]:.2f}", f"{bounces[place]:.1f}") if rest[place].any() else ("–",) * 4
-        cell = *(f"{value:g}" for value in values[:-1]), f"{1e3 * values[-1]:g}"
+        *values, mass = at.values()
+        cell = *(f"{value:g}" for value in values), f"{1e3 * mass:g}"
         rows.append((*cell, *shown, f"{rest[place].mean():.0%}"))
     names = [name.replace("frequency", "ν / Hz") for name in block.axes][:-1]
     return common.table((*names, "charm / g", "Δx / m", "σ / m", "t / s", "bounces", "at rest"), rows)

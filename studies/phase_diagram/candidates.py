@@ -5,7 +5,7 @@ the diagram share their deviations. Everything is of ln Δx, every cell counts a
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -23,15 +23,8 @@ BLOCKS = ("links", "frequency")
 ROUNDS = 40  # Samples of blocks
 
 
-@dataclass(frozen=True)
-class Candidate:
-    """A law.
-
-    Attributes:
-        name: in the table.
-        numbers: how many are fitted.
-        fit: of the law to cells.
-    """
+class Candidate(NamedTuple):
+    """A law: its name in the table, how many numbers are fitted, and its fit to cells."""
 
     name: str
     numbers: int
@@ -151,32 +144,28 @@ def table(cells: Columns, varied: scales.Cells) -> str:
     for candidate in CANDIDATES:
         row = [candidate.name, str(candidate.numbers)]
         for points in known.values():
-            own = laws.root_mean_square(residual(points, candidate))
-            others = [laws.root_mean_square(left_out(points, candidate, block)) for block in BLOCKS]
-            row.append(f"{own:.1f} / {others[0]:.1f} / {others[1]:.1f}")
+            left = [residual(points, candidate), *(left_out(points, candidate, block) for block in BLOCKS)]
+            row.append(" / ".join(f"{laws.root_mean_square(each):.1f}" for each in left))
         rows.append(row)
     heads = (f"{name} ({len(points.links)} cells)" for name, points in known.items())
     curves = "\n".join(f"- {name}: {laws.slopes(points)} {laws.drift(points)}" for name, points in known.items())
-    lines = [markdown(("law of Δx", "numbers", *heads), rows), curves, *errors(known), beyond(known["all"], varied)]
+    lines = [markdown(("law of Δx", "numbers", *heads), rows), curves, errors(known), beyond(known["all"], varied)]
     return "\n\n".join(lines)
 
 
-def errors(known: Mapping[str, Points]) -> list[str]:
-    """Markdown: numbers of laws with errors from blocks of links and of frequencies."""
+def errors(known: Mapping[str, Points]) -> str:
+    """Markdown: numbers of laws with errors from blocks of links and of frequencies; what is given has none."""
     rows = []
     for candidate in (CANDIDATES[0], CANDIDATES[1], *CANDIDATES[3:6]):
         for name, points in known.items():
             numbers = candidate.fit(points)[0]
-            of_blocks = [block_errors(points, candidate, block) for block in BLOCKS]
+            of_blocks = (block_errors(points, candidate, block) for block in BLOCKS)
             texts = [
-                f"{value:.2f} ± {one:.2f} ± {two:.2f}" for value, one, two in zip(numbers, *of_blocks, strict=True)
+                f"{value:.2f} ± {one:.2f} ± {two:.2f}" if one > 0 else f"{value:g}"
+                for value, one, two in zip(numbers, *of_blocks, strict=True)
             ]
-            if candidate is CANDIDATES[0]:
-                texts[2] = "2"
-            if candidate is CANDIDATES[3]:
-                texts[1] = "1"
             rows.append((candidate.name, name, ", ".join(texts)))
-    return [markdown(("law of Δx", "cells", "a, b, p or c, d or p, q ± over links ± over frequencies"), rows)]
+    return markdown("law of Δx | cells | a, b, p or c, d or p, q ± over links ± over frequencies", rows)
 
 
 def beyond(points: Points, varied: scales.Cells) -> str:

@@ -42,12 +42,11 @@ def walks_by_cell(parts: Sequence[SweepResult], names: Sequence[str] = COLUMNS) 
         if part.sweep["seed"] in [other.sweep["seed"] for other in parts[:number]]:
             raise InputError(f"{part.name}: walks of another part, the seed is the same; leave one out")
         for block in part.blocks.values():
-            for place, values in of_cells(block):
-                at = dict(zip(block.axes, values, strict=True))
+            for place, at in of_cells(block):
                 walks = {name: block.columns[name][place] for name in names}
                 found.setdefault((int(at["links"]), float(at["frequency"])), []).append(walks)
     return {
-        cell: {name: np.concatenate([walks[name] for walks in cells]) for name in cells[0]}
+        cell: {name: np.concatenate([walks[name] for walks in cells]) for name in names}
         for cell, cells in sorted(found.items())
     }
 
@@ -64,10 +63,10 @@ def settings_of(result: SweepResult) -> str:
 
 def reduced(links: int, frequency: float, walks: Columns) -> dict[str, float]:
     """Statistics of one cell: a row of the file. NaN where there are too few walks."""
-    status = walks["status"]
+    status, known = walks["status"], {name: _known(values) for name, values in walks.items()}
     rest = status == Status.AT_REST
     dx, codes = walks["dx"][rest].astype(float), endings(walks)[rest]
-    attempts = (_known(walks["steps_accepted"]) + _known(walks["steps_rejected"]))[status != MISSING]
+    attempts = (known["steps_accepted"] + known["steps_rejected"])[status != MISSING]
     deciles = np.quantile(dx, [0.1, 0.5, 0.9]) if len(dx) else np.full(3, np.nan)
     return {
         "links": links,
@@ -83,12 +82,18 @@ def reduced(links: int, frequency: float, walks: Columns) -> dict[str, float]:
         "dx_sd": float(deviation(dx)),
         "dx_se": float(standard_error(dx)),
         **dict(zip(("dx_10", "dx_50", "dx_90"), map(float, deciles), strict=True)),
-        **{f"{name}_mean": float(mean(_known(walks[name])[rest])) for name in AVERAGED},
-        "bounces_sd": float(deviation(_known(walks["bounces"])[rest])),
+        **{f"{name}_mean": float(mean(known[name][rest])) for name in AVERAGED},
+        "bounces_sd": float(deviation(known["bounces"][rest])),
         "attempts_mean": float(mean(attempts)),
         **{way.label: int((codes == way).sum()) for way in WAYS},
         **{f"dx_{way.label}": float(mean(dx[codes == way])) for way in WAYS},
     }
+
+
+def places_in(cells: Columns, others: Columns) -> Array:
+    """Where the rows of others have these cells."""
+    places = {key: i for i, key in enumerate(zip(others["links"], others["frequency"], strict=True))}
+    return np.array([places[key] for key in zip(cells["links"], cells["frequency"], strict=True)])
 
 
 def _known(values: Array) -> Array:

@@ -98,20 +98,20 @@ def draw_laws(cells: Columns) -> Figure:
     """Laws of Δx/(nℓ): cells coloured by links, and master curves; where the last one fails."""
     points = laws.points_of(cells)
     figure = Figure(figsize=(11, 8.2), layout="constrained")
-    grid, y = list(figure.subplots(2, 2).flat), points.distance / points.length
+    grid, y = list(figure.subplots(2, 2).flat), points.lengths
     variables = {
         "ν²ℓ/g": points.frequency**2 * laws.LINK_LENGTH / laws.GRAVITY,
         "v²/(g nℓ)": points.speed**2 / (laws.GRAVITY * points.length),
-        "v/(nℓ), turns of the loop / s⁻¹": points.speed / points.length,
+        "v/(nℓ), turns of the loop / s⁻¹": points.turns,
     }
     for axes, (name, x) in zip(grid, variables.items(), strict=False):
         image = axes.scatter(x, y, c=points.links, s=12, cmap="viridis")
-        fine = np.geomspace(x.min(), x.max(), 200)
-        axes.plot(fine, np.exp(laws.master_curve(x, y)(fine)), color=INK, linewidth=1)
+        fine, curve = np.geomspace(x.min(), x.max(), 200), laws.master_curve(x, y)
+        axes.plot(fine, np.exp(curve(fine)), color=INK, linewidth=1)
         title = f"residual {laws.rms_residual(x, y):.1f} %"
         tidy(axes, title, grid="both", xscale="log", yscale="log", xlabel=name, ylabel="Δx/(nℓ)")
     figure.colorbar(image, ax=grid[:2], label="links", pad=0.02)
-    left = 100 * np.expm1(laws.residuals(x, y))
+    left = 100 * np.expm1(np.log(y) - curve(x))
     limit = float(np.quantile(np.abs(left), 0.98))
     title = "Δx over its curve in v/(nℓ), less 1 / %"
     used = Grid(points.links, points.frequency)

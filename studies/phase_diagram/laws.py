@@ -22,7 +22,6 @@ RADIUS = PARAMETERS.sprocket_radius + PARAMETERS.circle_radius  # At which joint
 
 PIECES = 6  # Of the spline
 NUMBERS = PIECES + 3  # That a spline has
-FEWEST = 3 * NUMBERS  # Cells that are enough for one
 MOST_FAILED = 0.05
 """Cells of which more walks failed are left out: those at rest may be another kind of walks than the rest."""
 FAST = 12.0  # Frequency [Hz] from which most chains survive their second bounce
@@ -58,6 +57,16 @@ class Points:
         return self.links * LINK_LENGTH
 
     @property
+    def turns(self) -> Array:
+        """Of the loop per second, v/(nℓ) [1/s]."""
+        return self.speed / self.length
+
+    @property
+    def lengths(self) -> Array:
+        """Δx/(nℓ)."""
+        return self.distance / self.length
+
+    @property
     def hanging(self) -> Array:
         """Height of the loop that hangs on the sprocket [m]: straight sides and two half circles."""
         return 2 * RADIUS + np.maximum(self.length / 2 - np.pi * RADIUS, 0.0)
@@ -73,27 +82,20 @@ def points_of(cells: Columns) -> Points:
 def master_curve(x: Array, y: Array) -> Callable[[Array], Array]:
     """ln y as a cubic spline of ln x, by least squares; knots at equal shares of the points."""
     abscissa = np.log(x)
-    inner = np.unique(np.quantile(abscissa, np.linspace(0, 1, PIECES + 1)[1:-1]))
-    low, high = abscissa.min(), abscissa.max()
-    inner = inner[(inner > low) & (inner < high)]
-    knots = np.r_[[low] * 4, inner, [high] * 4]
+    inner, low, high = np.quantile(abscissa, np.linspace(0, 1, PIECES + 1)[1:-1]), abscissa.min(), abscissa.max()
+    knots = np.r_[[low] * 4, np.unique(inner[(inner > low) & (inner < high)]), [high] * 4]
 
     def design(values: Array) -> Array:
         clipped = np.clip(np.log(values), low, high)
         return BSpline.design_matrix(clipped, knots, 3).toarray()
 
-    weights, *_ = np.linalg.lstsq(design(x), np.log(y), rcond=None)
+    weights = np.linalg.lstsq(design(x), np.log(y), rcond=None)[0]
     return lambda values: design(values) @ weights
 
 
-def residuals(x: Array, y: Array) -> Array:
-    """ln y less the master curve, shape (cells,)."""
-    return np.log(y) - master_curve(x, y)(x)
-
-
 def rms_residual(x: Array, y: Array) -> float:
-    """Residual of a law, root mean square in per cent."""
-    return root_mean_square(residuals(x, y), NUMBERS)
+    """What the master curve leaves of ln y, root mean square in per cent."""
+    return root_mean_square(np.log(y) - master_curve(x, y)(x), NUMBERS)
 
 
 def residual_of(points: Points, c: float, d: float) -> float:
@@ -130,8 +132,7 @@ def root_mean_square(left: Array, numbers: int = 0) -> float:
 
 def slopes(points: Points) -> str:
     """Steepness of the curve of Δx/(nℓ) over v/(nℓ) at some places, in words."""
-    x, y = points.speed / points.length, points.distance / points.length
-    curve, width = master_curve(x, y), 1.05
+    x, curve, width = points.turns, master_curve(points.turns, points.lengths), 1.05
     places = np.array([place for place in PLACES if x.min() * width < place < x.max() / width])
     rise = (curve(places * width) - curve(places / width)) / (2 * np.log(width))
     texts = [
@@ -145,10 +146,6 @@ def drift(points: Points) -> str:
     """Exponent c of Δx/(nℓ) over ν n^c for the slower and the faster half of the frequencies, in words."""
     frequencies = np.unique(points.frequency)
     half = len(frequencies) // 2
-    if not half:
-        return ""
-    slow, fast = points.frequency <= frequencies[half - 1], points.frequency >= frequencies[-half]
-    if min(slow.sum(), fast.sum()) < FEWEST:
-        return ""
-    (low, high), (until, since) = (best_variable(points[part]) for part in (slow, fast)), frequencies[[half - 1, -half]]
+    until, since = frequencies[half - 1], frequencies[-half]
+    low, high = (best_variable(points[part]) for part in (points.frequency <= until, points.frequency >= since))
     return f"With d = 1 given, c is {low:.2f} up to {until:g} Hz and {high:.2f} from {since:g} Hz on."

@@ -4,7 +4,7 @@ In the phase diagram Δx/(nℓ) is a curve over v/(nℓ), turns of the loop per 
 and links, and shows with which time τ all of its cells are on that very curve, now over v τ/(nℓ).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,22 +13,17 @@ from scipy.optimize import least_squares
 
 from studies import common
 from studies.common import FAINT, INK, LINE_COLORS, Array, Columns
-from studies.common import table as markdown
 from studies.phase_diagram import laws
 from warpchain import InputError, Status, SweepResult, preset
 
-Exponents = tuple[float, float, float]
-"""Of gravity, of the radius at which joints ride on the sprocket, of the length of a link."""
-
 CSV = Path(__file__).parent / "results" / "scaling.csv"
-
-TIMES: Mapping[str, Exponents] = {
+TIMES = {
     "a constant": (0, 0, 0),
     "∝ g^-½": (-0.5, 0, 0),
     "(ℓ/g)^½": (-0.5, 0, 0.5),
     "(R/g)^½": (-0.5, 0.5, 0),
 }
-"""Times that are tried, by name."""
+"""Times that are tried, by name: exponents of gravity, of the radius at which joints ride, of the length of a link."""
 NORMAL = (laws.GRAVITY, laws.RADIUS, laws.LINK_LENGTH)  # The three quantities in the phase diagram [SI units]
 NORMAL_TIME = (laws.RADIUS / laws.GRAVITY) ** 0.5  # (R/g)^½ there [s]
 PLACES = (0.1, 0.3, 1.0, 3.0)  # Turns in this time at which the curve is described
@@ -37,35 +32,39 @@ BLOCKS = {"sprocket_radius": "radius of the sprocket", "gravity": "gravity", "li
 """What is varied: first word of the names of the blocks → name."""
 
 
-def reduced(result: SweepResult) -> list[dict[str, float | str]]:
+def reduced(result: SweepResult) -> Iterator[dict[str, float | str]]:
     """Statistics of the cells of the sweep: rows of the file.
 
     Raises:
         InputError: it has other axes, or a cell is unfinished.
     """
-    rows: list[dict[str, float | str]] = []
     for content in result.sweep["blocks"]:
         name, block = content["name"], result.blocks[content["name"]]
         if not {"links", "frequency"} <= block.axes.keys():
             raise InputError(f"block {name}: no axes links and frequency; give a folder of the sweep scaling")
         if np.any(block.columns["status"] < 0):
             raise InputError(f"block {name}: walks are missing; run the sweep to its end")
-        for place, values in common.of_cells(block):
-            at = dict(zip(block.axes, map(float, values), strict=True))
-            known = content["parameters"] | at
-            varied = {each: known[each] for each in ("gravity", "sprocket_radius", "link_length") if each in known}
-            parameters = preset("soft").with_values(varied)
+        for place, at in common.of_cells(block):
+            links, frequency = int(at.pop("links")), float(at.pop("frequency"))
+            chain = preset("soft").with_values(content["parameters"] | {key: float(value) for key, value in at.items()})
             status = block.columns["status"][place]
             dx = block.columns["dx"][place][status == Status.AT_REST]
-            cell = {"block": name, "links": int(at["links"]), "frequency": at["frequency"]}
-            cell |= {"gravity": parameters.gravity, "radius": parameters.sprocket_radius + parameters.circle_radius}
-            cell |= {"link_length": parameters.link_length, "walks": len(status), "at_rest": len(dx)}
-            rows.append(cell | {"dx_mean": float(common.mean(dx)), "dx_se": float(common.standard_error(dx))})
-    return rows
+            yield {
+                "block": name,
+                "links": links,
+                "frequency": frequency,
+                "gravity": chain.gravity,
+                "radius": chain.sprocket_radius + chain.circle_radius,
+                "link_length": chain.link_length,
+                "walks": len(status),
+                "at_rest": len(dx),
+                "dx_mean": float(common.mean(dx)),
+                "dx_se": float(common.standard_error(dx)),
+            }
 
 
 class Cells:
-    """Cells with few failures, shape (cells,) each.
+    """Cells of the file with few failures, shape (cells,) each.
 
     Attributes:
         names: of their blocks.
@@ -75,9 +74,9 @@ class Cells:
         scales: (3, cells), gravity, radius and length of links over those of the phase diagram.
     """
 
-    def __init__(self, path: Path = CSV) -> None:
+    def __init__(self) -> None:
         """Read the file."""
-        rows = common.read_columns(path)
+        rows = common.read_columns(CSV)
         used = rows["at_rest"] >= (1 - laws.MOST_FAILED) * rows["walks"]
         rows = {name: values[used] for name, values in rows.items()}
         self.names, self.links, self.frequency = rows["block"], rows["links"], rows["frequency"]
@@ -89,10 +88,9 @@ class Cells:
         """Which cells are of blocks whose names begin so, shape (cells,)."""
         return np.char.startswith(self.names, word)
 
-    def scaled_turns(self, exponents: Sequence[float] | Array) -> Array:
+    def scaled_turns(self, exponents: Sequence[float]) -> Array:
         """Turns per second, times the time with these exponents over what it is in the phase diagram."""
-        times: Array = np.prod(self.scales ** np.asarray(exponents)[:, None], axis=0)
-        return self.turns * times
+        return self.turns * np.prod(self.scales ** np.asarray(exponents)[:, None], axis=0)
 
 
 class Curve:
@@ -101,20 +99,20 @@ class Curve:
     def __init__(self, cells: Columns) -> None:
         """Fit it to the cells of the phase diagram."""
         points = laws.points_of(cells)
-        self.turns, self.lengths = points.speed / points.length, points.distance / points.length
+        self.turns, self.lengths = points.turns, points.lengths
         self._curve = laws.master_curve(self.turns, self.lengths)
 
     def __call__(self, turns: Array) -> Array:
         """Δx/(nℓ) on the curve; beyond its ends it keeps the value there."""
         return np.exp(self._curve(turns))
 
-    def left(self, cells: Cells, exponents: Sequence[float] | Array) -> Array:
+    def left(self, cells: Cells, exponents: Sequence[float]) -> Array:
         """Residuals of cells, shape (cells,)."""
         return np.log(cells.lengths) - self._curve(cells.scaled_turns(exponents))
 
     def best_exponents(self, cells: Cells, chosen: Array) -> Array:
         """Exponents with the least residuals of some cells; nothing of the curve is fitted to them."""
-        return np.asarray(least_squares(lambda numbers: self.left(cells, numbers)[chosen], (-0.5, 0.25, 0.25)).x)
+        return least_squares(lambda numbers: self.left(cells, numbers)[chosen], (-0.5, 0.25, 0.25)).x
 
 
 def table(cells: Cells, curve: Curve) -> str:
@@ -135,7 +133,7 @@ def table(cells: Cells, curve: Curve) -> str:
     g, r, link, lengths = (f"{each.min():.2g} to {each.max():.2g}" for each in (*cells.scales, cells.lengths))
     described = [f"{curve(np.array([place / NORMAL_TIME]))[0]:.2g} at {place:g}" for place in PLACES]
     return (
-        f"{markdown(('time τ', *groups), rows)}\n\n"
+        f"{common.table(('time τ', *groups), rows)}\n\n"
         f"{count} cells; g, R and ℓ are {g}, {r} and {link} times those of the phase diagram, Δx "
         f"is {lengths} lengths of the chain. The best exponents of g, R and ℓ are {', '.join(shares)} "
         f"and leave {residual:.0f} %. With (R/g)^½ the farthest cells are {farthest}.\n\n"

@@ -12,7 +12,7 @@ import numpy as np
 from studies.common import DRAWN, Array, Columns, drawn_terms, mean, minus, over_cells, standard_error
 from studies.common import table as markdown
 from studies.phase_diagram import laws
-from studies.phase_diagram.cells import walks_by_cell
+from studies.phase_diagram.cells import places_in, walks_by_cell
 from studies.phase_diagram.endings import Ending, endings
 from warpchain import Status, SweepResult
 
@@ -31,8 +31,7 @@ GROUPS = ((30, 50), (60, 90), (100, 140), (150, 180), (190, 240))  # Numbers of 
 def reduced(parts: Sequence[SweepResult]) -> Iterator[dict[str, float | str]]:
     """Rows of the file, a cell each."""
     names = [f"bounces_before_{name}" for name in EVENTS.values()]
-    (block, *_) = parts[0].blocks.values()
-    names += [name for name in block.columns if name.endswith(DRAWN)]
+    names += [name for name in next(iter(parts[0].blocks.values())).columns if name.endswith(DRAWN)]
     names += ["status", "dx", "collapsed_at", "strands_met_at", "flight_before_collapse"]
     for (links, frequency), walks in walks_by_cell(parts, names).items():
         rest = walks["status"] == Status.AT_REST
@@ -52,8 +51,7 @@ def reduced(parts: Sequence[SweepResult]) -> Iterator[dict[str, float | str]]:
             begun = at_rest[f"bounces_before_{name}"]
             counts = [np.sum(begun == number) for number in range(4)] + [np.sum(begun > 3), np.sum(begun < 0)]
             row |= {f"{event}_{key}": int(count) for key, count in zip(BEGUN, counts, strict=True)}
-        row |= {f"{way.label}_{k}": int(np.sum((ways == way) & (when == k))) for way in WAYS for k in range(3)}
-        yield row
+        yield row | {f"{way.label}_{k}": int(np.sum((ways == way) & (when == k))) for way in WAYS for k in range(3)}
 
 
 def _early(dx: Array, early: Array, terms: Sequence[Array]) -> dict[str, float]:
@@ -82,13 +80,20 @@ def _over_cells(values: Array, errors: Array, digits: int = 1) -> tuple[str, str
     return *texts, f"{over.rises}, {over.falls}"
 
 
+def _groups(cells: Columns) -> Iterator[tuple[str, Array, Array]]:
+    """Name of each group of links, its cells from 5 to 30 Hz, and its slower or faster ones."""
+    inside = (cells["frequency"] >= 5) & (cells["frequency"] <= 30)
+    for low, high in GROUPS:
+        chosen = (cells["links"] >= low) & (cells["links"] <= high)
+        yield f"{low} to {high}", chosen & inside, chosen & ~inside
+
+
 def shares(cells: Columns) -> str:
     """Markdown: after how many bounces loops crease, strands meet and loops collapse, by links; early against late."""
-    inside = (cells["frequency"] >= 5) & (cells["frequency"] <= 30)
     rows = []
-    for name, frequencies in (("5 to 30 Hz", inside), ("slower or faster", ~inside)):
-        for low, high in GROUPS:
-            chosen = frequencies & (cells["links"] >= low) & (cells["links"] <= high)
+    for which, frequencies in enumerate(("5 to 30 Hz", "slower or faster")):
+        for links, *both in _groups(cells):
+            chosen = both[which]
             for event in EVENTS:
                 counts = np.array([cells[f"{event}_{key}"][chosen].sum() for key in BEGUN])
                 texts = (f"{100 * count / max(counts.sum(), 1):.0f} %" for count in counts)
@@ -96,24 +101,23 @@ def shares(cells: Columns) -> str:
                 if event == "strands" and np.isfinite(cells["raw"][chosen]).any():
                     raw = f"{100 * np.nanmean(cells['raw'][chosen]):+.1f} %"
                     compared = raw, *_over_cells(cells["held"][chosen], cells["held_se"][chosen])
-                rows.append((name, f"{low} to {high}", event, *texts, *compared))
-    head = ("", "links", "", "before", "after 1", "after 2", "after 3", "later", "never")
-    head = (*head, "early over late", "what is drawn held", "χ² of none", "of one value", "rise, fall")
+                rows.append((frequencies, links, event, *texts, *compared))
+    head = " | links |  | before | after 1 | after 2 | after 3 | later | never"
+    head += " | early over late | what is drawn held | χ² of none | of one value | rise, fall"
     return minus(markdown(head, rows))
 
 
 def by_bounces(cells: Columns) -> str:
     """Markdown: the difference from 5 to 30 Hz, with what is drawn held, for other bounds of what is early."""
-    inside, rows = (cells["frequency"] >= 5) & (cells["frequency"] <= 30), []
-    for low, high in GROUPS:
-        chosen, texts = inside & (cells["links"] >= low) & (cells["links"] <= high), []
-        for bounce in sorted((EARLY, *OTHERWISE)):
-            end = "" if bounce == EARLY else f"_{bounce}"
-            values, errors = cells[f"held{end}"][chosen], cells[f"held_se{end}"][chosen]
-            mean, _, _, ends = _over_cells(values, errors)
-            texts.append(minus(f"{mean} ({np.isfinite(values).sum()}: {ends})"))
-        rows.append((f"{low} to {high}", *texts))
-    return markdown(("links", "met by the first bounce", "by the second", "by the third"), rows)
+    rows = []
+    for links, chosen, _ in _groups(cells):
+        texts = []
+        for end in ("_1", "", "_3"):
+            values = cells[f"held{end}"][chosen]
+            mean, _, _, ends = _over_cells(values, cells[f"held_se{end}"][chosen])
+            texts.append(f"{mean} ({np.isfinite(values).sum()}: {ends})")
+        rows.append((links, *texts))
+    return minus(markdown("links | met by the first bounce | by the second | by the third", rows))
 
 
 def ways(cells: Columns) -> str:
@@ -126,14 +130,13 @@ def ways(cells: Columns) -> str:
         if count.sum():
             parts = (f"{100 * count[where].sum() / total[where].sum():.2g} %" for where in (papers, ~papers))
             rows.append((way.meaning, BEFORE[k], *parts, f"{np.sum((most == number) & (total > 0))}"))
-    head = ("way of ending", "strands met", "share, paper's range", "elsewhere", "cells where it is the most frequent")
+    head = "way of ending | strands met | share, paper's range | elsewhere | cells where it is the most frequent"
     return f"{markdown(head, rows)}\n\n{total.sum():,.0f} walks at rest of {cells['walks'].sum():,.0f}."
 
 
 def against_million(cells: Columns, million: Columns) -> str:
     """Whether these walks, of today's engine, go as far as those of the million, in words."""
-    places = {key: i for i, key in enumerate(zip(million["links"], million["frequency"], strict=True))}
-    at = np.array([places[key] for key in zip(cells["links"], cells["frequency"], strict=True)])
+    at = places_in(cells, million)
     failed = 1 - million["at_rest"][at] / million["walks"][at]
     used = (cells["at_rest"] > 10) & (failed <= laws.MOST_FAILED)
     ratio = cells["dx"] / million["dx_mean"][at] - 1

@@ -35,10 +35,10 @@ def rows(block: Block) -> str:
     )
     names = [*block.axes, "Δx / m", "±", "without end", "their speed / (m/s)", "collapse / s"]
     lines = []
-    for place, values in common.of_cells(block):
+    for place, at in common.of_cells(block):
         numbers = [f"{number:.3f}" for number in (cells.mean[place], cells.standard_error[place])]
         numbers += [f"{share[place]:.0%}", f"{speed[place]:.2f}", f"{collapsed[place]:.2f}"]
-        lines.append([*(f"{value:g}" for value in values), *(text.replace("nan", "–") for text in numbers)])
+        lines.append([*(f"{value:g}" for value in at.values()), *(text.replace("nan", "–") for text in numbers)])
     return common.table(names, lines)
 
 
