@@ -43,13 +43,13 @@ def load(path: Path) -> films.Bank:
         experiments, time, values = file["experiments"], file["time"], file["values"]
         names = tuple(file["names"].tolist())
 
-    def film(at: tuple[int, int, int]) -> films.Film:
+    def film(*at: int) -> films.Film:
         links, frequency = experiments[at[1]].tolist()
-        seen = {"center": center[at], "outline": outline[at]}
-        return films.Film(time=time, links=int(links), frequency=frequency, speed=float(speed[at]), **seen)
+        seen = {"center": center[at], "outline": outline[at], "speed": float(speed[at])}
+        return films.Film(time=time, links=int(links), frequency=frequency, **seen)
 
     chains, count, most = speed.shape
-    walks = [[[film((c, e, r)) for r in range(most)] for e in range(count)] for c in range(chains)]
+    walks = [[[film(c, e, r) for r in range(most)] for e in range(count)] for c in range(chains)]
     return films.Bank(names, values, walks)
 
 

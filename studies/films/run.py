@@ -43,7 +43,7 @@ def answer_for(bank: films.Bank, wanted: Wanted) -> films.Posterior:
     """The posterior for films of the bank's chain that is nearest to its middle."""
     off = (bank.values - bank.values.mean(axis=0)) / bank.values.std(axis=0)
     chain = int((off**2).sum(axis=1).argmin())
-    return bank.posterior(set_of_films(bank, chain, wanted, CAMERA, np.zeros(8), np.random.default_rng(0)), CAMERA)
+    return bank.posterior(set_of_films(bank, chain, wanted, np.zeros(8), np.random.default_rng(0)), CAMERA)
 
 
 def percent(share: float) -> str:
@@ -55,17 +55,14 @@ def experiments_table(bank: films.Bank) -> str:
     """Widths for each film and each pair of films: μ, β, R, and R if r was measured."""
     every = bank.experiments
     sets: list[Wanted] = [*({one: 1} for one in every), *({one: 1, two: 1} for one, two in combinations(every, 2))]
-    middle = bank.values.mean(axis=0)
-
-    def widths(wanted: Wanted) -> list[float]:
+    middle, found = bank.values.mean(axis=0), []
+    for wanted in sets:
         alone = answer_for(bank, wanted)
         measured = alone.given(circle_radius=(middle[alone.names.index("circle_radius")], CALIPERS))
-        return [*(alone.sigma / middle), (measured.sigma / middle)[alone.names.index("sprocket_radius")]]
-
-    found = [(wanted, widths(wanted)) for wanted in sets]
-    singles, pairs = found[: len(every)], sorted(found[len(every) :], key=lambda each: each[1][1])
-    name = lambda wanted: " + ".join(f"{n}/{f:g}" for n, f in wanted)  # noqa: E731
-    rows = ((name(wanted), *map(percent, numbers)) for wanted, numbers in [*singles, *pairs[:8]])
+        radius = (measured.sigma / middle)[alone.names.index("sprocket_radius")]
+        found.append((" + ".join(f"{n}/{f:g}" for n, f in wanted), *(alone.sigma / middle), radius))
+    singles, pairs = found[: len(every)], sorted(found[len(every) :], key=lambda row: row[2])
+    rows = ((name, *map(percent, numbers)) for name, *numbers in [*singles, *pairs[:8]])
     return table(("links/Hz", *SYMBOLS.values(), "R, r by calipers"), rows)
 
 
@@ -114,29 +111,28 @@ def lines_table(banks: Mapping[str, films.Bank]) -> str:
 def main(banks: Path) -> None:
     """Calibrate, compare, draw."""
     bank, long = (load(banks / f"{name}_main.npz") for name in ("film_bank", "film_bank_90"))
-    truths = {
-        "same": load(banks / "film_truths_same.npz"),
+    same = load(banks / "film_truths_same.npz")
+    others = {
         "e_t = 0.3": load(banks / "film_truths_tangential.npz"),
         "links 5 % heavier": load(banks / "film_truths_heavier.npz"),
         "paper's joints": load(banks / "film_truths_paper_main.npz"),
     }
-    found = {
-        (kind, name): calibrate(bank, hidden, wanted)
-        for kind, hidden in truths.items()
-        for name, wanted in SETS.items()
-    }
-    rows = {key: (*calibration_rows(each), percent(each.refused)) for key, each in found.items()}
-    head, others = ("films", *SYMBOLS.values(), "refused"), {key: row for key, row in rows.items() if key[0] != "same"}
+    found = {name: calibrate(bank, same, wanted) for name, wanted in SETS.items()}
+    head, rows = ("films", *SYMBOLS.values(), "refused"), []
+    for kind, hidden in others.items():
+        for name, wanted in SETS.items():
+            each = calibrate(bank, hidden, wanted)
+            rows.append((kind, name, *calibration_rows(each), percent(each.refused)))
     tables = {
         "experiments": experiments_table(beside(bank, long)),
-        "calibration": table(head, ((name, *rows["same", name]) for name in SETS)),
-        "other chains": table(("truth", *head), ((*key, *row) for key, row in others.items())),
-        "pitfalls": pitfalls_table(bank, truths["same"]),
-        "lines": lines_table(
-            {"film_bank": bank, "film_bank_90": long} | {kind: each for kind, each in truths.items() if kind != "same"}
+        "calibration": table(
+            head, ((name, *calibration_rows(each), percent(each.refused)) for name, each in found.items())
         ),
+        "other chains": table(("truth", *head), rows),
+        "pitfalls": pitfalls_table(bank, same),
+        "lines": lines_table({"film_bank": bank, "film_bank_90": long} | others),
     }
-    publish(FOLDER, tables, {"coverage": coverage_figure({name: found["same", name] for name in SETS})}, dpi=130)
+    publish(FOLDER, tables, {"coverage": coverage_figure(found)}, dpi=130)
     outlines = {(5, 1.906): (-59.9, 62.1, 13.4, 335.8), (20, 7.648): (-68.7, 62.1, 13.4, 330.0)}
     hidden = [
         films.read(
@@ -144,11 +140,11 @@ def main(banks: Path) -> None:
         )
         for (hz, speed), outline in outlines.items()
     ]
-    answer = bank.posterior(hidden)
-    print(f"\nthe hidden chain\n{answer}\n{films.friction_line(hidden[1])}")
-    print(f"with r by calipers\n{answer.given(circle_radius=(4.05e-3, 5e-5))}")
+    answer, line = bank.posterior(hidden), films.friction_line(hidden[1])
+    print(f"\nthe hidden chain\n{answer}\n{line}")
+    print(f"with r by calipers\n{answer.given(circle_radius=(4.05e-3, CALIPERS))}")
     publish(FOLDER, {}, {"corner": corner(answer)}, dpi=110)
-    publish(FOLDER, {}, {"line": line_figure(films.friction_line(hidden[1]))})
+    publish(FOLDER, {}, {"line": line_figure(line)})
 
 
 if __name__ == "__main__":
