@@ -4,7 +4,6 @@ import csv
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -87,29 +86,31 @@ def area_of(outlines: Array) -> Array:
     return np.abs(0.5 * np.sum(x * np.roll(y, -1, axis=-1) - y * np.roll(x, -1, axis=-1), axis=-1))
 
 
-@dataclass(frozen=True)
 class OverCells:
-    """Values of several cells, each with a standard error, taken together.
+    """Values of several cells, each with a standard error, taken together; those without both are left out.
 
     Attributes:
         values, errors: of the cells that have both.
-        mean: of the values.
-        error: its standard error.
+        mean, error: of the values, and its standard error.
         typical: root mean square of the values without what their errors contribute.
         chi2: of no value in any cell.
         chi2_of_one: of one value in all cells, their mean weighted by errors.
         rises, falls: numbers of cells that are significant at 95 %.
     """
 
-    values: Array
-    errors: Array
-    mean: float
-    error: float
-    typical: float
-    chi2: float
-    chi2_of_one: float
-    rises: int
-    falls: int
+    def __init__(self, values: ArrayLike, errors: ArrayLike) -> None:
+        """Take them together."""
+        values, errors = (np.asarray(each, float).ravel() for each in (values, errors))
+        known = np.isfinite(values) & np.isfinite(errors)
+        self.values, self.errors = values, errors = values[known], errors[known]
+        weights = np.divide(1, errors, out=np.zeros(len(values)), where=errors > 0)
+        sizes = values * weights
+        one = np.sum(values * weights**2) / max(np.sum(weights**2), np.finfo(float).tiny)
+        self.mean = float(mean(values))
+        self.error = float(np.sqrt(np.sum(errors**2)) / len(values)) if len(values) else np.nan
+        self.typical = float(np.sqrt(max(0.0, mean(values**2 - errors**2))))
+        self.chi2, self.chi2_of_one = float(np.sum(sizes**2)), float(np.sum(((values - one) * weights) ** 2))
+        self.rises, self.falls = int(np.sum(sizes > 1.96)), int(np.sum(sizes < -1.96))
 
     def __len__(self) -> int:
         """Number of the cells."""
@@ -118,29 +119,6 @@ class OverCells:
     def text(self, digits: int = 1) -> str:
         """Mean ± standard error of values in per cent."""
         return f"{self.mean:+.{digits}f} ± {self.error:.{digits}f} %"
-
-
-def over_cells(values: ArrayLike, errors: ArrayLike) -> OverCells:
-    """Cells taken together; those without a value or an error are left out."""
-    values, errors = np.asarray(values, float).ravel(), np.asarray(errors, float).ravel()
-    known = np.isfinite(values) & np.isfinite(errors)
-    values, errors = values[known], errors[known]
-    if not len(values):
-        return OverCells(values, errors, np.nan, np.nan, np.nan, 0.0, 0.0, 0, 0)
-    weights = np.divide(1, errors, out=np.zeros(len(values)), where=errors > 0)
-    sizes = values * weights
-    one = np.sum(values * weights**2) / max(np.sum(weights**2), np.finfo(float).tiny)
-    return OverCells(
-        values,
-        errors,
-        mean=float(values.mean()),
-        error=float(np.sqrt(np.sum(errors**2)) / len(values)),
-        typical=float(np.sqrt(max(0.0, float(np.mean(values**2 - errors**2))))),
-        chi2=float(np.sum(sizes**2)),
-        chi2_of_one=float(np.sum(((values - one) * weights) ** 2)),
-        rises=int(np.sum(sizes > 1.96)),
-        falls=int(np.sum(sizes < -1.96)),
-    )
 
 
 def minus(text: str) -> str:

@@ -1,8 +1,4 @@
-"""Compares the walks of two sweeps of the same samples, cell by cell, for studies/accuracy/README.md.
-
-    warpchain sweep studies/accuracy/sweeps/finer.yaml -o finer --device cuda
-    warpchain sweep studies/accuracy/sweeps/defaults.yaml -o defaults --device cuda
-    python -m studies.accuracy.run defaults finer
+"""Compares the walks of two sweeps of the same samples, cell by cell; README.md has the commands.
 
 It prints the relative difference of the mean Δx of each cell with the standard error of pairs of samples; over all
 cells their mean and χ², scatter and bounces; and how exact either is.
@@ -11,7 +7,7 @@ cells their mean and χ², scatter and bounces; and how exact either is.
 import numpy as np
 
 import warpchain
-from studies.common import Array, of_cells, over_cells, run_study
+from studies.common import Array, OverCells, of_cells, run_study
 
 LENGTHS = ("penetration_floor", "penetration_self", "penetration_sprocket", "greatest_opening")
 
@@ -60,7 +56,7 @@ def compare(new: warpchain.SweepResult, base: warpchain.SweepResult) -> None:
         rows.append((difference, error, a.std() / b.std(), bounces[name].mean() / base_bounces[name].mean()))
         print(f"{name}: {100 * difference:+.2f} ± {100 * error:.2f} % ({len(a)} pairs)")
     differences, errors, scatter, bounced = np.array(rows).T
-    over = over_cells(100 * differences, 100 * errors)
+    over = OverCells(100 * differences, 100 * errors)
     print(f"mean of {len(rows)} cells {over.mean:+.3f} ± {over.error:.3f} %, χ² {over.chi2:.1f}")
     print(f"standard deviations {100 * scatter.mean() - 100:+.1f} %, bounces {100 * bounced.mean() - 100:+.1f} %")
 

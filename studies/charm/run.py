@@ -1,10 +1,4 @@
-"""Draws the figure of studies/charm/README.md and writes its tables, from the folder of the sweep.
-
-    warpchain sweep studies/charm/sweeps/charm.yaml -o charm --device cuda
-    python -m studies.charm.run charm
-
-The three loops of the figure are walked anew, in some seconds of a CPU.
-"""
+"""Draws the figure of README.md, whose three loops walk anew, and writes its tables, from the folder of the sweep."""
 
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Makes the two films of a hidden chain that come with the study: do not read on if you want to find it yourself.
 
-    python -m studies.films.hidden
-
 The errors of the camera are drawn once for both films. Tables are written as Tracker exports them, in mm.
 """
 

@@ -1,9 +1,4 @@
-"""Reduces the folders of sweeps of chains to small banks, which `studies.films.run` reads.
-
-    python -m studies.films.reduce film_bank film_bank_90 film_truths film_truths_paper
-
-A bank is written for each block: film-banks/SWEEP_BLOCK.npz.
-"""
+"""Reduces the folders of sweeps of chains to small banks, one for each block: film-banks/SWEEP_BLOCK.npz."""
 
 from pathlib import Path
 

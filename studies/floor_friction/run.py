@@ -1,10 +1,4 @@
-"""Draws the figure of studies/floor_friction/README.md and prints its numbers, from the folder of the sweep.
-
-    warpchain sweep studies/floor_friction/sweeps/floor_friction.yaml -o floor_friction --device cuda
-    python -m studies.floor_friction.run floor_friction
-
-The numbers are printed, the figure is written beside the page.
-"""
+"""Draws the figure of README.md and prints its numbers, from the folder of the sweep."""
 
 from pathlib import Path
 

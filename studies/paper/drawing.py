@@ -1,7 +1,8 @@
 """Figures of the page."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -18,23 +19,17 @@ from studies.paper.statistics import Effect
 from warpchain import Parameters, SweepResult
 
 PALE = "#BBBBBB"  # Dots of cells in which nothing is significant
-
 REACH = 1.0  # Greatest relative effect on the axis of the figure; greater ones stand at its edge
-
 _CONTACT = ("before the 1st bounce", "after the 1st", "after the 2nd", "after the 3rd", "later", "never")
 _SHADES = LinearSegmentedColormap.from_list("contact", ["#053061", "#4393C3", "#D55E00", "#F4A582", "#E3E3E3"])
-_OUTLINES = [(links, frequency) for links in (60, 120, 180) for frequency in (10.0, 20.0, 30.0)]
-"""Links and frequencies of the loops whose outlines are drawn."""
 
 
-def figures(numbers: Numbers, sweeps: Mapping[str, SweepResult]) -> Iterator[tuple[str, Figure]]:
-    """Name and figure, each in turn; outlines of loops only if the sweep that has them is given."""
-    yield "distances", distances(numbers)
-    yield "effects", effects(numbers)
-    yield "friction", friction(numbers)
-    yield "strands", strands(numbers)
+def figures(numbers: Numbers, sweeps: Mapping[str, SweepResult]) -> dict[str, Figure]:
+    """All figures by name; outlines of loops only if the sweep that has them is given."""
+    found = {draw.__name__: draw(numbers) for draw in (distances, effects, friction, strands)}
     if "paper_shapes" in sweeps:
-        yield "impacts", outlines(sweeps["paper_shapes"])
+        found["impacts"] = outlines(sweeps["paper_shapes"])
+    return found
 
 
 def panels_of_links(numbers: Numbers, x: str, y: str) -> tuple[Figure, Any]:
@@ -52,9 +47,8 @@ def panels_of_links(numbers: Numbers, x: str, y: str) -> tuple[Figure, Any]:
 def distances(numbers: Numbers) -> Figure:
     """Figure 6 with both starts at all lengths: means, boxes of one and bars of two standard deviations."""
     frequencies = numbers["paper_claims"]["cells"]["frequency"]
-    figure, panels = panels_of_links(
-        numbers, f"{FREQUENCY}; boxes: one standard deviation of a walk, bars: two", DISTANCE
-    )
+    x = f"{FREQUENCY}; boxes: one standard deviation of a walk, bars: two"
+    figure, panels = panels_of_links(numbers, x, DISTANCE)
     for start, color, shift, label in (("rest", RED, -0.7, "at rest"), ("ellipse", GREEN, 0.7, "as an ellipse")):
         x = np.array(frequencies) + shift
         tables = (of_start(numbers, start, name) for name in ("mean", "sd"))
@@ -165,7 +159,7 @@ def outlines(result: SweepResult) -> Figure:
     links, frequencies = (block.axes[name].tolist() for name in ("links", "frequency"))
     found, _ = impacts(block)
     figure = Figure(figsize=(6.3, 6.9), layout="constrained")
-    for axes, (n, frequency) in zip(figure.subplots(3, 3).flat, _OUTLINES, strict=True):
+    for axes, (n, frequency) in zip(figure.subplots(3, 3).flat, product((60, 120, 180), (10, 20, 30)), strict=True):
         axes.set_aspect("equal")
         axes.set_axis_off()
         axes.set_title(f"{n} links, {frequency:g} Hz", fontsize="small", loc="left")

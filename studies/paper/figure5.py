@@ -1,7 +1,4 @@
-"""Whether curves of other numbers of links and frequencies have the shape of the paper's Figure 5.
-
-python -m studies.paper.figure5     # a minute → results/figure5.csv
-"""
+"""Whether curves of other cells have the shape of the paper's Figure 5: walks of a minute → results/figure5.csv."""
 
 from itertools import pairwise, product
 from pathlib import Path

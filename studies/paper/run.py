@@ -1,9 +1,4 @@
-"""Makes studies/paper/README.md with its figures, from the folders of the sweeps that test what the paper says.
-
-    for each in claims joints tolerance shapes; do
-        warpchain sweep studies/paper/sweeps/paper_$each.yaml -o paper_$each
-    done
-    python -m studies.paper.run paper_claims paper_joints paper_tolerance paper_shapes
+"""Makes README.md with its figures, from the folders of the sweeps that test what the paper says.
 
 The numbers go to results/paper_claims.json, and the page is rendered from that file: without a folder only page and
 figures are made anew. Sweeps whose folder is not given keep their numbers.
@@ -37,7 +32,7 @@ def make(folders: Annotated[list[Path] | None, typer.Argument()] = None, out: Pa
         write_text(out / RESULTS, text)
     numbers = read(text)
     write_text(out / "README.md", page(numbers))
-    publish(out, {}, dict(figures(numbers, sweeps)))
+    publish(out, {}, figures(numbers, sweeps))
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import t
 
-from studies.common import Array, OverCells, deviation, mean, minus, over_cells, standard_error
+from studies.common import Array, OverCells, deviation, mean, minus, standard_error
 
 CONFIDENCE = 0.95  # Confidence level of every test and interval
 
@@ -68,7 +68,7 @@ class Effect:
     @cached_property
     def cells(self) -> OverCells:
         """All cells that could be compared together; the interval of their mean says nothing of other cells."""
-        return over_cells(self.relative, self.half_width / _factor(self.pairs - 1))
+        return OverCells(self.relative, self.half_width / _factor(self.pairs - 1))
 
     @property
     def count(self) -> int:

@@ -1,10 +1,7 @@
-"""What the push of floor and links in the pile does to the distance of slow long chains.
+"""What the push of floor and links in the pile does to the distance of slow long chains: prints the table of the page.
 
-    python -m studies.phase_diagram.push                    # prints the table of the page
-    python -m studies.phase_diagram.push FOLDER FAST WITHOUT    # first reduces sweeps of sweeps/push.yaml
-
-FAST is of an engine that pushes ten times as fast, WITHOUT of one that does not push. Walks are compared one by one
-with those of joints that do not soften.
+Folders are reduced first: of the sweep push by the engine of today, by one that pushes ten times as fast, and by one
+that does not. Walks are compared one by one with those of joints that do not soften.
 """
 
 from pathlib import Path
@@ -50,7 +47,7 @@ def over(dx: Array, error: Array, other: Array, its_error: Array) -> str:
 
 def shown(shares: Array, errors: Array) -> str:
     """Mean of shares in per cent, with its standard error."""
-    return common.minus(common.over_cells(100 * shares, 100 * errors).text(2))
+    return common.minus(common.OverCells(100 * shares, 100 * errors).text(2))
 
 
 def table() -> str:

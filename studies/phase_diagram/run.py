@@ -1,12 +1,7 @@
-"""Makes the numbers, figures and tables of studies/phase_diagram/README.md.
+"""Makes the numbers, figures and tables of README.md from the files in results/, in one to two minutes.
 
-    python -m studies.phase_diagram.run                    # results/*.csv → figures and tables of the page
-    python -m studies.phase_diagram.run FOLDER…            # parts of the sweep phase_diagram → results/cells.csv, first
-    python -m studies.phase_diagram.run --scaling FOLDER   # the sweep scaling → results/scaling.csv, first
-    python -m studies.phase_diagram.run --meetings FOLDER…  # parts of the sweep strands → results/strands.csv, first
-
-Parts are folders of ``warpchain sweep``. They have other seeds; they may be unfinished, and their grids may differ.
-Without a folder it takes one to two minutes.
+Parts of the sweep `phase_diagram` that are given, of `strands` as --meetings or the sweep `scaling`, are reduced to
+these first. Parts have other seeds; they may be unfinished, and their grids may differ.
 """
 
 from pathlib import Path

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from studies.common import DRAWN, Array, Columns, drawn_terms, mean, minus, over_cells, standard_error
+from studies.common import DRAWN, Array, Columns, OverCells, drawn_terms, mean, minus, standard_error
 from studies.common import table as markdown
 from studies.phase_diagram import laws
 from studies.phase_diagram.cells import places_in, walks_by_cell
@@ -73,7 +73,7 @@ def _early(dx: Array, early: Array, terms: Sequence[Array]) -> dict[str, float]:
 
 def _over_cells(values: Array, errors: Array, digits: int = 1) -> tuple[str, str, str, str]:
     """Mean over cells ± its standard error in per cent, χ² of none, of one difference, cells that rise, that fall."""
-    over = over_cells(100 * values, 100 * np.where(errors > 0, errors, np.nan))
+    over = OverCells(100 * values, 100 * np.where(errors > 0, errors, np.nan))
     if not len(over):
         return "", "", "", ""
     texts = over.text(digits), f"{over.chi2:.0f} of {len(over)}", f"{over.chi2_of_one:.0f} of {len(over) - 1}"

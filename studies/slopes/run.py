@@ -1,8 +1,4 @@
-"""Draws the figure of studies/slopes/README.md and writes its tables, from the folder of the sweep.
-
-warpchain sweep studies/slopes/sweeps/slopes.yaml -o slopes --device cuda
-python -m studies.slopes.run slopes
-"""
+"""Draws the figure of README.md and writes its tables, from the folder of the sweep."""
 
 from pathlib import Path
 

@@ -1,10 +1,4 @@
-"""Prints the tables of studies/stationary_loop/README.md and draws its figures.
-
-    python -m studies.stationary_loop.run           # mean loops beside theory and the catenary, in a few minutes
-    python -m studies.stationary_loop.run FOLDER    # of the sweep kink: the figure of the kinks as well
-
-Numbers are printed.
-"""
+"""Prints the tables of README.md and draws its figures, in a few minutes; that of the kinks from a folder."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -1,8 +1,4 @@
-"""Does Δx depend on how the loop came to spin, and how long it was held? Tables of studies/stationary_loop/README.md.
-
-python -m studies.stationary_loop.starts             # results/starts.csv → tables of the page
-python -m studies.stationary_loop.starts FOLDER…     # sweeps steadiness, steadiness_long, swing → the file, first
-"""
+"""Does Δx depend on how the loop came to spin, and how long it was held? Tables of README.md."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -137,7 +133,7 @@ def means(cells: Cells) -> str:
         texts = []
         for chosen in columns:
             pairs = [(_together(cells, one, cell), _together(cells, other, cell)) for cell in chosen]
-            found = common.over_cells(*zip(*(_ratio(*pair) for pair in pairs if all(pair)), strict=True))
+            found = common.OverCells(*zip(*(_ratio(*pair) for pair in pairs if all(pair)), strict=True))
             texts.append(f"{found.text(2)} (χ² {found.chi2:.1f} of {len(found)})")
         rows.append((f"{one} over {other}", *texts))
     head = f"Δx | all cells | below {LONG} links | from {LONG} links on | those at 20 and 30 Hz"
@@ -151,7 +147,7 @@ def over_time(cells: Cells, block: str, quantity: str, scale: float = 1, digits:
     for links, frequency in sorted({key[1:3] for key in cells if key[0] == block}):
         own = [cells[block, links, frequency, time] for time in times]
         values, errors = (scale * np.array([cell[name] for cell in own]) for name in (quantity, f"{quantity}_se"))
-        chi2 = [f"{common.over_cells(values, errors).chi2_of_one:.1f}"] if tests else []
+        chi2 = [f"{common.OverCells(values, errors).chi2_of_one:.1f}"] if tests else []
         texts = (f"{value:.{digits}f}" for value in (*values, errors.mean()))
         rows.append((links, f"{frequency:g}", *texts, *chi2))
     return common.table(("links", "Hz", *(f"{time:g} s" for time in times), "s.e.", *["χ²"] * tests), rows)

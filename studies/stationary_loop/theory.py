@@ -23,6 +23,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from scipy import fftpack
 from scipy.integrate import solve_bvp
 from scipy.optimize import brentq
 
@@ -146,7 +147,7 @@ def catenary_between(first: Array, last: Array, length: float, weight: float) ->
 
     With the width w and the height difference h, a curve y = c cosh((x − x₀)/c) has 2 c sinh(w/2c) = √(L² − h²).
     """
-    width, rise = float(first[0] - last[0]), float(last[1] - first[1])
+    (width, _), rise = first - last, last[1] - first[1]
     square = length**2 - rise**2
     if width <= 0 or square <= width**2:
         raise ValueError("a catenary of this length does not reach from one end to the other; check both")
@@ -183,11 +184,7 @@ def imbalances(loop: MeanLoop) -> dict[str, tuple[float, float]]:
     # Forces are complex numbers x + iy; the tangent is −exp(−iφ), the normal i exp(−iφ).
     force = (-loop.effective_tension + 1j * loop.shear) * np.exp(-1j * loop.angle)
     unbalanced = force - np.interp(0.0, loop.s, force) - 1j * weight * loop.s
-    waves = 2j * np.pi * np.fft.rfftfreq(len(loop.s), loop.length / len(loop.s))
-    waves[-1] *= len(loop.s) % 2
-    shear_slope, moment_slope = (
-        np.fft.irfft(waves * np.fft.rfft(values), len(loop.s)) for values in (loop.shear, loop.moment)
-    )
+    shear_slope, moment_slope = (fftpack.diff(values, period=loop.length) for values in (loop.shear, loop.moment))
     bend, across = loop.effective_tension * loop.curvature, weight * np.cos(loop.angle)
     turned = bending_inertia(loop) * loop.speed**2 * loop.bending
     expected = moment(p, p.link_length * loop.speed * loop.bending, p.friction_smoothing)

@@ -1,9 +1,4 @@
-"""What taps that a hand could give do: reduces the sweep `taps` and writes its tables.
-
-warpchain sweep studies/tilting_plane/sweeps/taps.yaml -o taps --device cuda
-python -m studies.tilting_plane.taps taps     # → results/taps.csv, tables of the page
-python -m studies.tilting_plane.taps          # that file → tables of the page
-"""
+"""What taps that a hand could give do: reduces the sweep `taps`, if its folder is given, and writes its tables."""
 
 import csv
 from pathlib import Path
@@ -13,7 +8,7 @@ import numpy as np
 import typer
 
 import warpchain
-from studies.common import Columns, mean, minus, over_cells, publish, run_study, standard_error, table, write_rows
+from studies.common import Columns, OverCells, mean, minus, publish, run_study, standard_error, table, write_rows
 
 FOLDER = Path(__file__).parent
 UNITS = {"tilt": "rad", "tilt_rate": "rad/s", "lateral_speed": "m/s", "yaw_rate": "rad/s"}
@@ -53,7 +48,7 @@ def _of_cells(columns: Columns, fixed: Any, rows: Any) -> dict[str, str]:
     dx, drift = (np.where(rest, columns[name][rows].astype(float), np.nan) for name in ("dx", "lateral_drift"))
     ratio = mean(dx) / fixed.mean[rows]
     own = standard_error(dx) / mean(dx)
-    over = over_cells(ratio, ratio * np.hypot(own, fixed.standard_error[rows] / fixed.mean[rows]))
+    over = OverCells(ratio, ratio * np.hypot(own, fixed.standard_error[rows] / fixed.mean[rows]))
     found = {
         "walks": str(rest.sum()),
         "fell": f"{100 * columns['fell_over'][rows].mean():.3g}",

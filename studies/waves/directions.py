@@ -1,10 +1,5 @@
 """Waves of either direction given to loops at their release: how far do these walk?
 
-    python -m studies.waves.directions run       # half an hour of one core → results/directions.csv
-    python -m studies.waves.directions           # that file → the table of the page
-    python -m studies.waves.directions impacts   # prints how large fast waves of this length are about a first impact
-    python -m studies.waves.directions given     # prints what else a wave changes of a loop
-
 Links turn by δθ cos(2πmj/n + φ), which bends the loop alike for both directions. Their rates say which way the wave
 runs: a slow one stands in the room, against the motion of the links; a fast one runs with them. φ is drawn.
 """
@@ -133,7 +128,7 @@ def run() -> None:
 def change(way: str, size: float) -> OverCells:
     """What a wave changes of Δx, in per cent, from the file."""
     rows = rows_of(way, size)
-    return common.over_cells(rows["change"], rows["error"])
+    return common.OverCells(rows["change"], rows["error"])
 
 
 def rows_of(way: str, size: float) -> Columns:

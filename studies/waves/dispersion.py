@@ -31,43 +31,26 @@ PHASE_STEP = 1e-5  # Step of a central difference with respect to the phase [rad
 ROUNDING = 1e-12  # Damping below this part of a rate is rounding
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class Waves:
-    """Free waves of k phases κ [rad], four each, with their rates λ = −γ − iω [1/s] in the chain's frame, (k, 4).
+    """Free waves of k phases, four each; columns are `UPPER_BACKWARD` … `UPPER_FORWARD`.
 
-    Columns are `UPPER_BACKWARD` … `UPPER_FORWARD`, sorted by frequency without friction and followed from there. Slopes
-    are dλ/dκ.
+    Attributes:
+        phase: κ [rad], (k,).
+        rate: λ = −γ − iω [1/s] in the chain's frame, (k, 4).
+        frequency: ω [rad/s]; 0 if friction lets a wave creep back without swinging.
+        damping: γ, at which an amplitude falls [1/s].
+        phase_speed, group_speed: ω/κ and dω/dκ, the speeds of crests and of packets [links/s].
+        reach: how far a packet runs until its amplitude is 1/e [links]; infinite if its damping is rounding.
     """
 
     phase: Array
     rate: Array
-    slope: Array
-
-    @property
-    def frequency(self) -> Array:
-        """ω [rad/s], shape (k, 4); 0 if friction lets a wave creep back without swinging."""
-        return -self.rate.imag
-
-    @property
-    def damping(self) -> Array:
-        """γ, at which an amplitude falls [1/s], shape (k, 4)."""
-        return -self.rate.real
-
-    @property
-    def group_speed(self) -> Array:
-        """dω/dκ, the speed of a packet of waves [links/s], shape (k, 4)."""
-        return -self.slope.imag
-
-    @property
-    def phase_speed(self) -> Array:
-        """ω/κ, the speed of crests [links/s], shape (k, 4)."""
-        return self.frequency / self.phase[:, None]
-
-    @property
-    def reach(self) -> Array:
-        """How far a packet runs until its amplitude is 1/e [links], (k, 4); infinite if its damping is rounding."""
-        damped = self.damping > ROUNDING * np.abs(self.rate)
-        return np.where(damped, np.abs(self.group_speed) / np.where(damped, self.damping, 1.0), np.inf)
+    frequency: Array
+    damping: Array
+    phase_speed: Array
+    group_speed: Array
+    reach: Array
 
 
 def straight_waves(parameters: Parameters, tension: float, phase: ArrayLike) -> Waves:
@@ -188,8 +171,11 @@ def _waves(parameters: Parameters, phases: Array, factors: Factors) -> Waves:
     powers = rates[:, :, None] ** np.arange(5)
     by_phase = np.einsum("kp,krp->kr", (ahead - behind) / (2 * PHASE_STEP), powers)
     by_rate = np.einsum("kp,krp->kr", quartic(phases, friction)[:, 1:] * np.arange(1, 5), powers[:, :, :4])
+    frequency, damping = -rates.imag, -rates.real
     with np.errstate(divide="ignore", invalid="ignore"):  # where two roots meet there is no slope
-        return Waves(phase=phases, rate=rates, slope=-by_phase / by_rate)
+        speed = (by_phase / by_rate).imag
+        reach = np.where(damping > ROUNDING * np.abs(rates), np.abs(speed) / damping, np.inf)
+    return Waves(phases, rates, frequency, damping, frequency / phases[:, None], speed, reach)
 
 
 def _by_frequency(rates: Array) -> Array:

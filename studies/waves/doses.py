@@ -1,8 +1,4 @@
-"""Tables of the dose and response of a drag on short waves, from what `studies.waves.drag` wrote.
-
-python -m studies.waves.doses drag60.npz drag90.npz …   # → results/doses.csv, tables of the page
-python -m studies.waves.doses                           # that file → tables of the page
-"""
+"""Tables of the dose and response of a drag on short waves; files of `studies.waves.drag` are reduced first."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -65,8 +61,8 @@ def summary_table() -> str:
     for when, rate in VARIANTS[1:]:
         values, errors = changes(when, rate)
         (one, one_error), (two, two_error) = (changes(when, rate, str(seed)) for seed in SEEDS)
-        chi2 = common.over_cells(one - two, np.hypot(one_error, two_error)).chi2
-        over, ends = common.over_cells(values, errors), f"{values.min():+.0f} to {values.max():+.0f} %"
+        chi2 = common.OverCells(one - two, np.hypot(one_error, two_error)).chi2
+        over, ends = common.OverCells(values, errors), f"{values.min():+.0f} to {values.max():+.0f} %"
         texts = over.text(), f"{over.typical:.1f} %", ends, f"{over.rises}, {over.falls}"
         lines.append([f"{rate:g}/s", when, *texts, f"{chi2:.0f} of {len(over)}"])
     return common.minus(

@@ -1,10 +1,4 @@
-"""Dose and response of a drag on short waves: the same releases walk on with and without it.
-
-    python -m studies.waves.drag release releases.npz            # six minutes of one core: the loops at their release
-    python -m studies.waves.drag walk releases.npz drag.npz cuda    # five minutes of a GPU: how far they walk
-
-`studies.waves.doses` makes the tables of the page from drag.npz.
-"""
+"""Dose and response of a drag on short waves: the same releases walk on with and without it."""
 
 from collections.abc import Sequence
 from pathlib import Path

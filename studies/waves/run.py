@@ -1,9 +1,4 @@
-"""Prints all numbers of studies/waves/README.md and draws its figures, in a minute.
-
-    python -m studies.waves.run
-
-The theory is in dispersion.py, rings are tapped in rings.py; what is computed of the frames of a walk is in fields.py.
-"""
+"""Prints all numbers of README.md and draws its figures: of rings in rings.py, of the frames of walks here."""
 
 from pathlib import Path
 

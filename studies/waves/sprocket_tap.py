@@ -1,7 +1,5 @@
 """A tap of the running chain on its sprocket: the bottom of the loop touches the floor for some milliseconds.
 
-    python -m studies.waves.sprocket_tap     # ten seconds; prints the table of the page
-
 The sprocket dips by 8 mm and comes back (`release`), 5 mm above a floor, and once more far above it. The difference of
 both is the tap's alone. Places are counted along the loop from its lowest point, positive with the motion of the links.
 """
