@@ -17,17 +17,17 @@ DRAWN = (0.0, 0.02, 0.1)  # Masses of their charms [kg]
 
 def distances(block: Block) -> str:
     """Δx with its errors, duration, bounces and share at rest of each cell, in Markdown."""
-    cells, rest = block.statistics(), block.columns["status"] == warpchain.Status.AT_REST
-    time, bounces = (common.mean_where(rest, block.columns[name]) for name in ("walk_time", "bounces"))
+    cells, time, bounces = (block.statistics(name) for name in ("dx", "walk_time", "bounces"))
     rows = []
     for place, at in common.of_cells(block):
-        numbers = f"{cells.mean[place]:.3f} ± {cells.standard_error[place]:.3f}", f"{cells.sd[place]:.3f}"
-        shown = (*numbers, f"{time[place]:.2f}", f"{bounces[place]:.1f}") if rest[place].any() else ("–",) * 4
         *values, mass = at.values()
-        cell = *(f"{value:g}" for value in values), f"{1e3 * mass:g}"
-        rows.append((*cell, *shown, f"{rest[place].mean():.0%}"))
+        share = cells.count[place] / block.shape[-1]
+        text = f"{cells.mean[place]:.3f} ± {cells.standard_error[place]:.3f}"
+        numbers = text, cells.sd[place], time.mean[place], bounces.mean[place]
+        rows.append((*values, 1e3 * mass, *(numbers if share else ("–",) * 4), share))
     names = [name.replace("frequency", "ν / Hz") for name in block.axes][:-1]
-    return common.table((*names, "charm / g", "Δx / m", "σ / m", "t / s", "bounces", "at rest"), rows)
+    heads = (*names, "charm / g", "Δx / m", "σ / m", "t / s", "bounces", "at rest")
+    return common.table(heads, rows, len(at) * "g " + "s .3f .2f .1f .0%")
 
 
 def draw_distances(panel: Axes, block: Block) -> None:

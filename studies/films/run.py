@@ -112,17 +112,18 @@ def main(banks: Path) -> None:
         "links 5 % heavier": load(banks / "film_truths_heavier.npz"),
         "paper's joints": load(banks / "film_truths_paper_main.npz"),
     }
+
+    def cells_of(found: Calibration) -> tuple[str, ...]:
+        return *calibration_rows(found), percent(found.refused)
+
     found = {name: calibrate(bank, same, wanted) for name, wanted in SETS.items()}
     head, rows = ("films", *SYMBOLS.values(), "refused"), []
     for kind, hidden in others.items():
-        for name, wanted in SETS.items():
-            each = calibrate(bank, hidden, wanted)
-            rows.append((kind, name, *calibration_rows(each), percent(each.refused)))
+        rows += [(kind, name, *cells_of(calibrate(bank, hidden, wanted))) for name, wanted in SETS.items()]
+    own = ((name, *cells_of(each)) for name, each in found.items())
     tables = {
         "experiments": experiments_table(beside(bank, long)),
-        "calibration": table(
-            head, ((name, *calibration_rows(each), percent(each.refused)) for name, each in found.items())
-        ),
+        "calibration": table(head, own),
         "other chains": table(("truth", *head), rows),
         "pitfalls": pitfalls_table(bank, same),
         "lines": lines_table({"film_bank": bank, "film_bank_90": long} | others),

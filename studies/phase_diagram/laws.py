@@ -67,8 +67,8 @@ class Points:
         return self.distance / self.length
 
     @property
-    def hanging(self) -> Array:
-        """Height of the loop that hangs on the sprocket [m]: straight sides and two half circles."""
+    def height(self) -> Array:
+        """Height H of the loop that hangs on the sprocket [m]: straight sides and two half circles."""
         return 2 * RADIUS + np.maximum(self.length / 2 - np.pi * RADIUS, 0.0)
 
 
@@ -105,17 +105,15 @@ def residual_of(points: Points, c: float, d: float) -> float:
 
 def best_variable(points: Points) -> float:
     """Exponent c of x = ν n^c with the least residual of Δx/n."""
-    starts = np.linspace(-1.5, 1.0, 26)
-    first = starts[int(np.argmin([residual_of(points, c, 1.0) for c in starts]))]
+    first = min(np.linspace(-1.5, 1.0, 26), key=lambda c: residual_of(points, c, 1.0))
     settings = {"bounds": (first - 0.1, first + 0.1), "method": "bounded", "options": {"xatol": 1e-4}}
     return float(minimize_scalar(lambda c: residual_of(points, c, 1.0), **settings).x)
 
 
-def best_powers(points: Points, start: tuple[float, float]) -> tuple[float, float]:
-    """Exponents (c, d) of Δx/n^d over ν n^c with the least residual near a start."""
-    options = {"xatol": 1e-4, "fatol": 1e-5}
-    found = minimize(lambda powers: residual_of(points, *powers), start, method="Nelder-Mead", options=options)
-    return float(found.x[0]), float(found.x[1])
+def best_powers(points: Points) -> tuple[float, float]:
+    """Exponents (c, d) of Δx/n^d over ν n^c with the least residual."""
+    settings = {"method": "Nelder-Mead", "options": {"xatol": 1e-4, "fatol": 1e-5}}
+    return tuple(minimize(lambda powers: residual_of(points, *powers), (-1.1, 1.1), **settings).x)
 
 
 def power_law(values: Array, *factors: Array) -> tuple[Array, Array]:

@@ -105,12 +105,20 @@ def make(
         write_rows(scales.CSV, scales.reduced(warpchain.load(scaling)))
     if meetings:
         write_rows(strands.CSV, strands.reduced([warpchain.load(path) for path in meetings]))
-    found, varied = read_columns(cells.CSV), scales.Cells()
+    found, met, varied = read_columns(cells.CSV), read_columns(strands.CSV), scales.Cells()
     curve = scales.Curve(found)
-    tables = {"cells": table_of_cells(found), "failures": table_of_failures(found), "endings": table_of_endings(found)}
-    tables |= {"scales": scales.table(varied, curve), "candidates": candidates.table(found, varied)}
-    tables |= {"walking time": candidates.walking_time(found)}
-    tables |= strands.tables(read_columns(strands.CSV), found)
+    tables = {
+        "cells": table_of_cells(found),
+        "failures": table_of_failures(found),
+        "endings": table_of_endings(found),
+        "scales": scales.table(varied, curve),
+        "candidates": candidates.table(found, varied),
+        "walking time": candidates.walking_time(found),
+        "strands": strands.shares(met),
+        "by bounces": strands.by_bounces(met),
+        "ways with strands": strands.ways(met),
+        "against the million": strands.against_million(met, found),
+    }
     figures = {"maps": drawing.draw_maps(found), "laws": drawing.draw_laws(found), "scales": scales.draw(varied, curve)}
     publish(FOLDER, tables, figures)
 

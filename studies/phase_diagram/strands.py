@@ -154,13 +154,3 @@ def against_million(cells: Columns, million: Columns) -> str:
         mean, chi2, _, ends = _over_cells(ratio[chosen], error[chosen], 2)
         texts.append(f"in {name} {mean} (χ² {chi2} cells; rise, fall: {ends})")
     return minus(f"Mean Δx of these walks over that of the million, less 1, mean over cells: {'; '.join(texts)}.")
-
-
-def tables(cells: Columns, million: Columns) -> dict[str, str]:
-    """The tables of the page by their markers."""
-    return {
-        "strands": shares(cells),
-        "by bounces": by_bounces(cells),
-        "ways with strands": ways(cells),
-        "against the million": against_million(cells, million),
-    }

@@ -25,17 +25,14 @@ def rows(block: Block) -> str:
     """
     cells, share, collapse = block.statistics(), share_without_end(block), block.columns["collapsed_at"]
     endless = block.columns["status"] == warpchain.Status.DISTANCE_LIMIT
-    speed, collapsed = (
-        common.mean_where(endless, LIMIT / block.columns["walk_time"]),
-        common.mean_where(~np.isnan(collapse), collapse),
-    )
-    names = [*block.axes, "Δx / m", "±", "without end", "their speed / (m/s)", "collapse / s"]
+    speed = common.mean_where(endless, LIMIT / block.columns["walk_time"])
+    collapsed = common.mean_where(~np.isnan(collapse), collapse)
     lines = []
     for place, at in common.of_cells(block):
-        numbers = [f"{number:.3f}" for number in (cells.mean[place], cells.standard_error[place])]
-        numbers += [f"{share[place]:.0%}", f"{speed[place]:.2f}", f"{collapsed[place]:.2f}"]
-        lines.append([*(f"{value:g}" for value in at.values()), *(text.replace("nan", "–") for text in numbers)])
-    return common.table(names, lines)
+        numbers = cells.mean[place], cells.standard_error[place], share[place], speed[place], collapsed[place]
+        lines.append([*at.values(), *("–" if np.isnan(number) else number for number in numbers)])
+    heads = *block.axes, "Δx / m", "±", "without end", "their speed / (m/s)", "collapse / s"
+    return common.table(heads, lines, len(at) * "g " + ".3f .3f .0% .2f .2f")
 
 
 def draw(block: Block) -> Figure:
