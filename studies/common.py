@@ -34,10 +34,7 @@ FREQUENCY = "frequency of the sprocket $ν$ / Hz"
 
 
 def run_study(*commands: Callable[..., None]) -> None:
-    """Run a study's command, or one of several, whose arguments are those of its function; what is refused is one line.
-
-    A command of several is given by its name.
-    """
+    """Run a study's command, or one of several by its name, with the arguments of its function; errors are one line."""
     app = typer.Typer(pretty_exceptions_enable=False)
     for command in commands:
         app.command()(command)
@@ -135,11 +132,7 @@ def drawn_terms(columns: Columns) -> list[Array]:
 
 
 def table(head: str | Iterable[str], rows: Iterable[Iterable[object]], formats: str = "") -> str:
-    """A table in Markdown.
-
-    The head may be one text with strokes between its cells; formats of columns, with blanks between them, are those of
-    cells that are no texts.
-    """
+    """A table in Markdown; the head may be one text with strokes, formats are those of columns, for what is no text."""
     head = head.split(" | ") if isinstance(head, str) else list(head)
     kinds = formats.split() or [""] * len(head)
     texts = (
@@ -195,11 +188,7 @@ def write_rows(path: Path, rows: Iterable[Mapping[str, object]]) -> None:
 
 
 def with_tables(text: str, tables: Mapping[str, str]) -> str:
-    """A page with these tables between its markers ``<!-- NAME -->`` and ``<!-- end of NAME -->``.
-
-    Raises:
-        ValueError: the page lacks a marker.
-    """
+    """A page with these tables between its markers ``<!-- NAME -->`` and ``<!-- end of NAME -->``."""
     for name, table in tables.items():
         begin, end = f"<!-- {name} -->", f"<!-- end of {name} -->"
         if text.count(begin) != 1 or text.count(end) != 1:

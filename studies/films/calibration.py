@@ -15,20 +15,13 @@ CAMERA = films.Camera()
 
 @dataclass(frozen=True)
 class Calibration:
-    """Errors of the posterior means of hidden chains.
+    """Errors of the posterior means of hidden chains."""
 
-    Attributes:
-        names: of the parameters.
-        errors, sigmas: mean less truth, and standard deviations that the posterior says, (films answered, p).
-        values: truths, (films answered, p).
-        refused: share of sets of films that were refused as outside of the bank.
-    """
-
-    names: tuple[str, ...]
-    errors: Array
-    sigmas: Array
-    values: Array
-    refused: float
+    names: tuple[str, ...]  # Of the parameters
+    errors: Array  # Mean less truth, (films answered, p)
+    sigmas: Array  # Standard deviations that the posterior says, likewise
+    values: Array  # Truths, likewise
+    refused: float  # Share of sets of films that were refused as outside of the bank
 
     @property
     def width(self) -> Array:

@@ -119,10 +119,10 @@ def friction(numbers: Numbers) -> Figure:
     """Distance walked against the friction of the floor, over that at the paper's value."""
     content = numbers["paper_claims"]
     found, frequencies = content["friction"], content["cells"]["frequency"]
-    mean, reference = np.array(found["mean"], float), content["effects"]["floor_friction"]["reference"]
+    reference = content["effects"]["floor_friction"]["reference"]
     x, y = f"friction of the floor {symbol_of('floor_friction')}", "Δx over that at Table 1's friction"
     figure, panels = panels_of_links(numbers, x, y)
-    for axes, of_links in zip(panels, mean, strict=True):
+    for axes, of_links in zip(panels, found["mean"], strict=True):
         for frequency, color, line in zip(frequencies, LINE_COLORS, of_links, strict=False):
             ratio = line / line[found["values"].index(reference)]
             axes.plot(found["values"], ratio, ".-", color=color, linewidth=1, label=f"{frequency:g} Hz")

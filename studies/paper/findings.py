@@ -30,8 +30,8 @@ SYMBOLS = {
 
 
 def of_start(numbers: Numbers, start: str, name: str) -> Any:
-    """A table (links, frequencies) of chains that began so."""
-    return np.array(numbers["paper_claims"]["starts"][start][name], float)
+    """Numbers of chains that began so."""
+    return numbers["paper_claims"]["starts"][start][name]
 
 
 def long_chains(numbers: Numbers) -> slice:
@@ -88,12 +88,12 @@ def speed(numbers: Numbers) -> Found:
 
 def faster(numbers: Numbers) -> Found:
     """Δx rises with the frequency."""
-    return rising(numbers["paper_claims"]["starts"]["rest"]["faster"])
+    return rising(of_start(numbers, "rest", "faster"))
 
 
 def longer(numbers: Numbers) -> Found:
     """Δx falls with the number of links."""
-    found, ellipses = (numbers["paper_claims"]["starts"][start]["longer"] for start in ("rest", "ellipse"))
+    found, ellipses = (of_start(numbers, start, "longer") for start in ("rest", "ellipse"))
     return direction(found.falls, found.rises, found.count), {"found": found, "ellipses": ellipses}
 
 
@@ -145,10 +145,7 @@ def cause(numbers: Numbers) -> Found:
 
 def losses(numbers: Numbers) -> Found:
     """A chain loses most of its energy in collisions."""
-    found, as_ellipse = (
-        {name: np.array(each, float) for name, each in numbers["paper_claims"]["starts"][start]["losses"].items()}
-        for start in ("rest", "ellipse")
-    )
+    found, as_ellipse = (of_start(numbers, start, "losses") for start in ("rest", "ellipse"))
     most = int((found["floor"] + found["self_contact"] > 0.5).sum())
     damped = [
         int((each["floor"] + each["self_contact"] + each["joint_damping"] > each["joint_friction"]).sum())
@@ -252,7 +249,7 @@ def small(kind_and_names: str) -> Check:
 
 def spread(numbers: Numbers) -> Found:
     """Drawing the release as well spreads Δx further."""
-    found = {name: np.array(table, float) for name, table in numbers["paper_claims"]["spread"].items()}
+    found = numbers["paper_claims"]["spread"]
     greater = int((found["both"] > found["parameters"]).sum())
     words = {name: plain(np.nanmedian(table)) for name, table in found.items()}
     return share(greater, found["both"].size), words | {"greater": greater, "cells": found["both"].size}
@@ -277,7 +274,7 @@ def gradual(numbers: Numbers) -> Found:
     """A loop loses its shape gradually: nine of ten take longer than an impact lasts."""
     found = numbers["paper_strands"]["strands"]["loss_of_shape"]["rest"]
     low, median, high = found["seconds"]
-    impact = float(np.nanmedian(np.array(numbers["paper_shapes"]["impacts"]["duration"], float)))
+    impact = np.nanmedian(numbers["paper_shapes"]["impacts"]["duration"])
     words = {"low": low, "median": median, "high": high, "of_walk": plain(found["of_the_walk"][1]), "impact": impact}
     return Verdict.AGREES if low > impact else Verdict.PART if median > impact else Verdict.DIFFERS, words
 
@@ -286,7 +283,7 @@ def nonlinear(numbers: Numbers) -> Found:
     """Linear propagation of the uncertainties fails: linear terms explain less than half of the variance in a cell."""
     texts, fails = [], []
     for start, found in numbers["paper_footnote"]["nonlinear"].items():
-        shares = {name: np.maximum(np.array(each, float), 0.0) for name, each in found.items()}
+        shares = {name: np.maximum(each, 0.0) for name, each in found.items()}
         linear, squares, products, repeated = (plain(np.median(each)) for each in shares.values())
         least = shares["linear"]
         texts.append(

@@ -11,31 +11,21 @@ import numpy as np
 from studies.common import Array, Block, area_of
 
 TOUCH = 3e-4  # A loop touches the floor while its lowest circle is less than this above it [m]
-APART = 0.02
-"""Touches less than this apart [s] are one impact: fast loops lose the floor for 10 ms while they roll over it."""
+APART = 0.02  # Touches less apart [s] are one impact: fast loops lose the floor for 10 ms while they roll over it
 
 
 @dataclass(frozen=True)
 class Impact:
-    """The loop just before its first impact and just after it has left the floor again.
+    """The loop just before its first impact and just after it has left the floor again."""
 
-    Attributes:
-        before, after: joints x, y from the centroid of the joints [m], shape (n, 2).
-        duration: time between the two frames [s].
-        area, height, width, speed: relative changes of the enclosed area, the height, the width and the mean speed of
-            the links along the loop.
-        moved: how far the outline moved, root mean square, over the radius of a circle of the same area; the loop may
-            turn on along itself meanwhile.
-    """
-
-    before: Array
+    before: Array  # Joints x, y from the centroid of the joints [m], shape (n, 2)
     after: Array
-    duration: float
-    area: float
+    duration: float  # Time between the two frames [s]
+    area: float  # Relative changes: of the enclosed area, …
     height: float
     width: float
-    speed: float
-    moved: float
+    speed: float  # … and of the mean speed of the links along the loop
+    moved: float  # By how much the outline moved, root mean square, over the radius of a circle of the same area
 
 
 def first_impact(walk: Any) -> Impact | None:

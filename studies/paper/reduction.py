@@ -19,16 +19,11 @@ from studies.paper.statistics import Effect, paired, spread, unpaired
 from warpchain import InputError, Parameters, SweepResult, preset
 
 DIGITS = 4  # Significant digits that are kept
-DEFAULTS = {"clearance": 0.01, "phase": 0.0, "start": "rest"}
-"""Scene of a walk that is not told otherwise: height of the release [m], part of a loop period, how it begins."""
+DEFAULTS = {"clearance": 0.01, "phase": 0.0, "start": "rest"}  # Of walks that are not told otherwise, in SI units
 
 
 def reduced(result: SweepResult) -> Numbers:
-    """The numbers of one sweep.
-
-    Raises:
-        InputError: it is none of `SWEEPS`, or not complete.
-    """
+    """The numbers of one sweep."""
     if result.name not in SWEEPS:
         raise InputError(f"{result.name}: no sweep of this page; give folders of {', '.join(SWEEPS)}")
     if result.missing_count:
@@ -68,11 +63,7 @@ def content_digest(sweep: Mapping[str, Any]) -> str:
 
 
 def effects_of(result: SweepResult, block: Block, name: str, table: Cells) -> Numbers:
-    """What each value of a block's further axis `name` does to a quantity, against that of the paper.
-
-    Raises:
-        InputError: the paper's value is not on the axis.
-    """
+    """What each value of a block's further axis `name` does to a quantity, against that of the paper."""
     if name in Parameters.model_fields:
         given = next(each for each in result.sweep["blocks"] if each["name"] == block.name)
         reference: Any = float(getattr(preset(given["preset"]), name))
@@ -172,8 +163,15 @@ def text_of(content: Mapping[str, Any]) -> str:
 
 
 def read(text: str) -> Numbers:
-    """The numbers of such a file, with effects in their places."""
-    return json.loads(text, object_hook=lambda found: Effect.of(found) if "half_width" in found else found)
+    """The numbers of such a file, with effects and arrays in their places."""
+
+    def found(content: Numbers) -> Any:
+        if "half_width" in content:
+            return Effect.of(content)
+        tables = {name: each for name, each in content.items() if isinstance(each, list) and isinstance(each[0], list)}
+        return content | {name: np.array(each, float) for name, each in tables.items()}
+
+    return json.loads(text, object_hook=found)
 
 
 WHOLE: dict[str, tuple[str, Callable[..., Any]]] = {

@@ -20,23 +20,14 @@ CONFIDENCE = 0.95  # Confidence level of every test and interval
 
 @dataclass(frozen=True)
 class Effect:
-    """What a change does to the mean of a quantity, cell by cell; every array has the shape of the cells.
+    """What a change does to the mean of a quantity, cell by cell; every array has the shape of the cells."""
 
-    Attributes:
-        relative: mean after the change over that before it, less 1; NaN without two walks to compare.
-        half_width: half of the 95 % interval of `relative`; NaN likewise.
-        sign: 1 if the mean rises and −1 if it falls, at 95 %; 0 if neither can be said.
-        pairs: number of pairs of walks; of two independent samples the smaller number of walks.
-        lost: walks or pairs left out, because a walk did not come to rest.
-        notes: what else a file has of it, such as the value of the quantity that was changed.
-    """
-
-    relative: Array
-    half_width: Array
-    sign: Array
-    pairs: Array
-    lost: int
-    notes: Mapping[str, Any] = field(default_factory=dict)
+    relative: Array  # Mean after the change over that before it, less 1; NaN without two walks to compare
+    half_width: Array  # Half of the 95 % interval of `relative`; NaN likewise
+    sign: Array  # 1 if the mean rises and −1 if it falls, at 95 %; 0 if neither can be said
+    pairs: Array  # Number of pairs of walks; of two independent samples the smaller number of walks
+    lost: int  # Walks or pairs left out, because a walk did not come to rest
+    notes: Mapping[str, Any] = field(default_factory=dict)  # What else a file has of it, such as the value it is of
 
     @classmethod
     def of(cls, content: Mapping[str, Any]) -> "Effect":

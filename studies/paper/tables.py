@@ -6,7 +6,7 @@ Each takes the numbers of `studies.paper.reduction` and gives a text. The paper'
 import re
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +18,10 @@ from studies.paper import figure5, findings, separations
 from studies.paper.findings import Numbers
 from studies.paper.further import EVENTS
 from studies.paper.statistics import Effect, percent, plain
-from studies.paper.verdicts import BOUNDS, Bounds, Verdict
+from studies.paper.verdicts import BOUNDS, Verdict
 from warpchain import Parameters
 
-SYMBOLS = {"phase": "phase of the release", "clearance": "height of the release / m"}
-"""Quantities that are none of Table 1."""
+SYMBOLS = {"phase": "phase of the release", "clearance": "height of the release / m"}  # None of Table 1
 NAMES = {
     "sprocket_radius_is": "the sprocket's radius is that of",
     "circle_radius": "radius of the circles of links / m",
@@ -45,23 +44,14 @@ def page(numbers: Numbers) -> str:
 
 @dataclass(frozen=True)
 class Claim:
-    """A sentence of the paper.
+    """A sentence of the paper."""
 
-    Attributes:
-        sentence: in short.
-        source: where its numbers are from, in Markdown.
-        says: what came out, with the names of numbers in braces.
-        check: name of the function of `findings`, and its argument; none of what another page shows.
-        verdict: set by hand, where it is not clear what the paper says.
-        reasons: verdict → why.
-    """
-
-    sentence: str
-    source: str
-    says: str
-    check: str = ""
-    verdict: str = ""
-    reasons: Mapping[str, str] | None = None
+    sentence: str  # In short
+    source: str  # Where its numbers are from, in Markdown
+    says: str  # What came out, with the names of numbers in braces
+    check: str = ""  # Name of the function of `findings`, and its argument; none of what another page shows
+    verdict: str = ""  # Set by hand, where it is not clear what the paper says
+    reasons: Mapping[str, str] = field(default_factory=dict)  # Verdict → why
 
     def finding(self, numbers: Numbers) -> tuple[str, Verdict]:
         """What came out, and what it says of the claim."""
@@ -72,7 +62,7 @@ class Claim:
 
     def reason(self, verdict: Verdict) -> str:
         """Why the verdict is what it is; the page admits it if no reason is known."""
-        for verdicts, text in (self.reasons or {}).items():
+        for verdicts, text in self.reasons.items():
             if verdict in verdicts.split(" | "):
                 return text
         return {Verdict.OPEN: "The numbers are missing.", Verdict.AGREES: ""}.get(verdict, "No reason is known.")
@@ -108,15 +98,15 @@ def verdicts(numbers: Numbers) -> str:
 def thresholds(numbers: Numbers) -> str:
     """Which verdicts change if one bound of the rules is halved or doubled."""
     usual, rows = all_verdicts(numbers), []
-    for field in fields(Bounds):
-        value, texts = getattr(BOUNDS, field.name), []
+    for name, value in asdict(BOUNDS).items():
+        texts = []
         for factor in (0.5, 2.0):
-            setattr(BOUNDS, field.name, factor * value)
+            setattr(BOUNDS, name, factor * value)
             pairs = enumerate(zip(usual, all_verdicts(numbers), strict=True), 1)
             changed = (f"{number}: *{before}* → *{after}*" for number, (before, after) in pairs if before != after)
             texts.append("; ".join(changed) or "none")
-        setattr(BOUNDS, field.name, value)
-        rows.append([field.name, f"{value:g}", *texts])
+        setattr(BOUNDS, name, value)
+        rows.append([name, f"{value:g}", *texts])
     return table(["bound", "value", "halved", "doubled"], rows)
 
 
@@ -155,7 +145,7 @@ def impacts(numbers: Numbers) -> str:
     for place, frequency in enumerate(content["cells"]["frequency"]):
         row = [f"{frequency:g} Hz"]
         for name in ("area", "height", "width", "speed", "moved"):
-            values, show = np.array(content["impacts"][name], float)[:, place], plain if name == "moved" else percent
+            values, show = content["impacts"][name][:, place], plain if name == "moved" else percent
             values = values[np.isfinite(values)]
             row.append(f"{show(values.mean())} ({show(values.min())} to {show(values.max())})" if len(values) else "—")
         rows.append(row)
@@ -283,9 +273,8 @@ def loops(numbers: Numbers) -> str:
     """How loops at their release differ from those that spun from the start and were held longest."""
     content, held = numbers["paper_loops"], numbers["paper_held"]
     found, links = content["loops"], np.array(content["cells"]["links"])
-    height, energy = (np.array(found[name], float) for name in ("height", "energy"))
-    place = np.s_[:, :, found["start"].index("spinning"), -1]
-    least = height[place], energy[place]
+    height, energy = found["height"], found["energy"]
+    least = [each[:, :, found["start"].index("spinning"), -1] for each in (height, energy)]
     there = np.isin(links, held["cells"]["links"])
     known = {
         f"{start}, held on for {seconds:g} s": (height[:, :, which, hold], energy[:, :, which, hold], links >= 0)

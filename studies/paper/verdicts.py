@@ -6,22 +6,15 @@ from enum import StrEnum
 
 @dataclass
 class Bounds:
-    """What the rules allow.
+    """What the rules allow."""
 
-    Attributes:
-        few: share of comparisons that may contradict a claim: a test at 95 % errs in one of twenty.
-        most: share of comparisons that must show what a claim says.
-        unseen: greatest relative effect that "no dependence" may mean: means of the paper's 12 walks, of which each
-            scatters by 5 to 10 %, differ by that much by chance.
-        little: greatest relative effect that "little effect" may mean.
-        moderate: greatest standard deviation of a walk over the mean of its cell that "moderately" may mean.
-    """
-
-    few: float = 0.1
-    most: float = 0.5
+    few: float = 0.1  # Share of comparisons that may contradict a claim: a test at 95 % errs in one of twenty
+    most: float = 0.5  # Share of comparisons that must show what a claim says
     unseen: float = 0.05
-    little: float = 0.1
-    moderate: float = 0.2
+    """Greatest relative effect that "no dependence" may mean: means of the paper's 12 walks, of which each scatters by
+    5 to 10 %, differ by that much by chance."""
+    little: float = 0.1  # Greatest relative effect that "little effect" may mean
+    moderate: float = 0.2  # Greatest standard deviation of a walk over its mean that "moderately" may mean
 
 
 BOUNDS = Bounds()  # Those that hold now; the page tries others

@@ -18,8 +18,7 @@ MOST_ENERGY_ERROR = 0.05  # A walk with a greater energy error counts as inaccur
 FAILURES = tuple(code for code in Status if code not in (Status.RUNNING, Status.AT_REST, Status.FINISHED))
 """What a walk can end with instead of rest."""
 WAYS = tuple(code for code in Ending if code != Ending.UNKNOWN)
-AVERAGED = ("bounces", "walk_time", "hold_time", "collapsed_at")
-"""Columns of the sweep of which the file has means over the walks at rest. NaNs are left out."""
+AVERAGED = ("bounces", "walk_time", "hold_time", "collapsed_at")  # Columns of which the file has means at rest
 COLUMNS = (
     *("status", "dx", "steps_accepted", "steps_rejected", "energy_error", "flight_before_collapse"),
     *("bounces_before_collapse", *AVERAGED),
@@ -28,11 +27,7 @@ COLUMNS = (
 
 
 def walks_by_cell(parts: Sequence[SweepResult], names: Sequence[str] = COLUMNS) -> dict[Cell, dict[str, Array]]:
-    """The walks of all parts of a sweep by cell: columns of these names, shape (walks,), missing walks included.
-
-    Raises:
-        InputError: a part has other axes than links and frequency, other settings than the first, or its seed.
-    """
+    """The walks of all parts of a sweep by cell: columns of these names, shape (walks,), missing walks included."""
     found: dict[Cell, list[dict[str, Array]]] = {}
     for number, part in enumerate(parts):
         if axes := [block.axes for block in part.blocks.values() if set(block.axes) != {"links", "frequency"}]:

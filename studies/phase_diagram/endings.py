@@ -11,8 +11,7 @@ import numpy as np
 from studies.common import Array, Columns
 from warpchain import Status
 
-IN_FLIGHT = 0.01
-"""Time since the last impulse on the floor [s] from which a chain is in flight; a later impulse begins a bounce."""
+IN_FLIGHT = 0.01  # Time since the last impulse on the floor [s] from which a chain is in flight
 
 
 class Ending(IntEnum):

@@ -22,8 +22,7 @@ RADIUS = PARAMETERS.sprocket_radius + PARAMETERS.circle_radius  # At which joint
 
 PIECES = 6  # Of the spline
 NUMBERS = PIECES + 3  # That a spline has
-MOST_FAILED = 0.05
-"""Cells of which more walks failed are left out: those at rest may be another kind of walks than the rest."""
+MOST_FAILED = 0.05  # Cells of which more failed are left out: walks at rest may be another kind than the rest
 FAST = 12.0  # Frequency [Hz] from which most chains survive their second bounce
 PLACES = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # Turns of the loop per second at which a curve is described
 

@@ -33,11 +33,7 @@ BLOCKS = {"sprocket_radius": "radius of the sprocket", "gravity": "gravity", "li
 
 
 def reduced(result: SweepResult) -> Iterator[dict[str, float | str]]:
-    """Statistics of the cells of the sweep: rows of the file.
-
-    Raises:
-        InputError: it has other axes, or a cell is unfinished.
-    """
+    """Statistics of the cells of the sweep: rows of the file."""
     for content in result.sweep["blocks"]:
         name, block = content["name"], result.blocks[content["name"]]
         if not {"links", "frequency"} <= block.axes.keys():

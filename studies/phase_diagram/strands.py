@@ -17,8 +17,7 @@ from studies.phase_diagram.endings import Ending, endings
 from warpchain import Status, SweepResult
 
 CSV = Path(__file__).parent / "results" / "strands.csv"
-EVENTS = {"crease": "self_contact", "strands": "strands_met", "collapse": "collapse"}
-"""What happens to a loop: name → end of the name of its column."""
+EVENTS = {"crease": "self_contact", "strands": "strands_met", "collapse": "collapse"}  # Name → end of its column
 BEGUN = ("0", "1", "2", "3", "later", "never")  # Bounces begun before an event
 FEW = 10  # Walks that each of two groups has in a cell in which they are compared, at least
 EARLY = 2  # Strands that met by this bounce met early

@@ -108,11 +108,7 @@ def draw(walk: warpchain.WalkResult) -> Figure:
 
 
 def draw_kinks(result: warpchain.SweepResult) -> Figure:
-    """Curvature and place of the kink against the frequency, a line for each number of links.
-
-    Raises:
-        InputError: no walk has frames of the time before its release.
-    """
+    """Curvature and place of the kink against the frequency, a line for each number of links."""
     kinks: dict[int, dict[float, list[Any]]] = {}
     for block in result.blocks.values():
         for place in np.argwhere(block.kept).tolist():

@@ -11,8 +11,7 @@ import warpchain
 from studies import common
 from studies.common import DRAWN, Array
 
-Key = tuple[str, int, float, float]
-"""Block, links, frequency [Hz], time for which the loop was held on [s], 0 where that is no axis."""
+Key = tuple[str, int, float, float]  # Block, links, frequency [Hz], time for which loops were held on [s]
 Cells = Mapping[Key, Mapping[str, float]]
 
 CSV = Path(__file__).parent / "results" / "starts.csv"

@@ -32,14 +32,12 @@ from warpchain import Parameters
 
 MeanLoop = Any  # What `walk.mean_loop()` returns
 
-SMOOTHINGS = (300.0, 100.0, 30.0, 10.0, 3.0, 1.0)
-"""Smoothings ω_c [rad/s] for which the problem is solved before that of the chain."""
+SMOOTHINGS = (300.0, 100.0, 30.0, 10.0, 3.0, 1.0)  # Smoothings ω_c [rad/s] before that of the chain
 LEAST_SMOOTHING = 0.3  # Least smoothing ω_c [rad/s]
 TOLERANCE = 1e-4  # Relative tolerance of the solver
 MOST_NODES = 20_000  # Greatest number of nodes of the solver
 POINTS = 801  # Number of points of a theoretical loop
-IN_LINKS = 1.0
-"""The theory begins and ends this many links inside of the free part: averages near it include links that touch."""
+IN_LINKS = 1.0  # Theory ends this many links inside of the free part: averages near it include links that touch
 
 EDGE = 4.0  # Links at either end of the free part that balances leave out: averages there include links on the sprocket
 
@@ -83,11 +81,7 @@ class TheoreticalLoop:
 
 
 def predict(loop: MeanLoop, values: Mapping[str, float] | None = None) -> TheoreticalLoop:
-    """The free part in theory, with the ends and the speed of a mean loop, which is also the first guess.
-
-    `values` are of parameters that are others than those of the loop's chain. Raises a `NoSolutionError` if the solver
-    finds no solution.
-    """
+    """The free part in theory, with the ends and the speed of a mean loop, the first guess, and other parameters."""
     p = loop.parameters.with_values(values or {})
     inset = IN_LINKS * loop.parameters.link_length
     first, last = loop.free[0] + inset, loop.free[1] - inset

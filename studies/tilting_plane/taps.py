@@ -17,11 +17,7 @@ FEW = 3  # Walks of a cell that are enough for a mean
 
 
 def reduced(folder: str, needed: str) -> tuple[warpchain.SweepResult, list[dict[str, str]]]:
-    """A sweep, and rows: what each tap does, over the cells and, of those of one number of links, alone.
-
-    Raises:
-        InputError: it lacks the block `fixed` or the needed one.
-    """
+    """A sweep, and rows: what each tap does, over the cells and, of those of one number of links, alone."""
     result, found = warpchain.load(folder), []
     if not {"fixed", needed} <= result.blocks.keys():
         raise warpchain.InputError(f"{folder}: no blocks fixed and {needed}; give a folder of the page's sweep")

@@ -36,10 +36,7 @@ VARIANTS = (("none", 0.0), *((way, size) for size in (0.05, 0.15) for way in ("s
 def with_wave(
     position: Array, velocity: Array, parameters: warpchain.Parameters, way: str, size: float, phase: float
 ) -> tuple[Array, Array]:
-    """The state (n, 3), (n, 3) of a loop with a wave, whose joints are as open as before.
-
-    Momentum stays, and angular momentum but for what the bend does to it.
-    """
+    """The state (n, 3), (n, 3) of a loop with a wave: joints are as open as before, momentum stays."""
     if way == ALIKE:
         moved, speeds = with_wave(position, velocity, parameters, "fast", size, phase)
         lift = lowest(moved, parameters.link_length) - lowest(position, parameters.link_length)
@@ -165,10 +162,7 @@ def about_impact(links: int, frequency: float) -> tuple[float, float]:
 
 
 def given(links: int, frequency: float) -> Array:
-    """What waves of all phases change of a loop: energy, angular momentum, run [%], lowest joint [mm].
-
-    Shape (variants, phases, 4).
-    """
+    """Energy, angular momentum, run [%] and lowest joint [mm] that waves change of a loop, (variants, phases, 4)."""
     position, velocity, parameters = released(links, frequency, SEED)
     inertia = inertia_of(links, parameters)
 

@@ -33,24 +33,15 @@ ROUNDING = 1e-12  # Damping below this part of a rate is rounding
 
 @dataclass(frozen=True, eq=False)
 class Waves:
-    """Free waves of k phases, four each; columns are `UPPER_BACKWARD` … `UPPER_FORWARD`.
+    """Free waves of k phases, four each; columns are `UPPER_BACKWARD` … `UPPER_FORWARD`."""
 
-    Attributes:
-        phase: κ [rad], (k,).
-        rate: λ = −γ − iω [1/s] in the chain's frame, (k, 4).
-        frequency: ω [rad/s]; 0 if friction lets a wave creep back without swinging.
-        damping: γ, at which an amplitude falls [1/s].
-        phase_speed, group_speed: ω/κ and dω/dκ, the speeds of crests and of packets [links/s].
-        reach: how far a packet runs until its amplitude is 1/e [links]; infinite if its damping is rounding.
-    """
-
-    phase: Array
-    rate: Array
-    frequency: Array
-    damping: Array
-    phase_speed: Array
-    group_speed: Array
-    reach: Array
+    phase: Array  # κ [rad], (k,)
+    rate: Array  # λ = −γ − iω [1/s] in the chain's frame, (k, 4), as all below
+    frequency: Array  # ω [rad/s]; 0 if friction lets a wave creep back without swinging
+    damping: Array  # γ, at which an amplitude falls [1/s]
+    phase_speed: Array  # ω/κ, the speed of crests [links/s]
+    group_speed: Array  # dω/dκ, the speed of packets [links/s]
+    reach: Array  # How far a packet runs until its amplitude is 1/e [links]; infinite if its damping is rounding
 
 
 def straight_waves(parameters: Parameters, tension: float, phase: ArrayLike) -> Waves:

@@ -19,8 +19,7 @@ LATEST = 4.0  # Time [s] at which the drag ends; it ends earlier when the loop h
 END = 20.0
 LONGEST = 24.0  # Longest waves that are dragged, in links
 NEAR = 1e-3  # A chain whose lowest circle is nearer to the floor than this [m] is in an impact
-WHEN = {"always": (True, True), "in flight": (True, False), "in impacts": (False, True)}
-"""Whether a drag acts in flight, and in impacts."""
+WHEN = {"always": (True, True), "in flight": (True, False), "in impacts": (False, True)}  # In flight, in impacts
 RATES = (10.0, 25.0, 50.0, 100.0, 250.0, 1000.0)
 HALVES = (10.0, 50.0, 250.0)
 VARIANTS = (

@@ -16,8 +16,7 @@ from studies.waves.wave_drag import inertia_of
 from warpchain import WalkResult
 
 Colour = Literal["curvature", "velocity"]
-Place = Callable[[Array, int], Array]
-"""Joint numbers at consecutive frames, and the first frame → places on a panel, wrapped around the loop."""
+Place = Callable[[Array, int], Array]  # Joint numbers at frames, and the first of these → places on a panel
 
 FIRST_IMPACTS = 3  # Number of impacts from which characteristics start
 MOST_COLUMNS = 900  # Most instants of an image; each is the mean of its frames

@@ -15,16 +15,13 @@ from studies.waves import dispersion
 from studies.waves.dispersion import LOWER_BACKWARD, LOWER_FORWARD, UPPER_BACKWARD, UPPER_FORWARD, Waves
 from warpchain import Parameters, preset
 
-CHAIN = preset("soft").with_values({"coulomb_friction": 0.0})
-"""Table 1's chain with softened joints, without Coulomb friction."""
-SMOOTH = CHAIN.with_values({"viscous_friction": CHAIN.viscous_friction / 100})
-"""The same, with a hundredth of the viscous friction."""
+CHAIN = preset("soft").with_values({"coulomb_friction": 0.0})  # Table 1's, its joints softened
+SMOOTH = CHAIN.with_values({"viscous_friction": CHAIN.viscous_friction / 100})  # A hundredth
 LENGTH = CHAIN.link_length
 DENSITY = (CHAIN.inner_mass + CHAIN.outer_mass) / 2 / LENGTH
 LINKS = 60
 FREQUENCIES = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0)
-SPINS = (0.01, 0.1, 1.0, 10.0, 60.0)
-"""Amplitudes of a joint's angular velocity [rad/s]; joints turn at 60 rad/s where a loop bends."""
+SPINS = (0.01, 0.1, 1.0, 10.0, 60.0)  # Amplitudes of a joint's angular velocity [rad/s]; 60 where a loop bends
 WAVELENGTHS = np.array([6.0, 12.0, 24.0])
 BOTH, FORWARD = [LOWER_BACKWARD, LOWER_FORWARD], [LOWER_FORWARD, UPPER_FORWARD]
 FOLDER = Path(__file__).parent

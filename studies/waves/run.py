@@ -11,8 +11,7 @@ from studies.waves.picture import waves_figure
 from studies.waves.wave_drag import inertia_of
 
 FOLDER = Path(__file__).parent
-WALKS = ((120, 20.0, 0.10, 0.24), (60, 15.0, 0.13, 0.33))
-"""Links, frequency [Hz], and times [s] between two impacts in which speeds are measured."""
+WALKS = ((120, 20.0, 0.10, 0.24), (60, 15.0, 0.13, 0.33))  # Links, frequency [Hz], times [s] between impacts
 MODES = (2, 3, 4, 5, 6, 8, 10)  # Numbers of waves around the loop
 RATIOS = np.arange(0.05, 1.51, 0.01)  # Speeds that are tried, as multiples of c
 
