@@ -55,7 +55,8 @@ def straight_waves(parameters: Parameters, tension: float, phase: ArrayLike) -> 
         )
         return first, second, squares[0] * squares[1]
 
-    inertia, quarter = _mean_inertia(parameters), _mean_mass(parameters) * parameters.link_length**2 / 4
+    mass, inertia, *_ = _links(parameters)
+    quarter = mass * parameters.link_length**2 / 4
     return _waves(parameters, np.asarray(phase, dtype=np.float64), factors)
 
 
@@ -65,8 +66,8 @@ def ring_waves(parameters: Parameters, links: int, speed: float, number: ArrayLi
     Its N links, N even, move at `speed` [m/s]; `number` has whole wavelengths around it, from 2 to N/4, shape (k,).
     Rates are those in the frame that turns with the ring, at the phases 2πn/N.
     """
-    inertia, eighth = _mean_inertia(parameters), _mean_mass(parameters) * parameters.link_length**2 / 8
-    alpha, spin = np.pi / links, ring_spin(parameters, links, speed)
+    mass, inertia, *_ = _links(parameters)
+    eighth, alpha, spin = mass * parameters.link_length**2 / 8, np.pi / links, ring_spin(parameters, links, speed)
 
     def factors(phases: Array, friction: float) -> tuple[Array, Array, Array]:
         forward, backward = phases / 2 + alpha, phases / 2 - alpha
@@ -87,10 +88,10 @@ def ring_waves(parameters: Parameters, links: int, speed: float, number: ArrayLi
 
 def continuous_ring(parameters: Parameters, links: int, speed: float, number: ArrayLike) -> Array:
     """Rates λ [1/s] of the continuous ring of length Nℓ, slow and fast, (k, 2): `ring_waves` for long waves."""
-    n, length = np.asarray(number, dtype=np.float64), parameters.link_length
-    density, radius = _mean_mass(parameters) / length, links * length / (2 * np.pi)
+    n, length, (mass, inertia, *_) = np.asarray(number, float), parameters.link_length, _links(parameters)
+    density, radius = mass / length, links * length / (2 * np.pi)
     spin, bend = speed / radius, (n**2 - 1) ** 2
-    rotary = (_mean_inertia(parameters) / length - density * length**2 / 6) / (density * radius**2)
+    rotary = (inertia / length - density * length**2 / 6) / (density * radius**2)
     friction = parameters.viscous_friction * length / (density * radius**4)
     leading = 1 + n**2 + bend * rotary
     half = (bend * n**2 * friction - 4j * n * spin) / (2 * leading)
@@ -108,7 +109,7 @@ def band_gap(parameters: Parameters, tension: float) -> tuple[float, float]:
 
 def long_wave_speed(parameters: Parameters, tension: float) -> float:
     """c = √(Tℓ/m̄), the speed of long waves along the chain under the tension T [N], in m/s."""
-    return float(np.sqrt(tension * parameters.link_length / _mean_mass(parameters)))
+    return float(np.sqrt(tension * parameters.link_length / _links(parameters)[0]))
 
 
 def ring_spin(parameters: Parameters, links: int, speed: float) -> float:
@@ -128,12 +129,10 @@ def equivalent_friction(parameters: Parameters, amplitude: float) -> float:
     return parameters.viscous_friction + 2 * parameters.coulomb_friction * mean / amplitude
 
 
-def _mean_mass(parameters: Parameters) -> float:
-    return (parameters.inner_mass + parameters.outer_mass) / 2
-
-
-def _mean_inertia(parameters: Parameters) -> float:
-    return (parameters.inner_inertia + parameters.outer_inertia) / 2
+def _links(p: Parameters) -> tuple[float, float, float, float]:
+    """m̄ and Ī, means of mass and moment of inertia, and half of what inner links have more than outer ones, μ and δ."""
+    pairs = (p.inner_mass, p.outer_mass), (p.inner_inertia, p.outer_inertia)
+    return *((inner + outer) / 2 for inner, outer in pairs), *((inner - outer) / 2 for inner, outer in pairs)
 
 
 def _waves(parameters: Parameters, phases: Array, factors: Factors) -> Waves:
@@ -142,9 +141,8 @@ def _waves(parameters: Parameters, phases: Array, factors: Factors) -> Waves:
     `factors` maps phases (k,) and friction to the coefficients of A and B, (k, 3) from λ⁰ on, each times any weight,
     and to the product of the weights, (k,).
     """
-    difference = (parameters.inner_mass - parameters.outer_mass) / 2
-    other = (parameters.inner_inertia - parameters.outer_inertia) / 2
-    coupling = other - difference * parameters.link_length**2 / 4
+    *_, mass, inertia = _links(parameters)
+    coupling = inertia - mass * parameters.link_length**2 / 4
 
     def quartic(phases: Array, friction: float) -> Array:
         first, second, weight = factors(phases, friction)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
+from scipy.signal import hilbert
 
 import warpchain
 from studies.common import BLUE, FAINT, GREEN, GROUND, INK, RED, Array, publish, table, tidy
@@ -89,7 +90,7 @@ def mode_amplitudes(angles: Array, number: int) -> Array:
 
 
 def fit_rates(signals: Array, interval: float, count: int) -> Array:
-    """Rates λ [1/s] of `count` exponentials exp(λt) that signals (t, s) are sums of, by falling imaginary part.
+    """Rates λ [1/s] of `count` exponentials exp(λt) that complex signals (t, s) are sums of.
 
     ESPRIT (Roy and Kailath, IEEE Trans. ASSP 37 (1989) 984): stretches of the signals span a space that is the same one
     sample later but for the factors exp(λ · interval), which are the eigenvalues of the map between both.
@@ -98,22 +99,18 @@ def fit_rates(signals: Array, interval: float, count: int) -> Array:
     rows = np.concatenate([np.lib.stride_tricks.sliding_window_view(column, stretch) for column in signals.T])
     space = np.linalg.svd(rows, full_matrices=False)[2][:count].T
     shift = np.linalg.lstsq(space[:-1], space[1:], rcond=None)[0]
-    rates = np.log(np.linalg.eigvals(shift).astype(np.complex128)) / interval
-    return rates[np.argsort(-rates.imag)]
+    return np.log(np.linalg.eigvals(shift)) / interval
 
 
 def find_packet(angles: Array, link: float, width: float) -> tuple[float, float, Array]:
     """The packet of a ring's angles (n,) at most `width` links from the place `link`, on an endless count of links.
 
     Returns the centre of its squared envelope [links], the root of that envelope's sum [rad], and the shares of the
-    modes from 2 to n/4 in it. The envelope is twice the absolute value of the waves with n > 0 in exp(2πinj/N).
+    modes from 2 to n/4 in it.
     """
     links = len(angles)
-    spectrum = np.fft.fft(angles)
-    spectrum[0] = 0.0
-    spectrum[links // 2 :] = 0.0
     offset = (np.arange(links) - link + links / 2) % links - links / 2
-    signal = np.where(np.abs(offset) <= width, 2 * np.fft.ifft(spectrum), 0.0)
+    signal = np.where(np.abs(offset) <= width, hilbert(angles - angles.mean()), 0.0)
     energy = np.abs(signal) ** 2
     shares = np.abs(np.fft.fft(signal))[2 : links // 4 + 1] ** 2
     return link + float(energy @ offset) / energy.sum(), energy.sum() ** 0.5, shares / shares.sum()
@@ -169,8 +166,7 @@ def show_coulomb() -> None:
     rows = []
     for name in ("soft", "paper"):
         chain = preset(name)
-        shares = (dispersion.equivalent_friction(chain, spin) / chain.viscous_friction for spin in SPINS)
-        rows.append([name, *shares])
+        rows.append([name, *(dispersion.equivalent_friction(chain, w) / chain.viscous_friction for w in SPINS)])
     print("Joint friction in units of β where joints swing about rest")
     print(table(["", *(f"{spin:g} rad/s" for spin in SPINS)], rows, "s" + len(SPINS) * " .2f"))
 
@@ -293,13 +289,10 @@ def main() -> None:
     show_bands()
     show_reach()
     show_coulomb()
-    at_20 = speed_at(20.0)
-    offset = from_tap(LINKS)
-    ring_angles = tapped(LINKS, at_20, 0.1 * offset * np.exp(-(offset**2) / 4.5), INTERVAL * np.arange(400))
-    ring_numbers = np.arange(2, 13)
-    show_ring(at_20, ring_angles, ring_numbers)
+    speed, offset, numbers, places = speed_at(20.0), from_tap(LINKS), np.arange(2, 13), []
+    angles = tapped(LINKS, speed, 0.1 * offset * np.exp(-(offset**2) / 4.5), INTERVAL * np.arange(400))
+    show_ring(speed, angles, numbers)
     print("Packets on larger rings")
-    places = []
-    for how_many, wave_number, spread in ((160, 20, 12.0), (180, 15, 10.0), (360, 15, 20.0)):
-        places += packets(how_many, wave_number, spread, at_20)
-    publish(FOLDER, {}, {"dispersion": draw(at_20, ring_angles, ring_numbers, places)})
+    for links, number, width in ((160, 20, 12.0), (180, 15, 10.0), (360, 15, 20.0)):
+        places += packets(links, number, width, speed)
+    publish(FOLDER, {}, {"dispersion": draw(speed, angles, numbers, places)})
