@@ -84,16 +84,7 @@ def area_of(outlines: Array) -> Array:
 
 
 class OverCells:
-    """Values of several cells, each with a standard error, taken together; those without both are left out.
-
-    Attributes:
-        values, errors: of the cells that have both.
-        mean, error: of the values, and its standard error.
-        typical: root mean square of the values without what their errors contribute.
-        chi2: of no value in any cell.
-        chi2_of_one: of one value in all cells, their mean weighted by errors.
-        rises, falls: numbers of cells that are significant at 95 %.
-    """
+    """Values of several cells, each with a standard error, taken together; those without both are left out."""
 
     def __init__(self, values: ArrayLike, errors: ArrayLike) -> None:
         """Take them together."""
@@ -105,8 +96,11 @@ class OverCells:
         one = np.sum(values * weights**2) / max(np.sum(weights**2), np.finfo(float).tiny)
         self.mean = float(mean(values))
         self.error = float(np.sqrt(np.sum(errors**2)) / len(values)) if len(values) else np.nan
+        # root mean square of the values without what their errors contribute
         self.typical = float(np.sqrt(max(0.0, mean(values**2 - errors**2))))
+        # of no value in any cell, and of one value in all
         self.chi2, self.chi2_of_one = float(np.sum(sizes**2)), float(np.sum(((values - one) * weights) ** 2))
+        # significant at 95 %
         self.rises, self.falls = int(np.sum(sizes > 1.96)), int(np.sum(sizes < -1.96))
 
     def __len__(self) -> int:
@@ -169,12 +163,12 @@ def read_columns(path: Path) -> dict[str, Array]:
     """The columns of a file of comma-separated values: texts where not all are numbers."""
     with path.open(encoding="utf-8", newline="") as file:
         head, *rows = csv.reader(file)
-    columns = dict(zip(head, map(np.array, zip(*rows, strict=True)), strict=True))
-    for name, texts in columns.items():
+    columns = {}
+    for name, *texts in zip(head, *rows, strict=True):
         try:
-            columns[name] = texts.astype(float)
+            columns[name] = np.array(texts, float)
         except ValueError:
-            continue
+            columns[name] = np.array(texts)
     return columns
 
 

@@ -34,25 +34,20 @@ def beside(bank: films.Bank, other: films.Bank) -> films.Bank:
     return films.Bank(bank.names, bank.values[[first for first, _ in pairs]], both)
 
 
-def answer_for(bank: films.Bank, wanted: Wanted) -> films.Posterior:
-    """The posterior for films of the bank's chain that is nearest to its middle."""
-    off = (bank.values - bank.values.mean(axis=0)) / bank.values.std(axis=0)
-    chain = int((off**2).sum(axis=1).argmin())
-    return bank.posterior(set_of_films(bank, chain, wanted, np.zeros(8), np.random.default_rng(0)), CAMERA)
-
-
 def percent(share: float) -> str:
     """Two digits."""
     return f"{100 * share:.2g} %"
 
 
 def experiments_table(bank: films.Bank) -> str:
-    """Widths for each film and each pair of films: μ, β, R, and R if r was measured."""
+    """Widths for each film and each pair of films of a chain in the middle: all, and R if r was measured."""
     every = bank.experiments
     sets: list[Wanted] = [*({one: 1} for one in every), *({one: 1, two: 1} for one, two in combinations(every, 2))]
     middle, found = bank.values.mean(axis=0), []
+    nearest = int((((bank.values - middle) / bank.values.std(axis=0)) ** 2).sum(axis=1).argmin())
     for wanted in sets:
-        alone = answer_for(bank, wanted)
+        seen = set_of_films(bank, nearest, wanted, np.zeros(8), np.random.default_rng(0))
+        alone = bank.posterior(seen, CAMERA)
         measured = alone.given(circle_radius=(middle[alone.names.index("circle_radius")], CALIPERS))
         radius = (measured.sigma / middle)[alone.names.index("sprocket_radius")]
         found.append((" + ".join(f"{n}/{f:g}" for n, f in wanted), *(alone.sigma / middle), radius))

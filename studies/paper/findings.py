@@ -256,10 +256,7 @@ def spread(numbers: Numbers) -> Found:
 
 
 def waves(numbers: Numbers) -> Found:
-    """Short fast waves influence the distance: from the drags of the study of waves, not from this page's sweeps.
-
-    Its verdict is set by hand: a drag shows an effect, a small one.
-    """
+    """Short fast waves influence the distance: from drags of another page; set by hand, for the effect is small."""
     drags = [doses.changes(*drag) for drag in (("in flight", 50.0), ("in flight", 250.0), ("always", 50.0))]
     (values, errors), (nothing, scatter) = drags[0], doses.changes("always", 1e-9)
     words: dict[str, object] = {"cells": len(values)}

@@ -38,27 +38,6 @@ def extremes(block: Block) -> list[dict[str, float]]:
     return [{"tolerance": end(block.axes["tolerance"])} for end in (np.max, np.min)]
 
 
-# --- when strands meet ---
-
-
-def endings_by_links(counts: dict[str, Cells], distance: Cells) -> list[Numbers]:
-    """Of each number of links: after how many bounces loops crease, their strands meet, they collapse; early over late.
-
-    Early is a walk whose strands met before its third bounce; walks are taken relative to the means of their cells.
-    """
-    relative, found = distance.values / mean(distance)[..., np.newaxis], []
-    for links, of_cells in enumerate(relative):
-        content: Numbers = {event: histogram(values.values[links]) for event, values in counts.items()}
-        met = counts["strands"].values[links]
-        early = (met >= 0) & (met <= 2)
-        both = [of_cells[np.isfinite(of_cells) & chosen] for chosen in (early, ~early)]
-        if min(map(len, both)) > 1:
-            content["early_over_late"] = unpaired(*both).plain
-        content["most_frequent"] = [np.argmax(histogram(cell)) for cell in met]
-        found.append(content)
-    return found
-
-
 def histogram(bounces: Array) -> Array:
     """Numbers of walks with 0, 1, 2, 3 and more bounces before an event, and of those without the event."""
     known = np.where(bounces < 0, 5, np.minimum(bounces, 4))[np.isfinite(bounces)]
@@ -66,14 +45,25 @@ def histogram(bounces: Array) -> Array:
 
 
 def strands(block: Block) -> Numbers:
-    """When loops crease, their strands meet and they collapse, by start; how gradually they lose their area."""
+    """When loops crease, their strands meet and they collapse, by start and links; how gradually they lose their area.
+
+    Early is a walk whose strands met before its third bounce; walks are taken relative to the means of their cells.
+    """
     counts = {event: at_rest(block, column) for event, column in EVENTS.items()}
     met = counts["strands"].where(counts["strands"] >= 0)
     lasts, duration = at_rest(block, "collapsed_at") - at_rest(block, "softened_at"), at_rest(block, "walk_time")
     starts, loss = {}, {}
     for start in block.axes["start"].tolist():
-        here = {event: values.sel(start=start) for event, values in counts.items()}
-        starts[start] = endings_by_links(here, at_rest(block).sel(start=start))
+        here = {event: values.sel(start=start).values for event, values in counts.items()}
+        distance, starts[start] = at_rest(block).sel(start=start).values, []
+        for links, of_cells in enumerate(distance / mean(distance)[..., np.newaxis]):
+            content: Numbers = {event: histogram(values[links]) for event, values in here.items()}
+            early = (here["strands"][links] >= 0) & (here["strands"][links] <= 2)
+            both = [of_cells[np.isfinite(of_cells) & chosen] for chosen in (early, ~early)]
+            if min(map(len, both)) > 1:
+                content["early_over_late"] = unpaired(*both).plain
+            content["most_frequent"] = [np.argmax(histogram(cell)) for cell in here["strands"][links]]
+            starts[start].append(content)
         loss[start] = {
             name: np.nanquantile(values.sel(start=start), [0.1, 0.5, 0.9])
             for name, values in (("seconds", lasts), ("of_the_walk", lasts / duration))
@@ -82,14 +72,8 @@ def strands(block: Block) -> Numbers:
     return {"starts": starts, "delay": delay.plain, "loss_of_shape": loss}
 
 
-# --- linear or not ---
-
-
 def nonlinear(block: Block) -> Numbers:
-    """Shares of the variance of Δx in each cell: of linear and further terms of what is drawn, and of all but chaos.
-
-    Terms are fitted cell by cell. What two walks of a sample share that differ in their tolerance only, is not chaos.
-    """
+    """Shares of the variance of Δx in each cell: of terms of what is drawn, and of what two tolerances share."""
     loose, tight = extremes(block)
     distance = at_rest(block)
     drawn = {name: at_rest(block, name).sel(loose) for name in block.columns if name.endswith(DRAWN)}
@@ -119,8 +103,6 @@ def explained(values: Array, terms: list[Array]) -> float:
     left = np.sum((values - design @ weights) ** 2) / (len(values) - rank)
     return float(1 - left / values.var(ddof=1))
 
-
-# --- loops at their release ---
 
 HEIGHT, ENERGY = "sprocket_height", "energy_kinetic_at_release"
 
@@ -155,8 +137,6 @@ def same_loops(block: Block) -> Numbers:
     return found | {"pairs": change.size}
 
 
-# --- links that pass through one another, and what else the paper leaves open ---
-
 REFERENCES = {
     "sprocket_radius_is": "contact",
     "circle_radius": 4.2e-3,
@@ -186,9 +166,6 @@ def left_open(*blocks: Block) -> Numbers:
     return found
 
 
-# --- from rest and after a long hold ---
-
-
 def rest_and_hold(block: Block) -> Numbers:
     """Differences of Δx between starts, and between holds, over the cells, with χ² of no difference at all."""
     table, holds = at_rest(block), block.axes["further_hold"]
@@ -208,8 +185,6 @@ def rest_and_hold(block: Block) -> Numbers:
         found[name] = {**effect.plain, **summary, "p": chi2.sf(over.chi2, len(over))}
     return found
 
-
-# --- further sentences ---
 
 FRICTION, DAMPING = 0.27, 1000.0  # Of the floor and of joints, in Table 1
 OWN_LENGTH = "links_of_12_7_mm"

@@ -73,10 +73,7 @@ def impacts(block: Block) -> tuple[dict[tuple[int, ...], list[Impact]], int]:
 
 
 def _speed(joints: Array, time: Array, place: int) -> float:
-    """Mean speed of the joints along the loop [m/s] from one frame to the next.
-
-    The mean of what each joint moves along the tangent half-way, in the frame of the centroid.
-    """
+    """Mean speed of the joints along the tangents half-way to the next frame, seen from the centroid [m/s]."""
     now, then = (joints[number] - joints[number].mean(axis=0) for number in (place, place + 1))
     middle = (now + then) / 2
     tangent = np.roll(middle, -1, axis=0) - np.roll(middle, 1, axis=0)

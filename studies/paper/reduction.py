@@ -75,10 +75,7 @@ def effects_of(result: SweepResult, block: Block, name: str, table: Cells) -> Nu
 
 
 def starts(block: Block) -> Numbers:
-    """Of each start means of Δx, bounces and losses, and the steps of Δx along both axes of the cells.
-
-    A loss is a share of the energy that a walk loses from its release to rest.
-    """
+    """Of each start means of Δx, bounces and shares of the losses of energy, and steps of Δx along both axes."""
     lost = {name: at_rest(block, name) for name in block.columns if name.startswith("loss_")}
     total = np.sum([values.values for values in lost.values()], axis=0)
     content: Numbers = {}

@@ -95,11 +95,7 @@ def plain(value: float) -> str:
 
 
 def paired(values: ArrayLike, reference: ArrayLike) -> Effect:
-    """Compare the same samples after and before a change, `reference`.
-
-    The sign is that of a t test of the mean difference; the interval of the ratio of the means follows from its
-    linearisation.
-    """
+    """Compare the same samples after and before a change by a t test; the interval is that of the linearised ratio."""
     both = np.asarray(np.isfinite(values) & np.isfinite(reference))
     after, before = (np.where(both, each, np.nan) for each in (values, reference))
     pairs = both.sum(axis=-1)

@@ -17,7 +17,7 @@ from studies.common import minus, table
 from studies.paper import figure5, findings, separations
 from studies.paper.findings import Numbers
 from studies.paper.further import EVENTS
-from studies.paper.statistics import Effect, percent, plain
+from studies.paper.statistics import percent, plain
 from studies.paper.verdicts import BOUNDS, Verdict
 from warpchain import Parameters
 
@@ -161,20 +161,15 @@ def effects(numbers: Numbers) -> str:
         first = SYMBOLS.get(name) or "{0.symbol} ({0.value:g})".format(Parameters.quantities()[name])
         for effect in content["values"]:
             counts = str(effect), effect.rises, effect.falls, plain(effect.cells.typical)
-            rows.append([first, effect.notes["value"], *counts, _extremes(effect, cells), effect.lost or ""])
+            ends, relative = [], np.where(effect.known, effect.relative, np.nan)
+            for place in (np.nanargmin(relative), np.nanargmax(relative)):
+                row, column = np.unravel_index(place, relative.shape)
+                at = f"{cells['links'][row]}, {cells['frequency'][column]:g} Hz"
+                ends.append(f"{percent(relative[row, column])} ({at})")
+            rows.append([first, effect.notes["value"], *counts, ", ".join(ends), effect.lost or ""])
             first = ""
     head = "quantity | value | Δx, mean of cells | rise | fall | typical | least and greatest cell | pairs lost"
     return table(head, rows, "s g s d d s s d")
-
-
-def _extremes(effect: Effect, cells: Mapping[str, list[float]]) -> str:
-    """The cells with the least and the greatest effect."""
-    relative, texts = np.where(effect.known, effect.relative, np.nan), []
-    for place in (np.nanargmin(relative), np.nanargmax(relative)):
-        row, column = np.unravel_index(place, relative.shape)
-        at = f"{cells['links'][row]}, {cells['frequency'][column]:g} Hz"
-        texts.append(f"{percent(relative[row, column])} ({at})")
-    return ", ".join(texts)
 
 
 def friction(numbers: Numbers) -> str:

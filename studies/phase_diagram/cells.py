@@ -58,7 +58,8 @@ def settings_of(result: SweepResult) -> str:
 
 def reduced(links: int, frequency: float, walks: Columns) -> dict[str, float]:
     """Statistics of one cell: a row of the file. NaN where there are too few walks."""
-    status, known = walks["status"], {name: _known(values) for name, values in walks.items()}
+    status = walks["status"]
+    known = {name: np.where(values == MISSING, np.nan, values) for name, values in walks.items()}
     rest = status == Status.AT_REST
     dx, codes = walks["dx"][rest].astype(float), endings(walks)[rest]
     attempts = (known["steps_accepted"] + known["steps_rejected"])[status != MISSING]
@@ -89,8 +90,3 @@ def places_in(cells: Columns, others: Columns) -> Array:
     """Where the rows of others have these cells."""
     places = {key: i for i, key in enumerate(zip(others["links"], others["frequency"], strict=True))}
     return np.array([places[key] for key in zip(cells["links"], cells["frequency"], strict=True)])
-
-
-def _known(values: Array) -> Array:
-    """As floats, NaN where a number is missing."""
-    return np.where(values == MISSING, np.nan, values)

@@ -94,9 +94,8 @@ def draw_endings(axes: Axes, grid: Grid, cells: Columns) -> None:
     axes.legend(handles=handles, fontsize="x-small", loc="upper center", bbox_to_anchor=(0.5, -0.16), frameon=False)
 
 
-def draw_laws(cells: Columns) -> Figure:
+def draw_laws(points: laws.Points) -> Figure:
     """Laws of Δx/(nℓ): cells coloured by links, and master curves; where the last one fails."""
-    points = laws.points_of(cells)
     figure = Figure(figsize=(11, 8.2), layout="constrained")
     grid, y = list(figure.subplots(2, 2).flat), points.lengths
     variables = {

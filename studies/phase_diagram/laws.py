@@ -6,7 +6,6 @@ residual of the law, in per cent of Δx.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -14,6 +13,8 @@ from scipy.optimize import minimize, minimize_scalar
 
 from studies.common import Array, Columns
 from warpchain import preset
+
+Points = np.recarray
 
 PARAMETERS = preset("soft")
 LINK_LENGTH = PARAMETERS.link_length
@@ -32,50 +33,22 @@ def in_papers_range(links: Array, frequency: Array) -> Array:
     return (links >= 60) & (links <= 180) & (frequency >= 5) & (frequency <= 30)
 
 
-@dataclass(frozen=True)
-class Points:
-    """Cells as the laws take them, shape (cells,) each: links, frequency [Hz], mean Δx [m], walking time [s]."""
-
-    links: Array
-    frequency: Array
-    distance: Array
-    duration: Array
-
-    def __getitem__(self, chosen: Array) -> "Points":
-        """Some of the cells."""
-        return Points(*(values[chosen] for values in vars(self).values()))
-
-    @property
-    def speed(self) -> Array:
-        """Speed of the loop [m/s]."""
-        return 2 * np.pi * RADIUS * self.frequency
-
-    @property
-    def length(self) -> Array:
-        """Length of the chain nℓ [m]."""
-        return self.links * LINK_LENGTH
-
-    @property
-    def turns(self) -> Array:
-        """Of the loop per second, v/(nℓ) [1/s]."""
-        return self.speed / self.length
-
-    @property
-    def lengths(self) -> Array:
-        """Δx/(nℓ)."""
-        return self.distance / self.length
-
-    @property
-    def height(self) -> Array:
-        """Height H of the loop that hangs on the sprocket [m]: straight sides and two half circles."""
-        return 2 * RADIUS + np.maximum(self.length / 2 - np.pi * RADIUS, 0.0)
-
-
 def points_of(cells: Columns) -> Points:
-    """The cells that have a mean, and few enough failures."""
+    """The cells that have a mean, and few enough failures, as the laws take them, shape (cells,).
+
+    Fields are links, frequency [Hz], the mean distance Δx [m] and duration [s] of walks; speed [m/s] of the loop,
+    length nℓ [m] of the chain, turns of the loop per second v/(nℓ), Δx/(nℓ) as lengths, and the height H [m] of the
+    loop that hangs on the sprocket, straight sides and two half circles.
+    """
     failed = cells["walks"] - cells["at_rest"]
     used = (cells["at_rest"] > 0) & (failed <= MOST_FAILED * cells["walks"]) & (cells["dx_mean"] > 0)
-    return Points(*(cells[name][used] for name in ("links", "frequency", "dx_mean", "walk_time_mean")))
+    links, frequency, distance, duration = (
+        cells[name][used] for name in ("links", "frequency", "dx_mean", "walk_time_mean")
+    )
+    speed, length = 2 * np.pi * RADIUS * frequency, links * LINK_LENGTH
+    height = 2 * RADIUS + np.maximum(length / 2 - np.pi * RADIUS, 0.0)
+    columns = links, frequency, distance, duration, speed, length, speed / length, distance / length, height
+    return np.rec.fromarrays(columns, names="links,frequency,distance,duration,speed,length,turns,lengths,height")
 
 
 def master_curve(x: Array, y: Array) -> Callable[[Array], Array]:

@@ -106,12 +106,12 @@ def make(
     if meetings:
         write_rows(strands.CSV, strands.reduced([warpchain.load(path) for path in meetings]))
     found, met, varied = read_columns(cells.CSV), read_columns(strands.CSV), scales.Cells()
-    curve = scales.Curve(found)
+    points = laws.points_of(found)
     tables = {
         "cells": table_of_cells(found),
         "failures": table_of_failures(found),
         "endings": table_of_endings(found),
-        "scales": scales.table(varied, curve),
+        "scales": scales.table(varied, points),
         "candidates": candidates.table(found, varied),
         "walking time": candidates.walking_time(found),
         "strands": strands.shares(met),
@@ -119,8 +119,8 @@ def make(
         "ways with strands": strands.ways(met),
         "against the million": strands.against_million(met, found),
     }
-    figures = {"maps": drawing.draw_maps(found), "laws": drawing.draw_laws(found), "scales": scales.draw(varied, curve)}
-    publish(FOLDER, tables, figures)
+    figures = {"maps": drawing.draw_maps(found), "laws": drawing.draw_laws(points)}
+    publish(FOLDER, tables, figures | {"scales": scales.draw(varied, points)})
 
 
 if __name__ == "__main__":

@@ -54,10 +54,7 @@ def reduced(parts: Sequence[SweepResult]) -> Iterator[dict[str, float | str]]:
 
 
 def _early(dx: Array, early: Array, terms: Sequence[Array]) -> dict[str, float]:
-    """Δx of walks with an early meeting over that of the others, less 1: as it is, and with what is drawn held.
-
-    The error takes no equal scatter of both for granted (HC3).
-    """
+    """Δx of walks with an early meeting over that of the others, less 1: as it is, and with draws held (HC3)."""
     found = {"early": int(early.sum()), "raw": np.nan, "held": np.nan, "held_se": np.nan}
     if min(early.sum(), (~early).sum()) < FEW:
         return found

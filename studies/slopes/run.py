@@ -19,10 +19,7 @@ def share_without_end(block: Block) -> Array:
 
 
 def rows(block: Block) -> str:
-    """Markdown, a line for each cell: its axes, Δx, share and speed along the floor of walks without end, collapse.
-
-    The time of the collapse is the mean over the walks in which it came.
-    """
+    """Of each cell Δx, share and speed along the floor of walks without end, and when it collapsed, if it did."""
     cells, share, collapse = block.statistics(), share_without_end(block), block.columns["collapsed_at"]
     endless = block.columns["status"] == warpchain.Status.DISTANCE_LIMIT
     speed = common.mean_where(endless, LIMIT / block.columns["walk_time"])

@@ -152,10 +152,11 @@ def _waves(parameters: Parameters, phases: Array, factors: Factors) -> Waves:
         product[:, 4] -= coupling**2 * weight
         return product
 
-    rates = _by_frequency(_roots(quartic(phases, 0.0)))
+    rates, orders = _by_frequency(_roots(quartic(phases, 0.0))), np.array(list(permutations(range(4))))
     for friction in parameters.viscous_friction * np.linspace(0.0, 1.0, FRICTION_STEPS + 1)[1:]:
-        rates = _matched(rates, _roots(quartic(phases, friction)))
-    friction = parameters.viscous_friction
+        found = _roots(quartic(phases, friction))
+        nearest = np.abs(found[:, orders] - rates[:, None, :]).sum(axis=2).argmin(axis=1)
+        rates = np.take_along_axis(found, orders[nearest], axis=1)
     ahead, behind = (quartic(phases + step, friction) for step in (PHASE_STEP, -PHASE_STEP))
     powers = rates[:, :, None] ** np.arange(5)
     by_phase = np.einsum("kp,krp->kr", (ahead - behind) / (2 * PHASE_STEP), powers)
@@ -180,10 +181,3 @@ def _roots(coefficients: Array) -> Array:
     companion = np.tile(np.eye(degree, k=-1, dtype=np.complex128), (len(scaled), 1, 1))
     companion[:, :, -1] = -scaled[:, :-1] / scaled[:, -1:]
     return scale * np.linalg.eigvals(companion)
-
-
-def _matched(before: Array, after: Array) -> Array:
-    """The roots `after`, each row in the order in which they are nearest to those `before`."""
-    orders = np.array(list(permutations(range(before.shape[1]))))
-    apart = np.abs(after[:, orders] - before[:, None, :]).sum(axis=2)
-    return np.take_along_axis(after, orders[np.argmin(apart, axis=1)], axis=1)

@@ -48,10 +48,8 @@ def changes(when: str, rate: float, seeds: str = "both") -> tuple[Array, Array]:
 
 def changes_table(drags: Sequence[tuple[str, float]]) -> str:
     """What some drags change in each cell."""
-    known = [changes(*drag) for drag in drags]
-    lines = []
-    for i, (links, frequency) in enumerate(CELLS):
-        lines.append([f"{links}, {frequency:g}", *(f"{values[i]:+.1f} ± {errors[i]:.1f}" for values, errors in known)])
+    known = [[f"{value:+.1f} ± {error:.1f}" for value, error in zip(*changes(*drag), strict=True)] for drag in drags]
+    lines = zip((f"{links}, {frequency:g}" for links, frequency in CELLS), *known, strict=True)
     return common.minus(common.table(["links, Hz", *(f"{rate:g}/s {when}" for when, rate in drags)], lines))
 
 

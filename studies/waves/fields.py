@@ -101,11 +101,6 @@ def in_room(values: Array, below: Array, points: int) -> Array:
     return (1 - share) * values[row, first] + share * values[row, (first + 1) % links]
 
 
-def floor_contacts(joints: Array, radius: float) -> Array:
-    """Whether the circles of a joint are at the floor y = 0, at most `NEAR` of their radius [m] above; shape (f, n)."""
-    return joints[..., 1] <= (1 + NEAR) * radius
-
-
 def self_contacts(joints: Array, radius: float) -> Array:
     """Whether a joint's circles are at most `NEAR` of their diameter from those of one that is no neighbour, (f, n)."""
     touching = np.zeros(joints.shape[:2], dtype=np.bool_)

@@ -43,14 +43,9 @@ _LOOKS: dict[Colour, _Look] = {
 def waves_figure(walk: WalkResult, *, colour: Colour = "curvature", window: tuple[float, float] = (0.0, 0.3)) -> Figure:
     """Space–time picture of a walk: waves along the chain, above in its own frame, below in that of the room.
 
-    Above, places are joints, which move with the chain; below, places are distances along the loop from the point below
-    the centre of mass. Contacts are marked: joints at the floor, and joints that touch others. Lines are
-    characteristics, along which small waves run at ±c relative to the chain; they start where each of the first impacts
-    begins, and where it ends.
-
-    The walk has a fixed plane and joint forces, in frames in which a wave runs at most half a link. Colours show the
-    `curvature` [1/m], positive where the chain bends as its loop, or the `velocity` of the joints across the chain,
-    outwards, relative to the centre of mass [m/s]; the window is of times since the release [s].
+    README.md says what lines and places mean. The walk has a fixed plane and joint forces, in frames in which a wave
+    runs at most half a link. Colours show the `curvature` [1/m], positive where the chain bends as its loop, or the
+    `velocity` of the joints across the chain, outwards, relative to the centre of mass [m/s].
     """
     if not len(walk.frame_forces):
         raise ValueError("walk: its joint forces were not recorded; run it again with record_loads")
@@ -62,7 +57,8 @@ def waves_figure(walk: WalkResult, *, colour: Colour = "curvature", window: tupl
     below = fields.joints_below(joints, masses)
     velocity = colour == "velocity"
     values = fields.normal_velocities(time, joints, masses) if velocity else fields.curvatures(joints, link)
-    floor, touch = (find(joints, parameters.circle_radius) for find in (fields.floor_contacts, fields.self_contacts))
+    floor = joints[..., 1] <= (1 + fields.NEAR) * parameters.circle_radius
+    touch = fields.self_contacts(joints, parameters.circle_radius)
     still, moved = (fields.bin_means(each, MOST_COLUMNS) for each in (values, fields.in_room(values, below, 2 * links)))
     low, high = np.percentile(still, SHARE)
     if velocity:

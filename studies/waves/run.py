@@ -16,12 +16,6 @@ MODES = (2, 3, 4, 5, 6, 8, 10)  # Numbers of waves around the loop
 RATIOS = np.arange(0.05, 1.51, 0.01)  # Speeds that are tried, as multiples of c
 
 
-def recorded(links: int, frequency: float) -> warpchain.WalkResult:
-    """The first 0.35 s of a walk of soft joints, with joint forces in frames 0.1 ms apart."""
-    scene = {"links": links, "frequency": frequency, "start": "spinning", "walk_limit": 0.35}
-    return warpchain.walk(preset="soft", **scene, record_loads=True, record_before=0.0, frame_interval=1e-4)
-
-
 def print_speeds(walk: warpchain.WalkResult, begin: float, end: float) -> None:
     """Speeds of waves by their number around the loop, and the part of the variance that has this speed."""
     parameters, scene, time, joints = walk.setup.parameters, walk.setup.scene, walk.frame_time, walk.frame_joints
@@ -47,7 +41,8 @@ def main() -> None:
     """Print all tables and draw the figures."""
     rings.main()
     for number, (links, frequency, begin, end) in enumerate(WALKS):
-        walk = recorded(links, frequency)
+        scene = {"links": links, "frequency": frequency, "start": "spinning", "walk_limit": 0.35}
+        walk = warpchain.walk(preset="soft", **scene, record_loads=True, record_before=0.0, frame_interval=1e-4)
         if number == 0:
             publish(FOLDER, {}, {"picture": waves_figure(walk, window=(0.0, 0.25))}, dpi=90)
         print_speeds(walk, begin, end)
