@@ -9,18 +9,15 @@ import numpy as np
 import warpchain
 from studies.common import Array, OverCells, of_cells, run_study
 
-LENGTHS = ("penetration_floor", "penetration_self", "penetration_sprocket", "greatest_opening")
-
 
 def cells(sweep: warpchain.SweepResult, column: str) -> dict[str, Array]:
     """Values (samples,) of a column, by block and cell."""
-    return {
-        ", ".join([name, *(f"{axis} {value:g}" for axis, value in at.items())]): np.asarray(
-            block.columns[column][place], dtype=np.float64
-        )
-        for name, block in sweep.blocks.items()
-        for place, at in of_cells(block)
-    }
+    found = {}
+    for name, block in sweep.blocks.items():
+        for place, at in of_cells(block):
+            cell = ", ".join([name, *(f"{axis} {value:g}" for axis, value in at.items())])
+            found[cell] = block.columns[column][place].astype(float)
+    return found
 
 
 def together(sweep: warpchain.SweepResult, column: str) -> Array:
@@ -31,7 +28,7 @@ def together(sweep: warpchain.SweepResult, column: str) -> Array:
 def describe(sweep: warpchain.SweepResult) -> None:
     """Print depths, openings, errors of the energy and steps of all walks of a sweep."""
     print(sweep.name)
-    for column in LENGTHS:
+    for column in ("penetration_floor", "penetration_self", "penetration_sprocket", "greatest_opening"):
         middle, high, greatest = 1e3 * np.nanpercentile(together(sweep, column), [50, 99, 100])
         print(f"  {column}: median {middle:.2f}, 99th percentile {high:.2f}, greatest {greatest:.2f} mm")
     high, higher = np.nanpercentile(np.abs(together(sweep, "energy_error")), [95, 99])

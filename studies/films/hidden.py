@@ -30,7 +30,6 @@ def main() -> None:
         scene = {"links": 60, "frequency": frequency, "start": "spinning", "walk_limit": 0.45, "phase": 0.3}
         walk = warpchain.walk(preset="soft", **scene, **CHAIN)
         film = films.film_of(walk, None).seen(camera, errors, random)
-        assert film.outline is not None and film.speed is not None
         delay, mm = 0.35 + random.uniform(0, 0.1), 1e3
         places = zip(film.time + delay, *(mm * film.center.T), strict=True)
         rows = (f"{t:.6E}\t{x:.4E}\t{y:.4E}\t" for t, x, y in places)

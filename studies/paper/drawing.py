@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from studies.common import BLUE, DASHES, DISTANCE, FAINT, FREQUENCY, GREEN, INK, LINE_COLORS, RED, tidy
-from studies.paper.findings import Numbers, of_start
-from studies.paper.findings import effects as effects_of
+from studies.paper import findings
+from studies.paper.findings import Numbers
 from studies.paper.impacts import impacts
 from studies.paper.statistics import Effect
 from warpchain import Parameters, SweepResult
@@ -51,7 +51,7 @@ def distances(numbers: Numbers) -> Figure:
     figure, panels = panels_of_links(numbers, x, DISTANCE)
     for start, color, shift, label in (("rest", RED, -0.7, "at rest"), ("ellipse", GREEN, 0.7, "as an ellipse")):
         x = np.array(frequencies) + shift
-        tables = (of_start(numbers, start, name) for name in ("mean", "sd"))
+        tables = (findings.of_start(numbers, start, name) for name in ("mean", "sd"))
         for axes, mean, sd in zip(panels, *tables, strict=True):
             axes.vlines(x, mean - 2 * sd, mean + 2 * sd, color=color, linewidth=1)
             axes.bar(x, 2 * sd, 1.2, mean - sd, color=color, alpha=0.3, linewidth=0)
@@ -64,7 +64,7 @@ def distances(numbers: Numbers) -> Figure:
 
 def effects(numbers: Numbers) -> Figure:
     """What each value of each quantity does to Δx: a dot for every cell, the mean over the cells with its interval."""
-    known = {name: found["values"] for name, found in effects_of(numbers).items() if name != "start"}
+    known = {name: found["values"] for name, found in findings.effects(numbers).items() if name != "start"}
     names, heights = list(known), np.cumsum([len(found) + 0.5 for found in known.values()])
     half = int(np.argmax(heights > heights[-1] / 2 - 1.5))
     columns, longest = (names[: half + 1], names[half + 1 :]), max(heights[half], heights[-1] - heights[half])

@@ -40,10 +40,8 @@ def shape(links: int, frequency: float) -> dict[str, object]:
 
 def figure5_table() -> str:
     """The numbers of all walks, in Markdown."""
-    head = (
-        *("cell", "bounces", "times it rises between them", "share of the changes of v_x in impacts"),
-        *("greatest v_x / m/s", "greatest backward v_x over it", "time from collapse to rest, over the walk's"),
-    )
+    head = "cell | bounces | times it rises between them | share of the changes of v_x in impacts"
+    head += " | greatest v_x / m/s | greatest backward v_x over it | time from collapse to rest, over the walk's"
     walks = zip(*read_columns(RESULTS).values(), strict=True)
     rows = ((f"{links:g} × {frequency:g} Hz", *numbers) for links, frequency, *numbers in walks)
     return table(head, rows, "s g g .3f .3g .3f .2f")

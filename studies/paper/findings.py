@@ -15,18 +15,13 @@ from studies.paper.figure5 import RESULTS as FIGURE5
 from studies.paper.statistics import Effect, percent, plain
 from studies.paper.verdicts import BOUNDS, Verdict, direction, share, together
 from studies.waves import directions, doses
+from warpchain import Parameters
 
 Numbers = Mapping[str, Any]
 Found = tuple[Verdict, Mapping[str, object]]
 Check = Callable[[Numbers], Found]
 
 LONG = 150  # Chains of so many links or more are those that the paper's start from rest underestimates
-SYMBOLS = {
-    **{"joint_stiffness": "k", "joint_damping": "b", "friction_smoothing": "ω_c", "tangential_restitution": "e_t"},
-    **{"sprocket_restitution": "e_sc", "sprocket_friction": "μ_sc", "floor_restitution": "e_fc"},
-    **{"inner_mass": "m_inner", "outer_mass": "m_outer", "inner_inertia": "I_inner", "outer_inertia": "I_outer"},
-}
-"""Of quantities whose effects are claimed to be small."""
 
 
 def of_start(numbers: Numbers, start: str, name: str) -> Any:
@@ -241,7 +236,8 @@ def small(kind_and_names: str) -> Check:
         widths = np.concatenate([effect.half_width[effect.known] for effect in every])
         above, inside = int(np.sum(sizes - widths > bound)), int(np.sum(sizes + widths <= bound))
         words = {"bound": 100 * bound, "above": above, "inside": inside, "total": len(sizes)}
-        words["worst"] = ", ".join(f"{SYMBOLS[name]} {effect}" for name, effect in greatest.items())
+        symbols = {name: quantity.symbol for name, quantity in Parameters.quantities().items()}
+        words["worst"] = ", ".join(f"{symbols[name]} {effect}" for name, effect in greatest.items())
         return share(len(sizes) - above, len(sizes)), words
 
     return check

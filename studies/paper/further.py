@@ -138,6 +138,7 @@ def same_loops(block: Block) -> Numbers:
 
 
 REFERENCES = {
+    "start": "rest",
     "sprocket_radius_is": "contact",
     "circle_radius": 4.2e-3,
     "clearance": 0.01,
@@ -145,7 +146,7 @@ REFERENCES = {
     "phase": 0.0,
     "ellipse_aspect": 1.5,
 }
-"""What is chosen here."""
+"""What is chosen where walks are not told otherwise."""
 
 
 def through(block: Block) -> Numbers:

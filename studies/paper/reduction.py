@@ -19,7 +19,6 @@ from studies.paper.statistics import Effect, paired, spread, unpaired
 from warpchain import InputError, Parameters, SweepResult, preset
 
 DIGITS = 4  # Significant digits that are kept
-DEFAULTS = {"clearance": 0.01, "phase": 0.0, "start": "rest"}  # Of walks that are not told otherwise, in SI units
 
 
 def reduced(result: SweepResult) -> Numbers:
@@ -68,7 +67,7 @@ def effects_of(result: SweepResult, block: Block, name: str, table: Cells) -> Nu
         given = next(each for each in result.sweep["blocks"] if each["name"] == block.name)
         reference: Any = float(getattr(preset(given["preset"]), name))
     else:
-        reference = DEFAULTS[name]
+        reference = further.REFERENCES[name]
     if reference not in (values := block.axes[name].tolist()):
         raise InputError(f"{name}: {reference} is not among {values}; give a sweep that has it")
     return {"reference": reference, "values": values_of(table, name, reference)}

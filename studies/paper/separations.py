@@ -19,7 +19,6 @@ RESULTS = Path(__file__).parent / "results" / "separations.csv"
 LINKS = (60, 90, 120, 150, 180)
 FREQUENCIES = (10.0, 15.0, 20.0, 25.0, 30.0)
 RELEASES = ((0.0, 0.008), (0.4, 0.0096))  # Phase and clearance [m]
-AROUND = 4
 HIGH = 0.04  # Height above the lowest joint [m] from which a touch is not one on the floor
 BINS = ((2, 3), (4, 8), (9, 12), (13, 16), (17, 21), (22, 28), (29, 35), (36, 90))
 LEAST = (2, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 30, 40)  # Values of m
@@ -39,7 +38,7 @@ def touches(walk: warpchain.WalkResult) -> Iterator[tuple[float, int, float]]:
         now = (cdist(joints, joints, "sqeuclidean") < reach**2) & (apart >= 2)
         for i, j in zip(*np.nonzero(np.triu(now & ~old)), strict=True):
             yield float(time / end), int(apart[i, j]), float(max(y[i], y[j]) - y.min())
-        old |= maximum_filter(now, 2 * AROUND + 1, mode="wrap")
+        old |= maximum_filter(now, 9, mode="wrap")  # 4 links around
 
 
 def main() -> None:

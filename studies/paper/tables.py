@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -257,10 +258,9 @@ def nonlinear(numbers: Numbers) -> str:
     """What explains the variance of Δx in a cell, by start."""
     content, rows = numbers["paper_footnote"], []
     for start, found in content["nonlinear"].items():
-        for i, links in enumerate(content["cells"]["links"]):
-            for j, frequency in enumerate(content["cells"]["frequency"]):
-                shares = (max(0.0, found[name][i][j]) for name in ("linear", "squares", "products", "repeated"))
-                rows.append([start, f"{links} × {frequency:g} Hz", *(f"{100 * share:.0f} %" for share in shares)])
+        for (i, links), (j, frequency) in product(*(enumerate(axis) for axis in content["cells"].values())):
+            shares = (max(0.0, found[name][i, j]) for name in ("linear", "squares", "products", "repeated"))
+            rows.append([start, f"{links} × {frequency:g} Hz", *(f"{100 * share:.0f} %" for share in shares)])
     return table("start | cell | linear terms | and squares, turning phase | and products | all but chaos", rows)
 
 

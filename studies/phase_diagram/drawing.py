@@ -12,16 +12,9 @@ from matplotlib.ticker import LogLocator
 
 from studies.common import GROUND, INK, RED, Array, Columns, tidy
 from studies.phase_diagram import laws
-from studies.phase_diagram.endings import Ending
+from studies.phase_diagram.cells import WAYS
 
-COLORS = {
-    Ending.KEPT: "#999999",
-    Ending.IN_FLIGHT: "#CC79A7",
-    Ending.FIRST: "#000000",
-    Ending.SECOND: "#0072B2",
-    Ending.LATER: "#56B4E9",
-}
-"""Of the ways of ending; those of Okabe and Ito."""
+COLORS = dict(zip(WAYS, ("#999999", "#CC79A7", "#000000", "#0072B2", "#56B4E9"), strict=True))  # Of Okabe and Ito
 
 
 class Grid:
@@ -84,13 +77,12 @@ def draw_failed(axes: Axes, share: Array, color: str = RED, rim: str = "white") 
 
 def draw_endings(axes: Axes, grid: Grid, cells: Columns) -> None:
     """The most frequent ending of each cell; the paler, the smaller its share. The legend is below."""
-    ways = list(COLORS)
-    counts = np.stack([cells[way.label] for way in ways], axis=1)
+    counts = np.stack([cells[way.label] for way in WAYS], axis=1)
     total, most = counts.sum(axis=1), counts.argmax(axis=1)
     share = counts.max(axis=1) / np.maximum(total, 1)
-    colors = 1 - share[:, None] * (1 - np.array([to_rgb(COLORS[ways[index]]) for index in most]))
+    colors = 1 - share[:, None] * (1 - np.array([to_rgb(COLORS[WAYS[index]]) for index in most]))
     grid.map(axes, np.column_stack([colors, total > 0]), "how the loop was lost; paler: a smaller share")
-    handles = [Patch(color=COLORS[ways[k]], label=ways[k].meaning) for k in np.unique(most[total > 0])]
+    handles = [Patch(color=COLORS[WAYS[k]], label=WAYS[k].meaning) for k in np.unique(most[total > 0])]
     axes.legend(handles=handles, fontsize="x-small", loc="upper center", bbox_to_anchor=(0.5, -0.16), frameon=False)
 
 

@@ -34,11 +34,8 @@ MeanLoop = Any  # What `walk.mean_loop()` returns
 
 SMOOTHINGS = (300.0, 100.0, 30.0, 10.0, 3.0, 1.0)  # Smoothings ω_c [rad/s] before that of the chain
 LEAST_SMOOTHING = 0.3  # Least smoothing ω_c [rad/s]
-TOLERANCE = 1e-4  # Relative tolerance of the solver
-MOST_NODES = 20_000  # Greatest number of nodes of the solver
 POINTS = 801  # Number of points of a theoretical loop
 IN_LINKS = 1.0  # Theory ends this many links inside of the free part: averages near it include links that touch
-
 EDGE = 4.0  # Links at either end of the free part that balances leave out: averages there include links on the sprocket
 
 
@@ -111,7 +108,7 @@ def predict(loop: MeanLoop, values: Mapping[str, float] | None = None) -> Theore
 
     least = max(p.friction_smoothing, LEAST_SMOOTHING)
     for smoothing in (*(each for each in SMOOTHINGS if each > least and p.coulomb_friction > 0), least):
-        found = solve_bvp(partial(slope, smoothing), conditions, share, values, tol=TOLERANCE, max_nodes=MOST_NODES)
+        found = solve_bvp(partial(slope, smoothing), conditions, share, values, tol=1e-4, max_nodes=20_000)
         if not found.success:
             reason = found.message.lower().rstrip(".")
             raise NoSolutionError(f"the boundary value problem was not solved ({reason})")

@@ -16,8 +16,8 @@ from studies.waves import dispersion
 from studies.waves.dispersion import LOWER_BACKWARD, LOWER_FORWARD, UPPER_BACKWARD, UPPER_FORWARD, Waves
 from warpchain import Parameters, preset
 
-CHAIN = preset("soft").with_values({"coulomb_friction": 0.0})  # Table 1's, its joints softened
-SMOOTH = CHAIN.with_values({"viscous_friction": CHAIN.viscous_friction / 100})  # A hundredth
+CHAIN = preset("soft").with_values({"coulomb_friction": 0.0})  # Joints softened, Coulomb friction left out
+SMOOTH = CHAIN.with_values({"viscous_friction": CHAIN.viscous_friction / 100})  # With a hundredth of β
 LENGTH = CHAIN.link_length
 DENSITY = (CHAIN.inner_mass + CHAIN.outer_mass) / 2 / LENGTH
 LINKS = 60

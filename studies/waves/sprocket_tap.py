@@ -12,21 +12,18 @@ from studies.waves.fields import curvatures, in_room, joints_below, normal_veloc
 from studies.waves.wave_drag import inertia_of
 
 LINKS = 120
-FREQUENCIES = (15.0, 20.0, 25.0)
-DIP = 0.008
-INTERVAL = 2.5e-4
 TOUCHING = 1e-4  # Height of the lowest circle above the floor that it touches, at most [m]
 LATER = np.arange(0.012, 0.027, 0.001)  # Times after the first touch [s]: after the tap, before the sprocket is reached
 SPAN = 7  # So many of these times next to one another give a speed
 
 
 def dipping(frequency: float, clearance: float) -> warpchain.WalkResult:
-    """A loop of `LINKS` on a sprocket that dips within 0.06 s and stays for 0.12 s more."""
+    """A loop of `LINKS` on a sprocket that dips by 8 mm within 0.06 s and stays for 0.12 s more."""
     shares = np.linspace(0, 1, 13)[1:]
-    dip = [[0.05 + 0.06 * s, 0, -DIP * np.sin(np.pi * s) ** 2, frequency] for s in shares.tolist()]
+    dip = [[0.05 + 0.06 * s, 0, -0.008 * np.sin(np.pi * s) ** 2, frequency] for s in shares.tolist()]
     scene = {"links": LINKS, "frequency": frequency, "start": "spinning", "further_hold": 4, "clearance": clearance}
     release = [[0.05, 0, 0, frequency], *dip, [0.22, 0, 0, frequency]]
-    return warpchain.walk(preset="soft", **scene, release=release, walk_until=0.2, frame_interval=INTERVAL)
+    return warpchain.walk(preset="soft", **scene, release=release, walk_until=0.2, frame_interval=2.5e-4)
 
 
 def found(frequency: float) -> list[str]:
@@ -68,7 +65,7 @@ def found(frequency: float) -> list[str]:
 def main() -> None:
     """Print the table."""
     head = ("", "v / (m/s)", "touch / ms", "slow: place / cm", "fast: front", "energy across, on the other side")
-    print(table(head, map(found, FREQUENCIES)))
+    print(table(head, map(found, (15.0, 20.0, 25.0))))
 
 
 if __name__ == "__main__":
