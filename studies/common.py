@@ -185,10 +185,10 @@ def with_tables(text: str, tables: Mapping[str, str]) -> str:
     """A page with these tables between its markers ``<!-- NAME -->`` and ``<!-- end of NAME -->``."""
     for name, table in tables.items():
         begin, end = f"<!-- {name} -->", f"<!-- end of {name} -->"
-        if text.count(begin) != 1 or text.count(end) != 1:
+        before, *rest = re.split(f"{re.escape(begin)}.*?{re.escape(end)}", text, flags=re.DOTALL)
+        if len(rest) != 1:
             raise ValueError(f"the page needs {begin} and {end} once each")
-        before, rest = text.split(begin)
-        text = f"{before}{begin}\n\n{table}\n\n{end}{rest.split(end)[1]}"
+        text = f"{before}{begin}\n\n{table}\n\n{end}{rest[0]}"
     return text
 
 

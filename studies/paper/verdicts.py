@@ -50,7 +50,5 @@ def share(fulfilled: int, cases: int) -> Verdict:
 
 def together(*verdicts: Verdict) -> Verdict:
     """Verdict on a claim of several parts: theirs if they are the same, else in part."""
-    kinds = set(verdicts) - {Verdict.OPEN}
-    if not kinds:
-        return Verdict.OPEN
+    kinds = {*verdicts} - {Verdict.OPEN} or {Verdict.OPEN}
     return kinds.pop() if len(kinds) == 1 else Verdict.PART

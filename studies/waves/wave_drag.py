@@ -30,8 +30,7 @@ def inertia_of(links: int, parameters: Parameters) -> Array:
 
 def distances(chains: Chains, inertia: Array) -> Array:
     """Δx [m] of chains, NaN of one that did not come to rest; `inertia` (W, n, 3) as of `wave_motion`."""
-    mass = inertia[..., 0]
-    dx: Array = np.sum(mass * chains.motions()[0][..., 0], axis=1) / mass.sum(axis=1)
+    dx = np.average(chains.motions()[0][..., 0], axis=1, weights=inertia[..., 0])
     return np.where(chains.status == Status.AT_REST, dx, np.nan)
 
 
