@@ -102,11 +102,8 @@ def main(banks: Path) -> None:
     """Calibrate, compare, draw."""
     bank, long = (load(banks / f"{name}_main.npz") for name in ("film_bank", "film_bank_90"))
     same = load(banks / "film_truths_same.npz")
-    others = {
-        "e_t = 0.3": load(banks / "film_truths_tangential.npz"),
-        "links 5 % heavier": load(banks / "film_truths_heavier.npz"),
-        "paper's joints": load(banks / "film_truths_paper_main.npz"),
-    }
+    blocks = {"e_t = 0.3": "tangential", "links 5 % heavier": "heavier", "paper's joints": "paper_main"}
+    others = {kind: load(banks / f"film_truths_{block}.npz") for kind, block in blocks.items()}
 
     def cells_of(found: Calibration) -> tuple[str, ...]:
         return *calibration_rows(found), percent(found.refused)

@@ -1,7 +1,7 @@
-"""Ways in which walks end: where and when the loop was lost, from the columns of a sweep.
+"""Ways in which walks end, from the columns of a sweep: every walk that is at rest has one.
 
-Every walk that is at rest has one ending. Its loop collapses when it first encloses less than half of its area at the
-release; `bounces_before_collapse` says in which bounce, counted from 1.
+Its loop collapses when it first encloses less than half of its area at the release; `bounces_before_collapse` says in
+which bounce, counted from 1.
 """
 
 from enum import IntEnum

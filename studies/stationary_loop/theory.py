@@ -1,7 +1,6 @@
 """The theory of the free part of a stationary loop: its balances as a boundary value problem.
 
-With the signs of `walk.mean_loop()`, p = κ' and M = f(ℓ v p), where f(w) = β w + τ_c
-tanh(w/ω_c):
+With the signs of `walk.mean_loop()`, p = κ' and M = f(ℓ v p), where f(w) = β w + τ_c tanh(w/ω_c):
 
     x' = −cos φ    y' = sin φ    φ' = κ    κ' = p    T_e' = N κ + ρ g sin φ    N' = ρ g cos φ − T_e κ
     p' = (j v² p − N) / (ℓ v f'(ℓ v p))

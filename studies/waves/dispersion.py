@@ -1,11 +1,8 @@
 """Waves along a chain: the straight one under tension and the ring that circulates without gravity.
 
 Joints are closed and friction is viscous. Small changes of the links' angles ϑ_j ∝ exp(iκj + λt) have the phase κ per
-link and the rate λ = −γ − iω: ω > 0 runs towards greater j. Inner links have m̄ + μ and Ī + δ, outer ones m̄ − μ and
-Ī − δ. They couple the wave of phase κ with that of phase κ + π: two bands in 0 < κ ≤ π/2.
-
-README.md derives what is solved here: A(λ) B(λ) = h² λ⁴ with h = δ − ¼ μℓ², and A, B of the straight chain and of the
-ring; a single band, A = 0, if h = 0; and the continuous ring.
+link and the rate λ = −γ − iω: ω > 0 runs towards greater j. README.md derives what is solved here: A(λ) B(λ) = h² λ⁴
+with h = δ − ¼ μℓ², and A, B of the straight chain and of the ring, two bands in 0 < κ ≤ π/2; and the continuous ring.
 
 Coulomb friction is left out: it is not linear. `equivalent_friction` replaces it in joints that only swing. Joints that
 keep their sense of rotation, because the loop bends there, do not feel it in small waves.

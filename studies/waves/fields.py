@@ -1,13 +1,11 @@
 """Waves along a chain, computed from its frames: tension, curvature, velocity, contacts, characteristics.
 
 Joint i ends link i. The number of a joint names the same piece of chain at all times: it is the place in the chain's
-own frame, in which long transverse waves run at ±c, c = √(Tℓ/m̄), with the tension T and the mean link mass m̄. The
-chain itself runs along its loop at the speed v, and v ≈ c because the tension bends the path of the links. In the frame
-of the room one of the two waves hence hardly moves, and the other one runs twice as fast as the chain.
+own frame, in which long transverse waves run at ±c, c = √(Tℓ/m̄), with the tension T and the mean link mass m̄.
 
 Functions take the `time` of f frames [s], shape (f,), `joints`, their x, y [m], shape (f, n, 2), and the `masses` of n
-links [kg]. Contacts are taken from the frames: a joint touches if its circle is not farther than a tolerance from the
-floor, or from the circle of a joint that is no neighbour. Inside, vectors are complex numbers x + iy.
+links [kg]. A joint touches if its circle is not farther than a tolerance from the floor, or from the circle of a joint
+that is no neighbour. Inside, vectors are complex numbers x + iy.
 """
 
 import numpy as np

@@ -1,12 +1,9 @@
 """A drag on the waves of a free loop that leaves its momenta and its run along itself.
 
 A loop that runs along itself, however fast, has no velocity across its path, seen from its centre of mass. A wave has:
-it moves the path. (So does a path that turns as a whole.) Of the two waves that a push starts, the fast one, which runs
-at about twice the links' speed in the room, has twice the velocity across that it has in the frame of the links; the
-slow one nearly stands still in the room and has nearly none. So a drag on the velocity across the path takes the fast
-wave and hardly touches the slow one, which is a lasting change of the loop's shape.
-
-The drag is an experiment, no physics of the chain: with it one asks whether the waves matter for how far a chain walks.
+it moves the path; the fast one of both directions twice as fast as in the frame of the links, the slow one hardly. So a
+drag on the velocity across the path takes the fast wave. It is an experiment, no physics of the chain: with it one asks
+whether the waves matter for how far a chain walks.
 """
 
 import numpy as np
