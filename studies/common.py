@@ -72,11 +72,6 @@ def standard_error(values: ArrayLike) -> Any:
     return deviation(values) / np.sqrt(np.maximum(np.isfinite(values).sum(axis=-1), 1))
 
 
-def mean_where(chosen: Array, values: Array) -> Array:
-    """Means over the samples of each cell of chosen walks; NaN without one."""
-    return np.asarray(mean(np.where(chosen, values, np.nan)))
-
-
 def area_of(outlines: Array) -> Array:
     """Area [m²] inside closed outlines of points x, y, (…, n, 2 or more)."""
     x, y = outlines[..., 0], outlines[..., 1]
@@ -153,12 +148,6 @@ def error_line(axes: Axes, x: Any, cells: Any, place: tuple[Any, ...], **style: 
     axes.errorbar(x, cells.mean[place], cells.standard_error[place], **style)
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write a file; its folder is made."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text, encoding="utf-8")
-
-
 def read_columns(path: Path) -> dict[str, Array]:
     """The columns of a file of comma-separated values: texts where not all are numbers."""
     with path.open(encoding="utf-8", newline="") as file:
@@ -200,7 +189,7 @@ def publish(
         print(f"\n{name}\n{table}")
     page = folder / "README.md"
     if tables:
-        write_text(page, with_tables(page.read_text(encoding="utf-8"), tables))
+        page.write_text(with_tables(page.read_text(encoding="utf-8"), tables), encoding="utf-8")
     for name, figure in (figures or {}).items():
         path = folder / "figures" / f"{name}.png"
         path.parent.mkdir(exist_ok=True)

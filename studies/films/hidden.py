@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 import warpchain
-from studies.common import run_study, write_text
+from studies.common import run_study
 from warpchain import films
 
 FOLDER = Path(__file__).parent / "hidden"
@@ -34,7 +34,7 @@ def main() -> None:
         places = zip(film.time + delay, *(mm * film.center.T), strict=True)
         rows = (f"{t:.6E}\t{x:.4E}\t{y:.4E}\t" for t, x, y in places)
         text = "\n".join(["cm_A", "t\tx\ty\t", *rows, ""])
-        write_text(FOLDER / f"60_links_{frequency:g}_Hz.txt", text)
+        (FOLDER / f"60_links_{frequency:g}_Hz.txt").write_text(text, encoding="utf-8")
         edges = ", ".join(f"{mm * edge:.1f}" for edge in film.outline)
         print(f"{frequency:g} Hz: outline {edges} mm, speed {film.speed:.3f} m/s")
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 
 import warpchain
-from studies.common import publish, run_study, write_text
+from studies.common import publish, run_study
 from studies.paper.drawing import figures
 from studies.paper.reduction import SWEEPS, read, reduced, text_of
 from studies.paper.tables import page
@@ -29,9 +29,9 @@ def make(folders: Annotated[list[Path] | None, typer.Argument()] = None, out: Pa
         raise warpchain.InputError(f"{missing[0]}: no numbers of this sweep; give its folder")
     text = text_of({name: known[name] for name in SWEEPS})
     if folders:
-        write_text(out / RESULTS, text)
+        (out / RESULTS).write_text(text, encoding="utf-8")
     numbers = read(text)
-    write_text(out / "README.md", page(numbers))
+    (out / "README.md").write_text(page(numbers), encoding="utf-8")
     publish(out, {}, figures(numbers, sweeps))
 
 

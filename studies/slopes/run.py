@@ -20,10 +20,9 @@ def share_without_end(block: Block) -> Array:
 
 def rows(block: Block) -> str:
     """Of each cell Δx, share and speed along the floor of walks without end, and when it collapsed, if it did."""
-    cells, share, collapse = block.statistics(), share_without_end(block), block.columns["collapsed_at"]
+    cells, share, collapsed = block.statistics(), share_without_end(block), common.mean(block.columns["collapsed_at"])
     endless = block.columns["status"] == warpchain.Status.DISTANCE_LIMIT
-    speed = common.mean_where(endless, LIMIT / block.columns["walk_time"])
-    collapsed = common.mean_where(~np.isnan(collapse), collapse)
+    speed = common.mean(np.where(endless, LIMIT / block.columns["walk_time"], np.nan))
     lines = []
     for place, at in common.of_cells(block):
         numbers = cells.mean[place], cells.standard_error[place], share[place], speed[place], collapsed[place]

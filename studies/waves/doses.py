@@ -25,7 +25,7 @@ def reduced(files: Sequence[Path]) -> Iterator[dict[str, object]]:
             for seed, chosen in parts.items():
                 change = walks[chosen] - dx[0, chosen]
                 both = np.isfinite(change)
-                plain = common.mean_where(both, dx[0, chosen])
+                mean, plain = (common.mean(np.where(both, each[chosen], np.nan)) for each in (walks, dx[0]))
                 yield {
                     "links": links,
                     "frequency": frequency,
@@ -33,7 +33,7 @@ def reduced(files: Sequence[Path]) -> Iterator[dict[str, object]]:
                     "rate": f"{rate:g}",
                     "seeds": seed,
                     "pairs": int(both.sum()),
-                    "dx": f"{common.mean_where(both, walks[chosen]):.5g}",
+                    "dx": f"{mean:.5g}",
                     "change_percent": f"{100 * common.mean(change) / plain:.4g}",
                     "error_percent": f"{100 * common.standard_error(change) / plain:.3g}",
                 }
