@@ -84,7 +84,7 @@ def show(name: str, walk: warpchain.WalkResult) -> None:
         chain |= {name: 0.0 for name in less}
         try:
             show_theory(which, loop, theory.predict(loop, chain))
-        except theory.NoSolutionError as error:
+        except ArithmeticError as error:
             print(f"  {which:22} {error}")
     show_theory("catenary", loop, theory.catenary_of(loop))
     balances = theory.imbalances(loop).items()
@@ -117,9 +117,7 @@ def draw_kinks(result: warpchain.SweepResult) -> Figure:
                 scene = walk.setup.scene
                 kinks.setdefault(scene.links, {}).setdefault(scene.frequency, []).append(walk.mean_loop().kink())
     if not kinks:
-        raise warpchain.InputError(
-            f"{result.name}: no walk has frames before its release; give a folder of the sweep kink"
-        )
+        raise warpchain.InputError(f"{result.name}: no frames before a release; give a folder of the sweep kink")
     figure = Figure(figsize=(9.6, 3.6), layout="constrained")
     panels = figure.subplots(1, 3)
     for axes, name, label, scale in (

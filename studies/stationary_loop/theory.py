@@ -38,10 +38,6 @@ IN_LINKS = 1.0  # Theory ends this many links inside of the free part: averages 
 EDGE = 4.0  # Links at either end of the free part that balances leave out: averages there include links on the sprocket
 
 
-class NoSolutionError(ValueError):
-    """The boundary value problem was not solved."""
-
-
 def bending_inertia(loop: MeanLoop) -> float:
     """j = (Ī − m̄ ℓ²/6)/ℓ of the chain of a loop [kg m]; may be negative."""
     p, length = loop.parameters, loop.parameters.link_length
@@ -110,7 +106,7 @@ def predict(loop: MeanLoop, values: Mapping[str, float] | None = None) -> Theore
         found = solve_bvp(partial(slope, smoothing), conditions, share, values, tol=1e-4, max_nodes=20_000)
         if not found.success:
             reason = found.message.lower().rstrip(".")
-            raise NoSolutionError(f"the boundary value problem was not solved ({reason})")
+            raise ArithmeticError(f"the boundary value problem was not solved ({reason})")
         share, values = found.x, found.y
     x, y, angle, curvature, *bending, tension, shear = found.sol(np.linspace(0.0, 1.0, POINTS))
     s, lowest = length * np.linspace(0.0, 1.0, POINTS), int(np.argmin(y))
