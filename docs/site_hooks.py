@@ -109,15 +109,9 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
 
 def on_page_content(html: str, **_: Any) -> str:
     """Take Sphinx roles away, and set subscripts such as that of `ω_c`."""
-
-    def set_below(match: re.Match[str]) -> str:
-        return f"{match[1]}<sub>{match[2] or match[3]}</sub>"
-
-    html, texts, end = ROLE.sub("", html), [], 0
-    for whole in WHOLE.finditer(html):
-        texts += [SUBSCRIPT.sub(set_below, html[end : whole.start()]), whole[0]]
-        end = whole.end()
-    return "".join([*texts, SUBSCRIPT.sub(set_below, html[end:])])
+    parts = WHOLE.split(ROLE.sub("", html))  # texts, and between them what has no subscripts
+    parts[::2] = [SUBSCRIPT.sub(r"\1<sub>\2\3</sub>", text) for text in parts[::2]]
+    return "".join(parts)
 
 
 def on_post_build(config: Any) -> None:

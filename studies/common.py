@@ -4,9 +4,8 @@ import csv
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Literal
 
 import numpy as np
 import typer
@@ -18,30 +17,24 @@ from numpy.typing import ArrayLike, NDArray
 from warpchain import InputError, Status
 
 Array = NDArray[Any]
-Block = Any
-"""A block of `warpchain.SweepResult.blocks`."""
-Columns = Mapping[str, Array]
-"""Columns of a table by name."""
+Block = Any  # A block of `warpchain.SweepResult.blocks`
+Columns = Mapping[str, Array]  # Columns of a table by name
 
-LINE_COLORS: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+LINE_COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Colours that people with any kind of colour vision can tell apart (Okabe and Ito, 2008)."""
 BLUE, RED, GREEN = LINE_COLORS[:3]
-INK: Final = "#222222"
-FAINT: Final = "#777777"
-GROUND: Final = "#E3E3E3"
-DASHES: Final[Any] = (0, (4, 3))
+INK = "#222222"
+FAINT = "#777777"
+GROUND = "#E3E3E3"
+DASHES = (0, (4, 3))
 
-DRAWN: Final = "_drawn"
-"""End of the names of columns with what a sample has drawn."""
-DISTANCE: Final = "distance walked $Δx$ / m"
-FREQUENCY: Final = "frequency of the sprocket $ν$ / Hz"
+DRAWN = "_drawn"  # End of the names of columns with what a sample has drawn
+DISTANCE = "distance walked $Δx$ / m"
+FREQUENCY = "frequency of the sprocket $ν$ / Hz"
 
 
 def run_study(*commands: Callable[..., None]) -> None:
-    """Run a study's command, or one of several, whose arguments are those of its function; what is refused is one line.
-
-    A command of several is given by its name.
-    """
+    """Run a study's command, or one of several by its name, with the arguments of its function; errors are one line."""
     app = typer.Typer(pretty_exceptions_enable=False)
     for command in commands:
         app.command()(command)
@@ -58,10 +51,10 @@ def at_rest(block: Block, quantity: str = "dx") -> xarray.DataArray:
     return xarray.DataArray(values, axes, block.dims).transpose("links", "frequency", ..., missing_dims="ignore")
 
 
-def of_cells(block: Block) -> Iterator[tuple[tuple[int, ...], list[float]]]:
+def of_cells(block: Block) -> Iterator[tuple[tuple[int, ...], dict[str, float]]]:
     """Place of each cell of a block, and the values of its axes there."""
     for place in np.ndindex(*map(len, block.axes.values())):
-        yield place, [values[number] for values, number in zip(block.axes.values(), place, strict=True)]
+        yield place, {name: block.axes[name][number] for name, number in zip(block.axes, place, strict=True)}
 
 
 def mean(values: ArrayLike) -> Any:
@@ -79,34 +72,31 @@ def standard_error(values: ArrayLike) -> Any:
     return deviation(values) / np.sqrt(np.maximum(np.isfinite(values).sum(axis=-1), 1))
 
 
-def mean_where(chosen: Array, values: Array) -> Array:
-    """Means over the samples of each cell of chosen walks; NaN without one."""
-    return np.asarray(mean(np.where(chosen, values, np.nan)))
+def area_of(outlines: Array) -> Array:
+    """Area [m²] inside closed outlines of points x, y, (…, n, 2 or more)."""
+    x, y = outlines[..., 0], outlines[..., 1]
+    return np.abs(0.5 * np.sum(x * np.roll(y, -1, axis=-1) - y * np.roll(x, -1, axis=-1), axis=-1))
 
 
-@dataclass(frozen=True)
 class OverCells:
-    """Values of several cells, each with a standard error, taken together.
+    """Values of several cells, each with a standard error, taken together; those without both are left out."""
 
-    Attributes:
-        values, errors: of the cells that have both.
-        mean: of the values.
-        error: its standard error.
-        typical: root mean square of the values without what their errors contribute.
-        chi2: of no value in any cell.
-        chi2_of_one: of one value in all cells, their mean weighted by errors.
-        rises, falls: numbers of cells that are significant at 95 %.
-    """
-
-    values: Array
-    errors: Array
-    mean: float
-    error: float
-    typical: float
-    chi2: float
-    chi2_of_one: float
-    rises: int
-    falls: int
+    def __init__(self, values: ArrayLike, errors: ArrayLike) -> None:
+        """Take them together."""
+        values, errors = (np.asarray(each, float).ravel() for each in (values, errors))
+        known = np.isfinite(values) & np.isfinite(errors)
+        self.values, self.errors = values, errors = values[known], errors[known]
+        weights = np.divide(1, errors, out=np.zeros(len(values)), where=errors > 0)
+        sizes = values * weights
+        one = np.sum(values * weights**2) / max(np.sum(weights**2), np.finfo(float).tiny)
+        self.mean = float(mean(values))
+        self.error = float(np.sqrt(np.sum(errors**2)) / len(values)) if len(values) else np.nan
+        # root mean square of the values without what their errors contribute
+        self.typical = float(np.sqrt(max(0.0, mean(values**2 - errors**2))))
+        # of no value in any cell, and of one value in all
+        self.chi2, self.chi2_of_one = float(np.sum(sizes**2)), float(np.sum(((values - one) * weights) ** 2))
+        # significant at 95 %
+        self.rises, self.falls = int(np.sum(sizes > 1.96)), int(np.sum(sizes < -1.96))
 
     def __len__(self) -> int:
         """Number of the cells."""
@@ -115,29 +105,6 @@ class OverCells:
     def text(self, digits: int = 1) -> str:
         """Mean ± standard error of values in per cent."""
         return f"{self.mean:+.{digits}f} ± {self.error:.{digits}f} %"
-
-
-def over_cells(values: ArrayLike, errors: ArrayLike) -> OverCells:
-    """Cells taken together; those without a value or an error are left out."""
-    values, errors = np.asarray(values, float).ravel(), np.asarray(errors, float).ravel()
-    known = np.isfinite(values) & np.isfinite(errors)
-    values, errors = values[known], errors[known]
-    if not len(values):
-        return OverCells(values, errors, np.nan, np.nan, np.nan, 0.0, 0.0, 0, 0)
-    weights = np.divide(1, errors, out=np.zeros(len(values)), where=errors > 0)
-    sizes = values * weights
-    one = np.sum(values * weights**2) / max(np.sum(weights**2), np.finfo(float).tiny)
-    return OverCells(
-        values,
-        errors,
-        mean=float(values.mean()),
-        error=float(np.sqrt(np.sum(errors**2)) / len(values)),
-        typical=float(np.sqrt(max(0.0, float(np.mean(values**2 - errors**2))))),
-        chi2=float(np.sum(sizes**2)),
-        chi2_of_one=float(np.sum(((values - one) * weights) ** 2)),
-        rises=int(np.sum(sizes > 1.96)),
-        falls=int(np.sum(sizes < -1.96)),
-    )
 
 
 def minus(text: str) -> str:
@@ -153,10 +120,15 @@ def drawn_terms(columns: Columns) -> list[Array]:
     return [np.sin(turn), np.cos(turn), *((values - values.mean()) / values.std() for values in plain)]
 
 
-def table(head: str | Iterable[str], rows: Iterable[Iterable[object]]) -> str:
-    """A table in Markdown; the head may be one text with strokes between its cells."""
+def table(head: str | Iterable[str], rows: Iterable[Iterable[object]], formats: str = "") -> str:
+    """A table in Markdown; the head may be one text with strokes, formats are those of columns, for what is no text."""
     head = head.split(" | ") if isinstance(head, str) else list(head)
-    return "\n".join(f"| {' | '.join(map(str, line))} |" for line in (head, ["---"] * len(head), *rows))
+    kinds = formats.split() or [""] * len(head)
+    texts = (
+        [cell if isinstance(cell, str) else format(cell, kind) for cell, kind in zip(row, kinds, strict=True)]
+        for row in rows
+    )
+    return "\n".join(f"| {' | '.join(line)} |" for line in (head, ["---"] * len(head), *texts))
 
 
 def tidy(axes: Axes, title: str = "", grid: Literal["x", "y", "both"] | None = None, **settings: Any) -> None:
@@ -176,22 +148,16 @@ def error_line(axes: Axes, x: Any, cells: Any, place: tuple[Any, ...], **style: 
     axes.errorbar(x, cells.mean[place], cells.standard_error[place], **style)
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write a file; its folder is made."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text, encoding="utf-8")
-
-
 def read_columns(path: Path) -> dict[str, Array]:
     """The columns of a file of comma-separated values: texts where not all are numbers."""
     with path.open(encoding="utf-8", newline="") as file:
         head, *rows = csv.reader(file)
-    columns = dict(zip(head, map(np.array, zip(*rows, strict=True)), strict=True))
-    for name, texts in columns.items():
+    columns = {}
+    for name, *texts in zip(head, *rows, strict=True):
         try:
-            columns[name] = texts.astype(float)
+            columns[name] = np.array(texts, float)
         except ValueError:
-            continue
+            columns[name] = np.array(texts)
     return columns
 
 
@@ -205,17 +171,13 @@ def write_rows(path: Path, rows: Iterable[Mapping[str, object]]) -> None:
 
 
 def with_tables(text: str, tables: Mapping[str, str]) -> str:
-    """A page with these tables between its markers ``<!-- NAME -->`` and ``<!-- end of NAME -->``.
-
-    Raises:
-        ValueError: the page lacks a marker.
-    """
+    """A page with these tables between its markers ``<!-- NAME -->`` and ``<!-- end of NAME -->``."""
     for name, table in tables.items():
         begin, end = f"<!-- {name} -->", f"<!-- end of {name} -->"
-        if text.count(begin) != 1 or text.count(end) != 1:
+        before, *rest = re.split(f"{re.escape(begin)}.*?{re.escape(end)}", text, flags=re.DOTALL)
+        if len(rest) != 1:
             raise ValueError(f"the page needs {begin} and {end} once each")
-        before, rest = text.split(begin)
-        text = f"{before}{begin}\n\n{table}\n\n{end}{rest.split(end)[1]}"
+        text = f"{before}{begin}\n\n{table}\n\n{end}{rest[0]}"
     return text
 
 
@@ -227,7 +189,7 @@ def publish(
         print(f"\n{name}\n{table}")
     page = folder / "README.md"
     if tables:
-        write_text(page, with_tables(page.read_text(encoding="utf-8"), tables))
+        page.write_text(with_tables(page.read_text(encoding="utf-8"), tables), encoding="utf-8")
     for name, figure in (figures or {}).items():
         path = folder / "figures" / f"{name}.png"
         path.parent.mkdir(exist_ok=True)

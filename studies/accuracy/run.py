@@ -1,32 +1,23 @@
-"""Compares the walks of two sweeps of the same samples, cell by cell, for studies/accuracy/README.md.
-
-    warpchain sweep studies/accuracy/sweeps/finer.yaml -o finer --device cuda
-    warpchain sweep studies/accuracy/sweeps/defaults.yaml -o defaults --device cuda
-    python -m studies.accuracy.run defaults finer
+"""Compares the walks of two sweeps of the same samples, cell by cell; README.md has the commands.
 
 It prints the relative difference of the mean Δx of each cell with the standard error of pairs of samples; over all
 cells their mean and χ², scatter and bounces; and how exact either is.
 """
 
-from typing import Final
-
 import numpy as np
 
 import warpchain
-from studies.common import Array, of_cells, over_cells, run_study
-
-LENGTHS: Final = ("penetration_floor", "penetration_self", "penetration_sprocket", "greatest_opening")
+from studies.common import Array, OverCells, of_cells, run_study
 
 
 def cells(sweep: warpchain.SweepResult, column: str) -> dict[str, Array]:
     """Values (samples,) of a column, by block and cell."""
-    return {
-        ", ".join([name, *(f"{axis} {value:g}" for axis, value in zip(block.axes, values, strict=True))]): np.asarray(
-            block.columns[column][place], dtype=np.float64
-        )
-        for name, block in sweep.blocks.items()
-        for place, values in of_cells(block)
-    }
+    found = {}
+    for name, block in sweep.blocks.items():
+        for place, at in of_cells(block):
+            cell = ", ".join([name, *(f"{axis} {value:g}" for axis, value in at.items())])
+            found[cell] = block.columns[column][place].astype(float)
+    return found
 
 
 def together(sweep: warpchain.SweepResult, column: str) -> Array:
@@ -37,7 +28,7 @@ def together(sweep: warpchain.SweepResult, column: str) -> Array:
 def describe(sweep: warpchain.SweepResult) -> None:
     """Print depths, openings, errors of the energy and steps of all walks of a sweep."""
     print(sweep.name)
-    for column in LENGTHS:
+    for column in ("penetration_floor", "penetration_self", "penetration_sprocket", "greatest_opening"):
         middle, high, greatest = 1e3 * np.nanpercentile(together(sweep, column), [50, 99, 100])
         print(f"  {column}: median {middle:.2f}, 99th percentile {high:.2f}, greatest {greatest:.2f} mm")
     high, higher = np.nanpercentile(np.abs(together(sweep, "energy_error")), [95, 99])
@@ -62,7 +53,7 @@ def compare(new: warpchain.SweepResult, base: warpchain.SweepResult) -> None:
         rows.append((difference, error, a.std() / b.std(), bounces[name].mean() / base_bounces[name].mean()))
         print(f"{name}: {100 * difference:+.2f} ± {100 * error:.2f} % ({len(a)} pairs)")
     differences, errors, scatter, bounced = np.array(rows).T
-    over = over_cells(100 * differences, 100 * errors)
+    over = OverCells(100 * differences, 100 * errors)
     print(f"mean of {len(rows)} cells {over.mean:+.3f} ± {over.error:.3f} %, χ² {over.chi2:.1f}")
     print(f"standard deviations {100 * scatter.mean() - 100:+.1f} %, bounces {100 * bounced.mean() - 100:+.1f} %")
 

@@ -1,13 +1,6 @@
-"""Draws the figure of studies/charm/README.md and writes its tables, from the folder of the sweep.
-
-    warpchain sweep studies/charm/sweeps/charm.yaml -o charm --device cuda
-    python -m studies.charm.run charm
-
-The three loops of the figure are walked anew, in some seconds of a CPU.
-"""
+"""Draws the figure of README.md, whose three loops walk anew, and writes its tables, from the folder of the sweep."""
 
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,25 +10,24 @@ import warpchain
 from studies import common
 from studies.common import DISTANCE, LINE_COLORS, RED, Array, Block
 
-FOLDER: Final = Path(__file__).parent
-TIMES: Final = (0.0, 0.04, 0.08, 0.16, 0.32)
-"""Moments of the loops [s] since the release."""
-DRAWN: Final = (0.0, 0.02, 0.1)
-"""Masses of their charms [kg]."""
+FOLDER = Path(__file__).parent
+TIMES = (0.0, 0.04, 0.08, 0.16, 0.32)  # Moments of the loops [s] since the release
+DRAWN = (0.0, 0.02, 0.1)  # Masses of their charms [kg]
 
 
 def distances(block: Block) -> str:
     """Δx with its errors, duration, bounces and share at rest of each cell, in Markdown."""
-    cells, rest = block.statistics(), block.columns["status"] == warpchain.Status.AT_REST
-    time, bounces = (common.mean_where(rest, block.columns[name]) for name in ("walk_time", "bounces"))
+    cells, time, bounces = (block.statistics(name) for name in ("dx", "walk_time", "bounces"))
     rows = []
-    for place, values in common.of_cells(block):
-        numbers = f"{cells.mean[place]:.3f} ± {cells.standard_error[place]:.3f}", f"{cells.sd[place]:.3f}"
-        shown = (*numbers, f"{time[place]:.2f}", f"{bounces[place]:.1f}") if rest[place].any() else ("–",) * 4
-        cell = *(f"{value:g}" for value in values[:-1]), f"{1e3 * values[-1]:g}"
-        rows.append((*cell, *shown, f"{rest[place].mean():.0%}"))
+    for place, at in common.of_cells(block):
+        *values, mass = at.values()
+        share = cells.count[place] / block.shape[-1]
+        text = f"{cells.mean[place]:.3f} ± {cells.standard_error[place]:.3f}"
+        numbers = text, cells.sd[place], time.mean[place], bounces.mean[place]
+        rows.append((*values, 1e3 * mass, *(numbers if share else ("–",) * 4), share))
     names = [name.replace("frequency", "ν / Hz") for name in block.axes][:-1]
-    return common.table((*names, "charm / g", "Δx / m", "σ / m", "t / s", "bounces", "at rest"), rows)
+    heads = (*names, "charm / g", "Δx / m", "σ / m", "t / s", "bounces", "at rest")
+    return common.table(heads, rows, len(at) * "g " + "s .3f .2f .1f .0%")
 
 
 def draw_distances(panel: Axes, block: Block) -> None:

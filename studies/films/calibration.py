@@ -1,59 +1,49 @@
 """How well the posterior of a bank knows chains that the bank does not have, filmed by cameras with errors."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from studies.common import Array
 from warpchain import InputError, films
 
-Wanted = Mapping[tuple[int, float], int]
-"""Links and frequency of an experiment → number of films of it."""
+Wanted = Mapping[tuple[int, float], int]  # Links and frequency of an experiment → number of films of it
 
-CAMERA: Final = films.Camera()
+CAMERA = films.Camera()
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """Errors of the posterior means of hidden chains.
+    """Errors of the posterior means of hidden chains."""
 
-    Attributes:
-        names: of the parameters.
-        errors: mean less truth, (films answered, p).
-        sigmas: standard deviations that the posterior says, (films answered, p).
-        values: truths, (films answered, p).
-        refused: share of sets of films that were refused as outside of the bank.
-    """
-
-    names: tuple[str, ...]
-    errors: Array
-    sigmas: Array
-    values: Array
-    refused: float
+    names: tuple[str, ...]  # Of the parameters
+    errors: Array  # Mean less truth, (films answered, p)
+    sigmas: Array  # Standard deviations that the posterior says, likewise
+    values: Array  # Truths, likewise
+    refused: float  # Share of sets of films that were refused as outside of the bank
 
     @property
     def width(self) -> Array:
         """Standard deviation relative to the parameter."""
-        return np.asarray((self.sigmas / self.values).mean(axis=0))
+        return (self.sigmas / self.values).mean(axis=0)
 
     @property
     def bias(self) -> Array:
         """Mean error in standard deviations."""
-        return np.asarray((self.errors / self.sigmas).mean(axis=0))
+        return (self.errors / self.sigmas).mean(axis=0)
 
     def coverage(self, size: float) -> Array:
         """Share of truths within so many standard deviations."""
-        return np.asarray((np.abs(self.errors) < size * self.sigmas).mean(axis=0))
+        return (np.abs(self.errors) < size * self.sigmas).mean(axis=0)
 
 
 def set_of_films(
-    bank: films.Bank, chain: int, wanted: Wanted, camera: films.Camera, errors: Array, random: np.random.Generator
+    bank: films.Bank, chain: int, wanted: Wanted, errors: Array, random: np.random.Generator
 ) -> list[films.Film]:
     """Films of a chain of a bank by one camera, whose errors they share."""
     return [
-        film.seen(camera, errors, random)
+        film.seen(CAMERA, errors, random)
         for experiment, count in wanted.items()
         for film in bank.films[chain][bank.experiments.index(experiment)][:count]
     ]
@@ -70,22 +60,15 @@ def calibrate(
 ) -> Calibration:
     """Film every hidden chain once and ask the bank for it.
 
-    Args:
-        bank: simulated chains.
-        truths: hidden chains.
-        wanted: which films.
-        believed: the camera that the posterior believes in; films are made by `CAMERA`.
-        shared: errors of the camera in all films, in place of random ones.
-        delay: by which the release was set too late in all films [s].
+    Films are made by `CAMERA`, with errors that are random or, in all films, `shared`, and a release that was set too
+    late by a delay [s]; the posterior believes in a camera that may be another one.
     """
     random, found, refused = np.random.default_rng(1), [], 0
     for chain, values in enumerate(truths.values):
         errors = CAMERA.errors(random) if shared is None else shared
-        seen = set_of_films(truths, chain, wanted, CAMERA, errors, random)
-        if delay:
-            seen = [films.Film(**(vars(film) | {"time": film.time - delay})) for film in seen]
+        seen = set_of_films(truths, chain, wanted, errors, random)
         try:
-            answer = bank.posterior(seen, believed)
+            answer = bank.posterior([replace(film, time=film.time - delay) for film in seen], believed)
         except InputError:
             refused += 1
             continue

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from statistics import NormalDist
-from typing import Final
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -11,7 +10,7 @@ from studies.common import BLUE, DASHES, FAINT, LINE_COLORS, RED, tidy
 from studies.films.calibration import Calibration
 from warpchain import films
 
-SYMBOLS: Final = {
+SYMBOLS = {
     "floor_friction": "μ",
     "viscous_friction": "β",
     "coulomb_friction": "τ_c",

@@ -1,21 +1,18 @@
 """Makes the two films of a hidden chain that come with the study: do not read on if you want to find it yourself.
 
-    python -m studies.films.hidden
-
 The errors of the camera are drawn once for both films. Tables are written as Tracker exports them, in mm.
 """
 
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
 import warpchain
-from studies.common import run_study, write_text
+from studies.common import run_study
 from warpchain import films
 
-FOLDER: Final = Path(__file__).parent / "hidden"
-CHAIN: Final = {
+FOLDER = Path(__file__).parent / "hidden"
+CHAIN = {
     "floor_friction": 0.231,
     "viscous_friction": 1.06e-4,
     "coulomb_friction": 9.4e-5,
@@ -33,12 +30,11 @@ def main() -> None:
         scene = {"links": 60, "frequency": frequency, "start": "spinning", "walk_limit": 0.45, "phase": 0.3}
         walk = warpchain.walk(preset="soft", **scene, **CHAIN)
         film = films.film_of(walk, None).seen(camera, errors, random)
-        assert film.outline is not None and film.speed is not None
         delay, mm = 0.35 + random.uniform(0, 0.1), 1e3
         places = zip(film.time + delay, *(mm * film.center.T), strict=True)
         rows = (f"{t:.6E}\t{x:.4E}\t{y:.4E}\t" for t, x, y in places)
         text = "\n".join(["cm_A", "t\tx\ty\t", *rows, ""])
-        write_text(FOLDER / f"60_links_{frequency:g}_Hz.txt", text)
+        (FOLDER / f"60_links_{frequency:g}_Hz.txt").write_text(text, encoding="utf-8")
         edges = ", ".join(f"{mm * edge:.1f}" for edge in film.outline)
         print(f"{frequency:g} Hz: outline {edges} mm, speed {film.speed:.3f} m/s")
 

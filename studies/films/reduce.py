@@ -1,9 +1,4 @@
-"""Reduces the folders of sweeps of chains to small banks, which `studies.films.run` reads.
-
-    python -m studies.films.reduce film_bank film_bank_90 film_truths film_truths_paper
-
-A bank is written for each block: film-banks/SWEEP_BLOCK.npz.
-"""
+"""Reduces the folders of sweeps of chains to small banks, one for each block: film-banks/SWEEP_BLOCK.npz."""
 
 from pathlib import Path
 
@@ -43,13 +38,13 @@ def load(path: Path) -> films.Bank:
         experiments, time, values = file["experiments"], file["time"], file["values"]
         names = tuple(file["names"].tolist())
 
-    def film(at: tuple[int, int, int]) -> films.Film:
+    def film(*at: int) -> films.Film:
         links, frequency = experiments[at[1]].tolist()
-        seen = {"center": center[at], "outline": outline[at]}
-        return films.Film(time=time, links=int(links), frequency=frequency, speed=float(speed[at]), **seen)
+        seen = {"center": center[at], "outline": outline[at], "speed": float(speed[at])}
+        return films.Film(time=time, links=int(links), frequency=frequency, **seen)
 
     chains, count, most = speed.shape
-    walks = [[[film((c, e, r)) for r in range(most)] for e in range(count)] for c in range(chains)]
+    walks = [[[film(c, e, r) for r in range(most)] for e in range(count)] for c in range(chains)]
     return films.Bank(names, values, walks)
 
 

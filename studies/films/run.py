@@ -1,15 +1,9 @@
-"""Fills in the tables of studies/films/README.md and draws its figures, from the banks that `reduce` wrote.
-
-    python -m studies.films.run film-banks
-
-Three minutes on one core; the numbers are printed, too.
-"""
+"""Fills in the tables of README.md and draws its figures, from the banks that `reduce` wrote; in three minutes."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
@@ -19,17 +13,16 @@ from studies.films.drawing import SYMBOLS, corner, coverage_figure, line_figure
 from studies.films.reduce import load
 from warpchain import films
 
-FOLDER: Final = Path(__file__).parent
+FOLDER = Path(__file__).parent
 FIVE, TWENTY = (60, 5.0), (60, 20.0)
-SETS: Final[dict[str, Wanted]] = {
+SETS: dict[str, Wanted] = {
     "1 film: 20 Hz": {TWENTY: 1},
     "2 films: 5, 20 Hz": {FIVE: 1, TWENTY: 1},
     "8 films: 4 of each": {FIVE: 4, TWENTY: 4},
 }
-PAIR: Final = SETS["2 films: 5, 20 Hz"]
-CALIPERS: Final = 5e-5
-"""Standard error of a roller's radius that was measured with calipers [m]."""
-EXACT: Final = replace(CAMERA, scale=1e-6, floor=1e-6, origin=1e-6, roll=1e-6, outline=1e-6, release=1e-6)
+PAIR = SETS["2 films: 5, 20 Hz"]
+CALIPERS = 5e-5  # Standard error of a roller's radius that was measured with calipers [m]
+EXACT = replace(CAMERA, scale=1e-6, floor=1e-6, origin=1e-6, roll=1e-6, outline=1e-6, release=1e-6)
 """A camera without errors other than noise, and those of the loop's speed."""
 
 
@@ -41,33 +34,25 @@ def beside(bank: films.Bank, other: films.Bank) -> films.Bank:
     return films.Bank(bank.names, bank.values[[first for first, _ in pairs]], both)
 
 
-def answer_for(bank: films.Bank, wanted: Wanted) -> films.Posterior:
-    """The posterior for films of the bank's chain that is nearest to its middle."""
-    off = (bank.values - bank.values.mean(axis=0)) / bank.values.std(axis=0)
-    chain = int((off**2).sum(axis=1).argmin())
-    return bank.posterior(set_of_films(bank, chain, wanted, CAMERA, np.zeros(8), np.random.default_rng(0)), CAMERA)
-
-
 def percent(share: float) -> str:
     """Two digits."""
     return f"{100 * share:.2g} %"
 
 
 def experiments_table(bank: films.Bank) -> str:
-    """Widths for each film and each pair of films: μ, β, R, and R if r was measured."""
+    """Widths for each film and each pair of films of a chain in the middle: all, and R if r was measured."""
     every = bank.experiments
     sets: list[Wanted] = [*({one: 1} for one in every), *({one: 1, two: 1} for one, two in combinations(every, 2))]
-    middle = bank.values.mean(axis=0)
-
-    def widths(wanted: Wanted) -> list[float]:
-        alone = answer_for(bank, wanted)
+    middle, found = bank.values.mean(axis=0), []
+    nearest = int((((bank.values - middle) / bank.values.std(axis=0)) ** 2).sum(axis=1).argmin())
+    for wanted in sets:
+        seen = set_of_films(bank, nearest, wanted, np.zeros(8), np.random.default_rng(0))
+        alone = bank.posterior(seen, CAMERA)
         measured = alone.given(circle_radius=(middle[alone.names.index("circle_radius")], CALIPERS))
-        return [*(alone.sigma / middle), (measured.sigma / middle)[alone.names.index("sprocket_radius")]]
-
-    found = [(wanted, widths(wanted)) for wanted in sets]
-    singles, pairs = found[: len(every)], sorted(found[len(every) :], key=lambda each: each[1][1])
-    name = lambda wanted: " + ".join(f"{n}/{f:g}" for n, f in wanted)  # noqa: E731
-    rows = ((name(wanted), *map(percent, numbers)) for wanted, numbers in [*singles, *pairs[:8]])
+        radius = (measured.sigma / middle)[alone.names.index("sprocket_radius")]
+        found.append((" + ".join(f"{n}/{f:g}" for n, f in wanted), *(alone.sigma / middle), radius))
+    singles, pairs = found[: len(every)], sorted(found[len(every) :], key=lambda row: row[2])
+    rows = ((name, *map(percent, numbers)) for name, *numbers in [*singles, *pairs[:8]])
     return table(("links/Hz", *SYMBOLS.values(), "R, r by calipers"), rows)
 
 
@@ -116,29 +101,26 @@ def lines_table(banks: Mapping[str, films.Bank]) -> str:
 def main(banks: Path) -> None:
     """Calibrate, compare, draw."""
     bank, long = (load(banks / f"{name}_main.npz") for name in ("film_bank", "film_bank_90"))
-    truths = {
-        "same": load(banks / "film_truths_same.npz"),
-        "e_t = 0.3": load(banks / "film_truths_tangential.npz"),
-        "links 5 % heavier": load(banks / "film_truths_heavier.npz"),
-        "paper's joints": load(banks / "film_truths_paper_main.npz"),
-    }
-    found = {
-        (kind, name): calibrate(bank, hidden, wanted)
-        for kind, hidden in truths.items()
-        for name, wanted in SETS.items()
-    }
-    rows = {key: (*calibration_rows(each), percent(each.refused)) for key, each in found.items()}
-    head, others = ("films", *SYMBOLS.values(), "refused"), {key: row for key, row in rows.items() if key[0] != "same"}
+    same = load(banks / "film_truths_same.npz")
+    blocks = {"e_t = 0.3": "tangential", "links 5 % heavier": "heavier", "paper's joints": "paper_main"}
+    others = {kind: load(banks / f"film_truths_{block}.npz") for kind, block in blocks.items()}
+
+    def cells_of(found: Calibration) -> tuple[str, ...]:
+        return *calibration_rows(found), percent(found.refused)
+
+    found = {name: calibrate(bank, same, wanted) for name, wanted in SETS.items()}
+    head, rows = ("films", *SYMBOLS.values(), "refused"), []
+    for kind, hidden in others.items():
+        rows += [(kind, name, *cells_of(calibrate(bank, hidden, wanted))) for name, wanted in SETS.items()]
+    own = ((name, *cells_of(each)) for name, each in found.items())
     tables = {
         "experiments": experiments_table(beside(bank, long)),
-        "calibration": table(head, ((name, *rows["same", name]) for name in SETS)),
-        "other chains": table(("truth", *head), ((*key, *row) for key, row in others.items())),
-        "pitfalls": pitfalls_table(bank, truths["same"]),
-        "lines": lines_table(
-            {"film_bank": bank, "film_bank_90": long} | {kind: each for kind, each in truths.items() if kind != "same"}
-        ),
+        "calibration": table(head, own),
+        "other chains": table(("truth", *head), rows),
+        "pitfalls": pitfalls_table(bank, same),
+        "lines": lines_table({"film_bank": bank, "film_bank_90": long} | others),
     }
-    publish(FOLDER, tables, {"coverage": coverage_figure({name: found["same", name] for name in SETS})}, dpi=130)
+    publish(FOLDER, tables, {"coverage": coverage_figure(found)}, dpi=130)
     outlines = {(5, 1.906): (-59.9, 62.1, 13.4, 335.8), (20, 7.648): (-68.7, 62.1, 13.4, 330.0)}
     hidden = [
         films.read(
@@ -146,11 +128,11 @@ def main(banks: Path) -> None:
         )
         for (hz, speed), outline in outlines.items()
     ]
-    answer = bank.posterior(hidden)
-    print(f"\nthe hidden chain\n{answer}\n{films.friction_line(hidden[1])}")
-    print(f"with r by calipers\n{answer.given(circle_radius=(4.05e-3, 5e-5))}")
+    answer, line = bank.posterior(hidden), films.friction_line(hidden[1])
+    print(f"\nthe hidden chain\n{answer}\n{line}")
+    print(f"with r by calipers\n{answer.given(circle_radius=(4.05e-3, CALIPERS))}")
     publish(FOLDER, {}, {"corner": corner(answer)}, dpi=110)
-    publish(FOLDER, {}, {"line": line_figure(films.friction_line(hidden[1]))})
+    publish(FOLDER, {}, {"line": line_figure(line)})
 
 
 if __name__ == "__main__":

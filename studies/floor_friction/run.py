@@ -1,21 +1,14 @@
-"""Draws the figure of studies/floor_friction/README.md and prints its numbers, from the folder of the sweep.
-
-    warpchain sweep studies/floor_friction/sweeps/floor_friction.yaml -o floor_friction --device cuda
-    python -m studies.floor_friction.run floor_friction
-
-The numbers are printed, the figure is written beside the page.
-"""
+"""Draws the figure of README.md and prints its numbers, from the folder of the sweep."""
 
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 from matplotlib.figure import Figure
 
 import warpchain
-from studies.common import DISTANCE, LINE_COLORS, Array, Block, error_line, mean_where, publish, run_study, table, tidy
+from studies.common import DISTANCE, LINE_COLORS, Array, Block, error_line, publish, run_study, table, tidy
 
-FOLDER: Final = Path(__file__).parent
+FOLDER = Path(__file__).parent
 
 
 def furthest(block: Block) -> Array:
@@ -25,14 +18,10 @@ def furthest(block: Block) -> Array:
 
 def ledger(block: Block, links: int, frequency: float) -> str:
     """Mean Δx, speed, duration and energy lost in self-contacts by friction of a cell, in Markdown."""
-    cell = [list(block.axes[name]).index(value) for name, value in (("links", links), ("frequency", frequency))]
-    rest = block.columns["status"][tuple(cell)] == warpchain.Status.AT_REST
-    dx, time, lost = (
-        mean_where(rest, block.columns[name][tuple(cell)]) for name in ("dx", "walk_time", "loss_self_contact")
-    )
-    values = zip(block.axes["floor_friction"], dx, dx / time, time, lost, strict=True)
-    rows = ((f"{friction:g}", f"{a:.3f}", f"{b:.2f}", f"{c:.2f}", f"{d:.2f}") for friction, a, b, c, d in values)
-    return table(("μ_fc", "Δx / m", "Δx / t / (m/s)", "t / s", "lost to self-contacts / J"), rows)
+    cell = tuple(list(block.axes[name]).index(value) for name, value in (("links", links), ("frequency", frequency)))
+    dx, time, lost = (block.statistics(name).mean[cell] for name in ("dx", "walk_time", "loss_self_contact"))
+    rows = zip(block.axes["floor_friction"], dx, dx / time, time, lost, strict=True)
+    return table("μ_fc | Δx / m | Δx / t / (m/s) | t / s | lost to self-contacts / J", rows, "g .3f .2f .2f .2f")
 
 
 def draw(blocks: dict[str, Block]) -> Figure:

@@ -1,8 +1,9 @@
 """Figures of the page."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Mapping, Sequence
+from itertools import product
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,32 +12,24 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from studies.common import BLUE, DASHES, DISTANCE, FAINT, FREQUENCY, GREEN, INK, LINE_COLORS, RED, tidy
-from studies.paper.findings import Numbers, of_start, steps
-from studies.paper.findings import effects as effects_of
+from studies.paper import findings
+from studies.paper.findings import Numbers
 from studies.paper.impacts import impacts
 from studies.paper.statistics import Effect
 from warpchain import Parameters, SweepResult
 
-PALE: Final = "#BBBBBB"
-"""Dots of cells in which nothing is significant."""
-
-REACH: Final = 1.0
-"""Greatest relative effect on the axis of the figure; greater ones stand at its edge."""
-
-_CONTACT: Final = ("before the 1st bounce", "after the 1st", "after the 2nd", "after the 3rd", "later", "never")
-_SHADES: Final = LinearSegmentedColormap.from_list("contact", ["#053061", "#4393C3", "#D55E00", "#F4A582", "#E3E3E3"])
-_OUTLINES: Final = [(links, frequency) for links in (60, 120, 180) for frequency in (10.0, 20.0, 30.0)]
-"""Links and frequencies of the loops whose outlines are drawn."""
+PALE = "#BBBBBB"  # Dots of cells in which nothing is significant
+REACH = 1.0  # Greatest relative effect on the axis of the figure; greater ones stand at its edge
+_CONTACT = ("before the 1st bounce", "after the 1st", "after the 2nd", "after the 3rd", "later", "never")
+_SHADES = LinearSegmentedColormap.from_list("contact", ["#053061", "#4393C3", "#D55E00", "#F4A582", "#E3E3E3"])
 
 
-def figures(numbers: Numbers, sweeps: Mapping[str, SweepResult]) -> Iterator[tuple[str, Figure]]:
-    """Name and figure, each in turn; outlines of loops only if the sweep that has them is given."""
-    yield "distances", distances(numbers)
-    yield "effects", effects(numbers)
-    yield "friction", friction(numbers)
-    yield "strands", strands(numbers)
+def figures(numbers: Numbers, sweeps: Mapping[str, SweepResult]) -> dict[str, Figure]:
+    """All figures by name; outlines of loops only if the sweep that has them is given."""
+    found = {draw.__name__: draw(numbers) for draw in (distances, effects, friction, strands)}
     if "paper_shapes" in sweeps:
-        yield "impacts", outlines(sweeps["paper_shapes"])
+        found["impacts"] = outlines(sweeps["paper_shapes"])
+    return found
 
 
 def panels_of_links(numbers: Numbers, x: str, y: str) -> tuple[Figure, Any]:
@@ -54,12 +47,11 @@ def panels_of_links(numbers: Numbers, x: str, y: str) -> tuple[Figure, Any]:
 def distances(numbers: Numbers) -> Figure:
     """Figure 6 with both starts at all lengths: means, boxes of one and bars of two standard deviations."""
     frequencies = numbers["paper_claims"]["cells"]["frequency"]
-    figure, panels = panels_of_links(
-        numbers, f"{FREQUENCY}; boxes: one standard deviation of a walk, bars: two", DISTANCE
-    )
+    x = f"{FREQUENCY}; boxes: one standard deviation of a walk, bars: two"
+    figure, panels = panels_of_links(numbers, x, DISTANCE)
     for start, color, shift, label in (("rest", RED, -0.7, "at rest"), ("ellipse", GREEN, 0.7, "as an ellipse")):
         x = np.array(frequencies) + shift
-        tables = (of_start(numbers, start, name) for name in ("mean", "sd"))
+        tables = (findings.of_start(numbers, start, name) for name in ("mean", "sd"))
         for axes, mean, sd in zip(panels, *tables, strict=True):
             axes.vlines(x, mean - 2 * sd, mean + 2 * sd, color=color, linewidth=1)
             axes.bar(x, 2 * sd, 1.2, mean - sd, color=color, alpha=0.3, linewidth=0)
@@ -72,7 +64,7 @@ def distances(numbers: Numbers) -> Figure:
 
 def effects(numbers: Numbers) -> Figure:
     """What each value of each quantity does to Δx: a dot for every cell, the mean over the cells with its interval."""
-    known = {name: steps(found) for name, found in effects_of(numbers).items() if name not in ("start", "tolerance")}
+    known = {name: found["values"] for name, found in findings.effects(numbers).items() if name != "start"}
     names, heights = list(known), np.cumsum([len(found) + 0.5 for found in known.values()])
     half = int(np.argmax(heights > heights[-1] / 2 - 1.5))
     columns, longest = (names[: half + 1], names[half + 1 :]), max(heights[half], heights[-1] - heights[half])
@@ -95,13 +87,13 @@ def symbol_of(name: str) -> str:
     return f"${base}" + (f"_\\mathrm{{{index}}}$" if index else "$")
 
 
-def _draw_effects(axes: Axes, known: Mapping[str, Sequence[tuple[float, Effect]]]) -> None:
+def _draw_effects(axes: Axes, known: Mapping[str, Sequence[Effect]]) -> None:
     """The effects of some quantities, one line for each value."""
     rng = np.random.default_rng(0)
     y, places, texts = 0.0, [], []
     for number, (name, found) in enumerate(known.items()):
         top = y - 0.5
-        for value, effect in found:
+        for effect in found:
             sign = effect.sign[effect.known]
             relative = np.clip(effect.relative[effect.known], -REACH, REACH)
             height = y + rng.uniform(-0.25, 0.25, len(relative))
@@ -110,7 +102,7 @@ def _draw_effects(axes: Axes, known: Mapping[str, Sequence[tuple[float, Effect]]
             mean = float(np.clip(effect.cells.mean, -REACH, REACH))
             axes.errorbar(mean, y, xerr=1.96 * effect.cells.error, fmt="|", color=INK, markersize=9)
             places.append(y)
-            shortest = re.sub(r"e\+?(-?)0*(?=\d)", r"e\1", f"{value:.6g}")  # 1e-6 and not 1e-06
+            shortest = re.sub(r"e\+?(-?)0*(?=\d)", r"e\1", f"{effect.notes['value']:.6g}")  # 1e-6 and not 1e-06
             texts.append(f"{symbol_of(name)} = {shortest}")
             y += 1.0
         if number % 2:
@@ -127,10 +119,10 @@ def friction(numbers: Numbers) -> Figure:
     """Distance walked against the friction of the floor, over that at the paper's value."""
     content = numbers["paper_claims"]
     found, frequencies = content["friction"], content["cells"]["frequency"]
-    mean, reference = np.array(found["mean"], float), content["effects"]["floor_friction"]["reference"]
+    reference = content["effects"]["floor_friction"]["reference"]
     x, y = f"friction of the floor {symbol_of('floor_friction')}", "Δx over that at Table 1's friction"
     figure, panels = panels_of_links(numbers, x, y)
-    for axes, of_links in zip(panels, mean, strict=True):
+    for axes, of_links in zip(panels, found["mean"], strict=True):
         for frequency, color, line in zip(frequencies, LINE_COLORS, of_links, strict=False):
             ratio = line / line[found["values"].index(reference)]
             axes.plot(found["values"], ratio, ".-", color=color, linewidth=1, label=f"{frequency:g} Hz")
@@ -167,7 +159,7 @@ def outlines(result: SweepResult) -> Figure:
     links, frequencies = (block.axes[name].tolist() for name in ("links", "frequency"))
     found, _ = impacts(block)
     figure = Figure(figsize=(6.3, 6.9), layout="constrained")
-    for axes, (n, frequency) in zip(figure.subplots(3, 3).flat, _OUTLINES, strict=True):
+    for axes, (n, frequency) in zip(figure.subplots(3, 3).flat, product((60, 120, 180), (10, 20, 30)), strict=True):
         axes.set_aspect("equal")
         axes.set_axis_off()
         axes.set_title(f"{n} links, {frequency:g} Hz", fontsize="small", loc="left")

@@ -1,23 +1,16 @@
-"""Whether curves of other numbers of links and frequencies have the shape of the paper's Figure 5.
+"""Whether curves of other cells have the shape of the paper's Figure 5: walks of a minute → results/figure5.csv."""
 
-python -m studies.paper.figure5     # a minute → results/figure5.csv
-"""
-
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
 import warpchain
 from studies.common import read_columns, table, write_rows
 
-RESULTS: Final = Path(__file__).parent / "results" / "figure5.csv"
-CELLS: Final = tuple((links, frequency) for links in (60, 90, 120, 150, 180) for frequency in (10.0, 15.0, 20.0, 30.0))
-NEAR: Final = 1e-3
-"""A chain whose lowest circle is nearer to the floor [m] is in an impact."""
-APART: Final = 0.01
-"""Impacts [s] less apart are one."""
+RESULTS = Path(__file__).parent / "results" / "figure5.csv"
+NEAR = 1e-3  # A chain whose lowest circle is nearer to the floor [m] is in an impact
+APART = 0.01  # Impacts [s] less apart are one
 
 
 def shape(links: int, frequency: float) -> dict[str, object]:
@@ -47,22 +40,12 @@ def shape(links: int, frequency: float) -> dict[str, object]:
 
 def figure5_table() -> str:
     """The numbers of all walks, in Markdown."""
-    head = (
-        *("cell", "bounces", "times it rises between them", "share of the changes of v_x in impacts"),
-        *("greatest v_x / m/s", "greatest backward v_x over it", "time from collapse to rest, over the walk's"),
-    )
-    columns = read_columns(RESULTS)
-    formats, rows = ("g", "g", ".3f", ".3g", ".3f", ".2f"), []
-    for links, frequency, *numbers in zip(*columns.values(), strict=True):
-        texts = map(format, numbers, formats)
-        rows.append((f"{links:g} × {frequency:g} Hz", *texts))
-    return table(head, rows)
-
-
-def main() -> None:
-    """Let all chains walk, and write the file."""
-    write_rows(RESULTS, [shape(*cell) for cell in CELLS])
+    head = "cell | bounces | times it rises between them | share of the changes of v_x in impacts"
+    head += " | greatest v_x / m/s | greatest backward v_x over it | time from collapse to rest, over the walk's"
+    walks = zip(*read_columns(RESULTS).values(), strict=True)
+    rows = ((f"{links:g} × {frequency:g} Hz", *numbers) for links, frequency, *numbers in walks)
+    return table(head, rows, "s g g .3f .3g .3f .2f")
 
 
 if __name__ == "__main__":
-    main()
+    write_rows(RESULTS, [shape(*cell) for cell in product((60, 90, 120, 150, 180), (10.0, 15.0, 20.0, 30.0))])

@@ -5,66 +5,34 @@ and, by name, what the words of the claim in claims.yaml need.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Final
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from studies.common import minus, read_columns
 from studies.paper.figure5 import RESULTS as FIGURE5
-from studies.paper.statistics import Effect
-from studies.paper.verdicts import Verdict, bounds, direction, share, together
+from studies.paper.statistics import Effect, percent, plain
+from studies.paper.verdicts import BOUNDS, Verdict, direction, share, together
 from studies.waves import directions, doses
+from warpchain import Parameters
 
 Numbers = Mapping[str, Any]
 Found = tuple[Verdict, Mapping[str, object]]
 Check = Callable[[Numbers], Found]
 
-LONG: Final = 150
-"""Chains of so many links or more are those that the paper's start from rest underestimates."""
-SYMBOLS: Final = {
-    **{"joint_stiffness": "k", "joint_damping": "b", "friction_smoothing": "ω_c", "tangential_restitution": "e_t"},
-    **{"sprocket_restitution": "e_sc", "sprocket_friction": "μ_sc", "floor_restitution": "e_fc"},
-    **{"inner_mass": "m_inner", "outer_mass": "m_outer", "inner_inertia": "I_inner", "outer_inertia": "I_outer"},
-}
-"""Of quantities whose effects are claimed to be small."""
-
-
-def percent(value: float, half_width: float | None = None, *, sign: bool = True) -> str:
-    """A share in per cent with two significant digits of its interval, such as ``+3.1 ± 0.4 %``."""
-    if not np.isfinite(value):
-        return "—"
-    number, width = 100 * value, 100 * (half_width or np.nan)
-    if np.isfinite(width):
-        digits, end = 0 if width >= 2 else 1 if width >= 0.2 else 2, " ± {:.{}f}"
-    else:
-        digits, end = 0 if abs(number) >= 10 else 1, ""
-    return minus(f"{number:{'+' if sign else ''}.{digits}f}") + f"{end.format(width, digits)} %"
-
-
-def plain(value: float) -> str:
-    """A share in per cent without a sign."""
-    return percent(float(value), sign=False)
-
-
-def over(effect: Effect) -> str:
-    """Mean effect over the cells with its interval."""
-    return percent(effect.cells.mean, 1.96 * effect.cells.error)
+LONG = 150  # Chains of so many links or more are those that the paper's start from rest underestimates
 
 
 def of_start(numbers: Numbers, start: str, name: str) -> Any:
-    """A table (links, frequencies) of chains that began so."""
-    return np.array(numbers["paper_claims"]["starts"][start][name], float)
+    """Numbers of chains that began so."""
+    return numbers["paper_claims"]["starts"][start][name]
 
 
 def long_chains(numbers: Numbers) -> slice:
     """Rows of the cells with `LONG` links or more."""
     links = numbers["paper_claims"]["cells"]["links"]
     return slice(next(place for place, each in enumerate(links) if each >= LONG), None)
-
-
-def steps(content: Mapping[str, Any]) -> list[tuple[Any, Effect]]:
-    """Value → effect, for each value of a quantity but that of the paper."""
-    return [(each["value"], Effect.of(each)) for each in content["values"]]
 
 
 def effects(numbers: Numbers) -> dict[str, Any]:
@@ -74,10 +42,11 @@ def effects(numbers: Numbers) -> dict[str, Any]:
 
 def ellipse(numbers: Numbers) -> Effect:
     """What an ellipse does to Δx of long chains, in place of a start from rest."""
-    return dict(steps(effects(numbers)["start"]))["ellipse"][long_chains(numbers)]
+    values = effects(numbers)["start"]["values"]
+    return next(each for each in values if each.notes["value"] == "ellipse")[long_chains(numbers)]
 
 
-def rising(effect: Effect, words: Mapping[str, object]) -> Found:
+def rising(effect: Effect, **words: object) -> Found:
     """A claim that an effect is a rise; its words, and the effect as `found`."""
     return direction(effect.rises, effect.falls, effect.count), {**words, "found": effect}
 
@@ -98,7 +67,7 @@ def shape(numbers: Numbers) -> Found:
     medians = (f"{name} {percent(each['quantiles'][1])}" for name, each in kept.items())
     words = {"walks": count, "medians": ", ".join(medians), "inside": ", ".join(map(str, inside)), "without": without}
     words |= {"every": count + without, "of_all": ", ".join(plain(each / (count + without)) for each in inside)}
-    return together([share(each, total) for each in inside for total in (count, count + without)]), words
+    return together(*(share(each, total) for each in inside for total in (count, count + without))), words
 
 
 def speed(numbers: Numbers) -> Found:
@@ -109,17 +78,17 @@ def speed(numbers: Numbers) -> Found:
     words = dict(zip(("low", "median", "high"), map(percent, of_walks["quantiles"]), strict=True))
     words |= {"slightly": slightly, "walks": count, "without": without}
     words |= {"rises": count - of_walks["falls"], "of_all": plain(slightly / (count + without))}
-    return together([share(slightly, total) for total in (count, count + without)]), words
+    return together(share(slightly, count), share(slightly, count + without)), words
 
 
 def faster(numbers: Numbers) -> Found:
     """Δx rises with the frequency."""
-    return rising(Effect.of(numbers["paper_claims"]["starts"]["rest"]["faster"]), {})
+    return rising(of_start(numbers, "rest", "faster"))
 
 
 def longer(numbers: Numbers) -> Found:
     """Δx falls with the number of links."""
-    found, ellipses = (Effect.of(numbers["paper_claims"]["starts"][start]["longer"]) for start in ("rest", "ellipse"))
+    found, ellipses = (of_start(numbers, start, "longer") for start in ("rest", "ellipse"))
     return direction(found.falls, found.rises, found.count), {"found": found, "ellipses": ellipses}
 
 
@@ -127,12 +96,12 @@ def moderate(numbers: Numbers) -> Found:
     """Δx varies only moderately while links and frequency stay."""
     relative = of_start(numbers, "rest", "sd") / of_start(numbers, "rest", "mean")
     words = dict(zip(("least", "median", "most"), map(plain, np.nanquantile(relative, [0, 0.5, 1])), strict=True))
-    return share(int((relative <= bounds().moderate).sum()), relative.size), words
+    return share(int((relative <= BOUNDS.moderate).sum()), relative.size), words
 
 
 def underestimate(numbers: Numbers) -> Found:
     """From rest, long chains walk less far than as an ellipse."""
-    return rising(ellipse(numbers), {"ratio": 1 + ellipse(numbers).cells.mean})
+    return rising(ellipse(numbers), ratio=1 + ellipse(numbers).cells.mean)
 
 
 def self_collision(numbers: Numbers) -> Found:
@@ -147,35 +116,31 @@ def self_collision(numbers: Numbers) -> Found:
 
 def cause(numbers: Numbers) -> Found:
     """Long chains whose links pass through one another walk further, and nearly as far as an ellipse."""
-    rest, control = (Effect.of(numbers[name]["through"]) for name in ("paper_through", "paper_through_ellipse"))
+    rest, control = (numbers[name]["through"] for name in ("paper_through", "paper_through_ellipse"))
     further, tried = ellipse(numbers), numbers["paper_through"]["cells"]["frequency"]
     there = further.relative[:, np.isin(numbers["paper_claims"]["cells"]["frequency"], tried)]
     content = numbers["paper_strands"]
     early = [
-        f"{links} links {percent(each['early_over_late']['relative'], each['early_over_late']['half_width'])}"
+        f"{links} links {each['early_over_late']}"
         for links, each in zip(content["cells"]["links"], content["strands"]["starts"]["rest"], strict=True)
         if "early_over_late" in each and links >= LONG - 30
     ]
-    words = {
-        "rest": over(rest),
-        "control": over(control),
-        "further": plain(further.cells.mean),
-        "early": ", ".join(early),
-    }
-    words |= {"band": f"{tried[0]:g} to {tried[-1]:g} Hz", "there": plain(there.mean())}
-    closes = (
-        Verdict.AGREES if rest.cells.mean - control.cells.mean >= bounds().most * further.cells.mean else Verdict.PART
+    verdict, words = rising(
+        rest,
+        rest=rest,
+        control=control,
+        further=plain(further.cells.mean),
+        early=", ".join(early),
+        band=f"{tried[0]:g} to {tried[-1]:g} Hz",
+        there=plain(there.mean()),
     )
-    verdict, words = rising(rest, words)
-    return together([verdict, closes]), words
+    is_closed = rest.cells.mean - control.cells.mean >= BOUNDS.most * further.cells.mean
+    return together(verdict, Verdict.AGREES if is_closed else Verdict.PART), words
 
 
 def losses(numbers: Numbers) -> Found:
     """A chain loses most of its energy in collisions."""
-    found, as_ellipse = (
-        {name: np.array(each, float) for name, each in numbers["paper_claims"]["starts"][start]["losses"].items()}
-        for start in ("rest", "ellipse")
-    )
+    found, as_ellipse = (of_start(numbers, start, "losses") for start in ("rest", "ellipse"))
     most = int((found["floor"] + found["self_contact"] > 0.5).sum())
     damped = [
         int((each["floor"] + each["self_contact"] + each["joint_damping"] > each["joint_friction"]).sum())
@@ -188,9 +153,9 @@ def losses(numbers: Numbers) -> Found:
 
 def delay(numbers: Numbers) -> Found:
     """Starting as an ellipse delays the meeting of the loop's strands."""
-    found = Effect.of(numbers["paper_strands"]["strands"]["delay"])[long_chains(numbers)]
+    found = numbers["paper_strands"]["strands"]["delay"][long_chains(numbers)]
     slower = found.relative[:, np.array(numbers["paper_claims"]["cells"]["frequency"]) <= 20]
-    return rising(found, {"mean": over(found), "least": percent(slower.min()), "most": percent(slower.max())})
+    return rising(found, mean=found, least=percent(slower.min()), most=percent(slower.max()))
 
 
 def single_walks(numbers: Numbers) -> Found:
@@ -202,56 +167,60 @@ def single_walks(numbers: Numbers) -> Found:
 
 def means(numbers: Numbers) -> Found:
     """Means of 12 walks differ by less than a few per cent between the tolerances."""
-    effect = Effect.of(numbers["paper_tolerance"]["tolerance"]["means"])
+    effect = numbers["paper_tolerance"]["tolerance"]["means"]
     off = np.abs(effect.relative[effect.known])
-    inside = int((off <= bounds().unseen).sum())
-    words = {"greatest": plain(off.max(initial=0.0)), "inside": inside, "found": effect, "mean": over(effect)}
+    inside = int((off <= BOUNDS.unseen).sum())
+    words = {"greatest": plain(off.max(initial=0.0)), "inside": inside, "found": effect, "mean": effect}
     return share(inside, effect.count), words | {"significant": effect.rises + effect.falls}
 
 
 def falling(name: str) -> Check:
     """Δx falls as a quantity grows."""
-    return lambda numbers: monotonic(numbers, name, steps(effects(numbers)[name]), -1)
+    return lambda numbers: monotonic(numbers, name, effects(numbers)[name]["values"], -1)
 
 
 def floor_friction(numbers: Numbers) -> Found:
     """Δx falls as the friction of the floor grows: for all values, and for those beside Table 1's."""
     content = effects(numbers)["floor_friction"]
-    every, reference = steps(content), content["reference"]
-    below = max(value for value, _ in every if value < reference)
-    above = min(value for value, _ in every if value > reference)
-    near = [(value, effect) for value, effect in every if value in (below, above)]
-    (first, words), (second, beside) = (monotonic(numbers, "floor_friction", each, -1) for each in (every, near))
+    known = {effect.notes["value"]: effect for effect in content["values"]}
+    below = max(value for value in known if value < content["reference"])
+    above = min(value for value in known if value > content["reference"])
+    (first, words), (second, beside) = (
+        monotonic(numbers, "floor_friction", each, -1) for each in (content["values"], [known[below], known[above]])
+    )
     words = {**words, "verdict": first, "below": below, "above": above, "near": beside["counts"]}
-    return together([first, second]), words
+    return together(first, second), words
 
 
 def collapse(numbers: Numbers) -> Found:
     """Longer links lose their loop after fewer bounces."""
-    verdict, words = monotonic(numbers, "link_length", steps(numbers["paper_claims"]["collapse"]), -1)
-    lengths = (f"{value:g}: {percent(effect.cells.mean)}" for value, effect in steps(effects(numbers)["link_length"]))
-    return verdict, {**words, "distances": ", ".join(lengths)}
+    verdict, words = monotonic(numbers, "link_length", numbers["paper_claims"]["collapse"]["values"], -1)
+    distances = effects(numbers)["link_length"]["values"]
+    texts = (f"{effect.notes['value']:g}: {percent(effect.cells.mean)}" for effect in distances)
+    return verdict, {**words, "distances": ", ".join(texts)}
 
 
 def lost_on_floor(numbers: Numbers) -> Found:
     """Less friction of the floor takes less energy in collisions with it."""
-    return monotonic(numbers, "floor_friction", steps(numbers["paper_claims"]["lost_on_floor"]), 1)
+    return monotonic(numbers, "floor_friction", numbers["paper_claims"]["lost_on_floor"]["values"], 1)
 
 
 def sliding(numbers: Numbers) -> Found:
     """Less friction of the floor lets a chain slide for longer after its collapse."""
     found = numbers["paper_more"]["more"]["sliding"].items()
-    return monotonic(numbers, "floor_friction", [(float(value), Effect.of(each["time"])) for value, each in found], -1)
+    times = [replace(each["time"], notes={"value": float(value)}) for value, each in found]
+    return monotonic(numbers, "floor_friction", times, -1)
 
 
-def monotonic(numbers: Numbers, name: str, steps: Sequence[tuple[float, Effect]], slope: int) -> Found:
+def monotonic(numbers: Numbers, name: str, values: Sequence[Effect], slope: int) -> Found:
     """Whether a quantity has a slope: a greater value changes it one way, a smaller one the other."""
     reference = numbers["paper_claims"]["effects"][name]["reference"]
-    ways = [(effect.rises, effect.falls)[:: slope if value > reference else -slope] for value, effect in steps]
+    known = {effect.notes["value"]: effect for effect in values}
+    ways = [(each.rises, each.falls)[:: slope if value > reference else -slope] for value, each in known.items()]
     agreeing, against = (sum(way) for way in zip(*ways, strict=True))
-    cells = sum(effect.count for _, effect in steps)
+    cells = sum(effect.count for effect in values)
     counts = f"{agreeing} of {cells} comparisons as claimed, {against} the other way"
-    texts = "; ".join(f"{value:g}: {over(effect)}" for value, effect in steps)
+    texts = "; ".join(f"{value:g}: {effect}" for value, effect in known.items())
     return direction(agreeing, against, cells), {"steps": texts, "counts": counts}
 
 
@@ -260,16 +229,15 @@ def small(kind_and_names: str) -> Check:
     kind, *names = kind_and_names.split()
 
     def check(numbers: Numbers) -> Found:
-        known = {name: [effect for _, effect in steps(effects(numbers)[name])] for name in names}
+        bound, known = getattr(BOUNDS, kind), {name: effects(numbers)[name]["values"] for name in names}
         greatest = {name: max(found, key=lambda each: abs(each.cells.mean)) for name, found in known.items()}
-        worst, bound = (f"{SYMBOLS[name]} {over(effect)}" for name, effect in greatest.items()), getattr(bounds(), kind)
         every = [effect for found in known.values() for effect in found]
-        sizes, widths = (
-            np.concatenate([getattr(effect, each)[effect.known] for effect in every])
-            for each in ("relative", "half_width")
-        )
-        above, inside = (int(np.sum(each)) for each in (abs(sizes) - widths > bound, abs(sizes) + widths <= bound))
-        words = {"worst": ", ".join(worst), "bound": 100 * bound, "above": above, "inside": inside, "total": len(sizes)}
+        sizes = np.abs(np.concatenate([effect.relative[effect.known] for effect in every]))
+        widths = np.concatenate([effect.half_width[effect.known] for effect in every])
+        above, inside = int(np.sum(sizes - widths > bound)), int(np.sum(sizes + widths <= bound))
+        words = {"bound": 100 * bound, "above": above, "inside": inside, "total": len(sizes)}
+        symbols = {name: quantity.symbol for name, quantity in Parameters.quantities().items()}
+        words["worst"] = ", ".join(f"{symbols[name]} {effect}" for name, effect in greatest.items())
         return share(len(sizes) - above, len(sizes)), words
 
     return check
@@ -277,25 +245,21 @@ def small(kind_and_names: str) -> Check:
 
 def spread(numbers: Numbers) -> Found:
     """Drawing the release as well spreads Δx further."""
-    found = {name: np.array(table, float) for name, table in numbers["paper_claims"]["spread"].items()}
+    found = numbers["paper_claims"]["spread"]
     greater = int((found["both"] > found["parameters"]).sum())
     words = {name: plain(np.nanmedian(table)) for name, table in found.items()}
     return share(greater, found["both"].size), words | {"greater": greater, "cells": found["both"].size}
 
 
 def waves(numbers: Numbers) -> Found:
-    """Short fast waves influence the distance: from the drags of the study of waves, not from this page's sweeps.
-
-    Its verdict is set by hand: a drag shows an effect, a small one.
-    """
+    """Short fast waves influence the distance: from drags of another page; set by hand, for the effect is small."""
     drags = [doses.changes(*drag) for drag in (("in flight", 50.0), ("in flight", 250.0), ("always", 50.0))]
     (values, errors), (nothing, scatter) = drags[0], doses.changes("always", 1e-9)
     words: dict[str, object] = {"cells": len(values)}
     words["known"] = [int(np.sum(np.abs(each) > 1.96 * error)) for each, error in drags]
     words["ends"] = [f"{percent(each.min() / 100)} to {percent(each.max() / 100)}" for each, _ in drags]
     words["beyond"] = int(np.sum(np.abs(values - nothing) > 1.96 * np.hypot(errors, scatter)))
-    for way in ("fast", "slow"):
-        words[way] = minus(directions.change(way, 0.05).text())
+    words |= {way: minus(directions.change(way, 0.05).text()) for way in ("fast", "slow")}
     return Verdict.PART, words
 
 
@@ -303,7 +267,7 @@ def gradual(numbers: Numbers) -> Found:
     """A loop loses its shape gradually: nine of ten take longer than an impact lasts."""
     found = numbers["paper_strands"]["strands"]["loss_of_shape"]["rest"]
     low, median, high = found["seconds"]
-    impact = float(np.nanmedian(np.array(numbers["paper_shapes"]["impacts"]["duration"], float)))
+    impact = np.nanmedian(numbers["paper_shapes"]["impacts"]["duration"])
     words = {"low": low, "median": median, "high": high, "of_walk": plain(found["of_the_walk"][1]), "impact": impact}
     return Verdict.AGREES if low > impact else Verdict.PART if median > impact else Verdict.DIFFERS, words
 
@@ -312,7 +276,7 @@ def nonlinear(numbers: Numbers) -> Found:
     """Linear propagation of the uncertainties fails: linear terms explain less than half of the variance in a cell."""
     texts, fails = [], []
     for start, found in numbers["paper_footnote"]["nonlinear"].items():
-        shares = {name: np.maximum(np.array(each, float), 0.0) for name, each in found.items()}
+        shares = {name: np.maximum(each, 0.0) for name, each in found.items()}
         linear, squares, products, repeated = (plain(np.median(each)) for each in shares.values())
         least = shares["linear"]
         texts.append(
@@ -320,8 +284,8 @@ def nonlinear(numbers: Numbers) -> Found:
             f"({plain(least.min())} to {plain(least.max())}), with squares {squares}, with products {products}, "
             f"all but chaos {repeated}"
         )
-        fails.append(share(int((least < bounds().most).sum()), least.size))
-    return together(fails), {"shares": "; ".join(texts)}
+        fails.append(share(int((least < BOUNDS.most).sum()), least.size))
+    return together(*fails), {"shares": "; ".join(texts)}
 
 
 def figure5_shape(numbers: Numbers) -> Found:

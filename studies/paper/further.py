@@ -1,6 +1,7 @@
 """Numbers of further sweeps: strands, what the paper leaves open, rest against long holds, its last sentences."""
 
-from typing import Any, Final
+from itertools import combinations_with_replacement, product
+from typing import Any
 
 import numpy as np
 import xarray
@@ -9,17 +10,16 @@ from scipy.stats import chi2, ks_2samp
 from studies.common import DRAWN, Array, Block, at_rest, mean
 from studies.paper.statistics import paired, spread, unpaired
 
-Cells = xarray.DataArray
-"""Values of walks at rest, axes links and frequency in front, samples last."""
+Cells = xarray.DataArray  # Values of walks at rest, axes links and frequency in front, samples last
 Numbers = dict[str, Any]
 
-EVENTS: Final = {
+EVENTS = {
     "crease": "bounces_before_self_contact",
     "strands": "bounces_before_strands_met",
     "collapse": "bounces_before_collapse",
 }
 """What happens to a loop: name → column with the number of bounces begun before it, −1 if it never does."""
-CELLS: Final = ("links", "frequency")
+CELLS = ("links", "frequency")
 
 
 def values_of(table: Cells, axis: str, reference: Any) -> list[Numbers]:
@@ -38,60 +38,42 @@ def extremes(block: Block) -> list[dict[str, float]]:
     return [{"tolerance": end(block.axes["tolerance"])} for end in (np.max, np.min)]
 
 
-# --- when strands meet ---
-
-
-def endings_by_links(counts: dict[str, Cells], distance: Cells) -> list[Numbers]:
-    """Of each number of links: after how many bounces loops crease, their strands meet, they collapse; early over late.
-
-    Early is a walk whose strands met before its third bounce; walks are taken relative to the means of their cells.
-    """
-    relative, found = distance.values / mean(distance)[..., np.newaxis], []
-    for links, of_cells in enumerate(relative):
-        content: Numbers = {event: histogram(values.values[links]) for event, values in counts.items()}
-        met = counts["strands"].values[links]
-        early = (met >= 0) & (met <= 2)
-        both = [of_cells[np.isfinite(of_cells) & chosen] for chosen in (early, ~early)]
-        content |= {"early": len(both[0]), "late": len(both[1])}
-        if min(map(len, both)) > 1:
-            content["early_over_late"] = unpaired(*both).plain
-        content["second_by_cell"] = [float((cell[np.isfinite(cell)] == 2).mean()) for cell in met]
-        content["most_frequent"] = [int(np.argmax(histogram(cell))) for cell in met]
-        found.append(content)
-    return found
-
-
-def histogram(bounces: Array) -> list[int]:
+def histogram(bounces: Array) -> Array:
     """Numbers of walks with 0, 1, 2, 3 and more bounces before an event, and of those without the event."""
     known = np.where(bounces < 0, 5, np.minimum(bounces, 4))[np.isfinite(bounces)]
-    return np.bincount(known.astype(int), minlength=6).tolist()
+    return np.bincount(known.astype(int), minlength=6)
 
 
 def strands(block: Block) -> Numbers:
-    """When loops crease, their strands meet and they collapse, by start; how gradually they lose their area."""
+    """When loops crease, their strands meet and they collapse, by start and links; how gradually they lose their area.
+
+    Early is a walk whose strands met before its third bounce; walks are taken relative to the means of their cells.
+    """
     counts = {event: at_rest(block, column) for event, column in EVENTS.items()}
     met = counts["strands"].where(counts["strands"] >= 0)
     lasts, duration = at_rest(block, "collapsed_at") - at_rest(block, "softened_at"), at_rest(block, "walk_time")
     starts, loss = {}, {}
     for start in block.axes["start"].tolist():
-        here = {event: values.sel(start=start) for event, values in counts.items()}
-        starts[start] = endings_by_links(here, at_rest(block).sel(start=start))
+        here = {event: values.sel(start=start).values for event, values in counts.items()}
+        distance, starts[start] = at_rest(block).sel(start=start).values, []
+        for links, of_cells in enumerate(distance / mean(distance)[..., np.newaxis]):
+            content: Numbers = {event: histogram(values[links]) for event, values in here.items()}
+            early = (here["strands"][links] >= 0) & (here["strands"][links] <= 2)
+            both = [of_cells[np.isfinite(of_cells) & chosen] for chosen in (early, ~early)]
+            if min(map(len, both)) > 1:
+                content["early_over_late"] = unpaired(*both).plain
+            content["most_frequent"] = [np.argmax(histogram(cell)) for cell in here["strands"][links]]
+            starts[start].append(content)
         loss[start] = {
-            name: np.nanquantile(values.sel(start=start), [0.1, 0.5, 0.9]).tolist()
+            name: np.nanquantile(values.sel(start=start), [0.1, 0.5, 0.9])
             for name, values in (("seconds", lasts), ("of_the_walk", lasts / duration))
         }
     delay = paired(met.sel(start="ellipse"), met.sel(start="rest"))
     return {"starts": starts, "delay": delay.plain, "loss_of_shape": loss}
 
 
-# --- linear or not ---
-
-
 def nonlinear(block: Block) -> Numbers:
-    """Shares of the variance of Δx in each cell: of linear and further terms of what is drawn, and of all but chaos.
-
-    Terms are fitted cell by cell. What two walks of a sample share that differ in their tolerance only, is not chaos.
-    """
+    """Shares of the variance of Δx in each cell: of terms of what is drawn, and of what two tolerances share."""
     loose, tight = extremes(block)
     distance = at_rest(block)
     drawn = {name: at_rest(block, name).sel(loose) for name in block.columns if name.endswith(DRAWN)}
@@ -105,12 +87,12 @@ def nonlinear(block: Block) -> Numbers:
             known = {name: values for name, values in columns.items() if values.std() > 0}
             linear = [(values - values.mean()) / values.std() for values in known.values()]
             turning = [f(2 * np.pi * known[f"phase{DRAWN}"]) for f in (np.sin, np.cos)]
-            products = [first * second for k, first in enumerate(linear) for second in linear[: k + 1]]
+            products = [first * second for first, second in combinations_with_replacement(linear, 2)]
             squares = [each**2 for each in linear]
             for name, terms in (("linear", []), ("squares", turning + squares), ("products", turning + products)):
                 shares[name][place] = explained(one[place][kept], linear + terms)
             shares["repeated"][place] = np.corrcoef(one[place][kept], two[place][kept])[0, 1]
-        found[start] = {name: values.tolist() for name, values in shares.items()}
+        found[start] = shares
     return found
 
 
@@ -122,8 +104,6 @@ def explained(values: Array, terms: list[Array]) -> float:
     return float(1 - left / values.var(ddof=1))
 
 
-# --- loops at their release ---
-
 HEIGHT, ENERGY = "sprocket_height", "energy_kinetic_at_release"
 
 
@@ -134,12 +114,11 @@ def every(block: Block, values: Array) -> Cells:
 
 def loops(block: Block) -> Numbers:
     """Height of the sprocket over the floor [µm] and kinetic energy [µJ] at the release, means over the phases."""
-    further = [name for name in ("start", "further_hold") if name in block.dims]
-    found: Numbers = {name: block.axes[name].tolist() for name in further}
+    held = [name for name in ("start", "further_hold") if name in block.dims]
+    found: Numbers = {name: block.axes[name] for name in held}
     for name, column in (("height", HEIGHT), ("energy", ENERGY)):
-        values = every(block, block.columns[column]).transpose(*CELLS, *further, ...).values
-        means = values.mean(axis=tuple(range(2 + len(further), values.ndim)))
-        found[name] = np.rint(1e6 * means).astype(int).tolist()
+        values = every(block, block.columns[column]).transpose(*CELLS, *held, ...).values
+        found[name] = np.rint(1e6 * values.mean(axis=tuple(range(2 + len(held), values.ndim)))).astype(int)
     return found
 
 
@@ -148,19 +127,18 @@ def same_loops(block: Block) -> Numbers:
     places = np.empty(block.columns["status"].shape)
     for at in np.ndindex(places.shape):
         places[at] = block.walk_motion(at).center[0, 0]
-    found = {}
+    found: Numbers = {}
     for name, values in (("height", block.columns[HEIGHT]), ("place", places), ("energy", block.columns[ENERGY])):
         table = every(block, values).transpose(*CELLS, "start", "sample")
         spinning = table.sel(start="spinning").values
         change = table.sel(start="rest").values - spinning
-        change = (change / spinning if name == "energy" else 1e6 * change).ravel()
-        found[name] = [float(each) for each in (change.mean(), change.std(ddof=1), np.abs(change).max())]
-    return found | {"pairs": int(change.size)}
+        change = change / spinning if name == "energy" else 1e6 * change
+        found[name] = [change.mean(), np.abs(change).max()]
+    return found | {"pairs": change.size}
 
 
-# --- links that pass through one another, and what else the paper leaves open ---
-
-REFERENCES: Final = {
+REFERENCES = {
+    "start": "rest",
     "sprocket_radius_is": "contact",
     "circle_radius": 4.2e-3,
     "clearance": 0.01,
@@ -168,13 +146,13 @@ REFERENCES: Final = {
     "phase": 0.0,
     "ellipse_aspect": 1.5,
 }
-"""What is chosen here."""
+"""What is chosen where walks are not told otherwise."""
 
 
 def through(block: Block) -> Numbers:
     """What it does to Δx if links pass through one another, cell by cell."""
-    (found,) = values_of(at_rest(block), "self_contact", True)
-    return {name: values for name, values in found.items() if name != "value"}
+    table = at_rest(block)
+    return paired(table.sel(self_contact=False), table.sel(self_contact=True)).plain
 
 
 def left_open(*blocks: Block) -> Numbers:
@@ -184,12 +162,9 @@ def left_open(*blocks: Block) -> Numbers:
         (name,) = (axis for axis in block.axes if axis not in CELLS)
         table, reference = at_rest(block), REFERENCES[name]
         here = table.isel({name: block.axes[name].tolist().index(reference)})
-        content = {"reference": reference, "spread": float(np.nanmedian(spread(here)))}
+        content = {"reference": reference, "spread": np.nanmedian(spread(here))}
         found[name] = content | {"values": values_of(table, name, reference)}
     return found
-
-
-# --- from rest and after a long hold ---
 
 
 def rest_and_hold(block: Block) -> Numbers:
@@ -208,28 +183,25 @@ def rest_and_hold(block: Block) -> Numbers:
         effect = paired(*(table.sel(start=start, further_hold=hold) for start, hold in pair))
         over = effect.cells
         summary = {"mean": over.mean, "error": over.error, "chi2": over.chi2, "cells": len(over)}
-        found[name] = {**effect.plain, **summary, "p": float(chi2.sf(over.chi2, len(over)))}
+        found[name] = {**effect.plain, **summary, "p": chi2.sf(over.chi2, len(over))}
     return found
 
 
-# --- further sentences ---
-
-FRICTION, DAMPING = 0.27, 1000.0
-"""Of the floor and of joints, in Table 1."""
-OWN_LENGTH: Final = "links_of_12_7_mm"
-LENGTHS: Final = {"links_of_11_mm": 11.0, "links_of_15_mm": 15.0, "links_of_18_mm": 18.0}
-"""Blocks with links of other lengths [mm], with the masses and inertias of their length."""
+FRICTION, DAMPING = 0.27, 1000.0  # Of the floor and of joints, in Table 1
+OWN_LENGTH = "links_of_12_7_mm"
+LENGTHS = {"11": "links_of_11_mm", "15": "links_of_15_mm", "18": "links_of_18_mm"}
+"""Links of other lengths [mm], with the masses and inertias of their length, and their blocks."""
 
 
 def more(*blocks: Block) -> Numbers:
-    """Longer links of their mass, sliding with less friction, undamped joints, distributions at both tolerances."""
+    """Longer links of their mass, sliding with less friction, undamped joints."""
     known = {block.name: block for block in blocks}
     lengths = {
-        f"{length:g}": {
+        length: {
             quantity: unpaired(of(known[name]), of(known[OWN_LENGTH])).plain
             for quantity, of in (("dx", at_rest), ("until_collapse", until_collapse))
         }
-        for name, length in LENGTHS.items()
+        for length, name in LENGTHS.items()
     }
     block, sliding = known["sliding"], {}
     slid = at_rest(block, "walk_time") - at_rest(block, "collapsed_at")
@@ -249,14 +221,11 @@ def until_collapse(block: Block) -> Cells:
 def distributions(block: Block) -> list[Numbers]:
     """Of each cell: Δx at both tolerances, and whether it is of one distribution (Kolmogorov and Smirnov)."""
     table, found = at_rest(block), []
-    for links in block.axes["links"].tolist():
-        for frequency in block.axes["frequency"].tolist():
-            cell = table.sel(links=links, frequency=frequency)
-            both = [cell.sel(each).dropna("sample").values for each in extremes(block)]
-            test = ks_2samp(*both)
-            content = {"links": links, "frequency": frequency}
-            content |= {"distance": float(test.statistic), "p": float(test.pvalue)}
-            content["means"] = [float(each.mean()) for each in both]
-            content["sds"] = [float(each.std(ddof=1)) for each in both]
-            found.append(content | {"walks": [len(each) for each in both]})
+    for links, frequency in product(*(block.axes[name].tolist() for name in CELLS)):
+        cell = table.sel(links=links, frequency=frequency)
+        both = [cell.sel(each).dropna("sample").values for each in extremes(block)]
+        test = ks_2samp(*both)
+        content = {"links": links, "frequency": frequency, "distance": test.statistic, "p": test.pvalue}
+        content |= {"means": [each.mean() for each in both], "sds": [each.std(ddof=1) for each in both]}
+        found.append(content | {"walks": [len(each) for each in both]})
     return found

@@ -4,47 +4,32 @@ Everything follows from the frames of walks that a sweep kept.
 """
 
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
-from studies.common import Array, Block
+from studies.common import Array, Block, area_of
 
-Motion = Any
-"""The kept motion of a walk, as `Block.walk_motion` returns it."""
-
-TOUCH: Final = 3e-4
-"""A loop touches the floor while its lowest circle is less than this above it [m]."""
-APART: Final = 0.02
-"""Touches less than this apart [s] are one impact: fast loops lose the floor for 10 ms while they roll over it."""
+TOUCH = 3e-4  # A loop touches the floor while its lowest circle is less than this above it [m]
+APART = 0.02  # Touches less apart [s] are one impact: fast loops lose the floor for 10 ms while they roll over it
 
 
 @dataclass(frozen=True)
 class Impact:
-    """The loop just before its first impact and just after it has left the floor again.
+    """The loop just before its first impact and just after it has left the floor again."""
 
-    Attributes:
-        before: joints x, y from the centroid of the joints [m], shape (n, 2).
-        after: likewise.
-        duration: time between the two frames [s].
-        area, height, width, speed: relative changes of the enclosed area, the height, the width and the mean speed of
-            the links along the loop.
-        moved: how far the outline moved, root mean square, over the radius of a circle of the same area; the loop may
-            turn on along itself meanwhile.
-    """
-
-    before: Array
+    before: Array  # Joints x, y from the centroid of the joints [m], shape (n, 2)
     after: Array
-    duration: float
-    area: float
+    duration: float  # Time between the two frames [s]
+    area: float  # Relative changes: of the enclosed area, …
     height: float
     width: float
-    speed: float
-    moved: float
+    speed: float  # … and of the mean speed of the links along the loop
+    moved: float  # By how much the outline moved, root mean square, over the radius of a circle of the same area
 
 
-def first_impact(walk: Motion) -> Impact | None:
-    """The first impact of a walk; None if its loop did not rise again or no frame lies before the impact."""
+def first_impact(walk: Any) -> Impact | None:
+    """The first impact of a kept motion; None if its loop did not rise again or no frame lies before the impact."""
     joints, time = walk.frame_joints, walk.frame_time
     lowest = joints[:, :, 1].min(axis=1) - walk.setup.parameters.circle_radius
     touches = np.flatnonzero((lowest < TOUCH) & (time > 0))
@@ -57,8 +42,11 @@ def first_impact(walk: Motion) -> Impact | None:
         return None
     last = int(ends[0])
     before, after = (joints[place] - joints[place].mean(axis=0) for place in (first - 1, last + 1))
-    sizes = [(abs(_area(each)), *np.ptp(each, axis=0)) for each in (before, after)]
+    sizes = [(area_of(each), *np.ptp(each, axis=0)) for each in (before, after)]
     area, width, height = (float(new / old - 1) for old, new in zip(*sizes, strict=True))
+    # How far the outline moved, at the best of all shifts by whole links.
+    shifts = (np.roll(after, shift, axis=0) for shift in range(len(after)))
+    moved = np.sqrt(min(np.sum((before - each) ** 2, axis=1).mean() for each in shifts))
     return Impact(
         before=before,
         after=after,
@@ -67,7 +55,7 @@ def first_impact(walk: Motion) -> Impact | None:
         height=height,
         width=width,
         speed=_speed(joints, time, last + 1) / _speed(joints, time, first - 2) - 1,
-        moved=_moved(before, after) / float(np.sqrt(sizes[0][0] / np.pi)),
+        moved=float(moved) / float(np.sqrt(sizes[0][0] / np.pi)),
     )
 
 
@@ -75,8 +63,7 @@ def impacts(block: Block) -> tuple[dict[tuple[int, ...], list[Impact]], int]:
     """The first impacts of all walks whose motion was kept, by cell; and the number of walks without one."""
     found: dict[tuple[int, ...], list[Impact]] = {}
     without = 0
-    for place in zip(*np.nonzero(block.kept), strict=True):
-        *cell, sample = map(int, place)
+    for *cell, sample in np.argwhere(block.kept).tolist():
         impact = first_impact(block.walk_motion((*cell, sample)))
         if impact is None:
             without += 1
@@ -85,26 +72,11 @@ def impacts(block: Block) -> tuple[dict[tuple[int, ...], list[Impact]], int]:
     return found, without
 
 
-def _area(outline: Array) -> float:
-    """Area that an outline encloses [m²], positive if it runs anticlockwise."""
-    x, y = outline.T
-    return float(0.5 * np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
-
-
 def _speed(joints: Array, time: Array, place: int) -> float:
-    """Mean speed of the joints along the loop [m/s] from one frame to the next.
-
-    The mean of what each joint moves along the tangent half-way, in the frame of the centroid.
-    """
+    """Mean speed of the joints along the tangents half-way to the next frame, seen from the centroid [m/s]."""
     now, then = (joints[number] - joints[number].mean(axis=0) for number in (place, place + 1))
     middle = (now + then) / 2
     tangent = np.roll(middle, -1, axis=0) - np.roll(middle, 1, axis=0)
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
     along = np.sum((then - now) * tangent, axis=1).mean()
     return float(along / (time[place + 1] - time[place]))
-
-
-def _moved(before: Array, after: Array) -> float:
-    """Root mean square distance of two outlines [m], at the best of all shifts by whole links."""
-    shifts = (np.roll(after, shift, axis=0) for shift in range(len(after)))
-    return float(np.sqrt(min(np.sum((before - each) ** 2, axis=1).mean() for each in shifts)))

@@ -7,30 +7,22 @@ import hashlib
 import json
 import re
 from collections.abc import Callable, Mapping
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
 from studies.common import Block, at_rest, deviation, mean
 from studies.paper import further
-from studies.paper.further import CELLS, Cells, Numbers, extremes, until_collapse, values_of
+from studies.paper.further import CELLS, Cells, Numbers, until_collapse, values_of
 from studies.paper.impacts import impacts
-from studies.paper.statistics import paired, spread, unpaired
+from studies.paper.statistics import Effect, paired, spread, unpaired
 from warpchain import InputError, Parameters, SweepResult, preset
 
-DIGITS: Final = 4
-"""Significant digits that are kept."""
-
-DEFAULTS: Final = {"clearance": 0.01, "phase": 0.0}
-"""Scene of a walk that is not told otherwise: height of the release [m] and part of a loop period."""
+DIGITS = 4  # Significant digits that are kept
 
 
 def reduced(result: SweepResult) -> Numbers:
-    """The numbers of one sweep.
-
-    Raises:
-        InputError: it is none of `SWEEPS`, or not complete.
-    """
+    """The numbers of one sweep."""
     if result.name not in SWEEPS:
         raise InputError(f"{result.name}: no sweep of this page; give folders of {', '.join(SWEEPS)}")
     if result.missing_count:
@@ -43,10 +35,10 @@ def reduced(result: SweepResult) -> Numbers:
         "inaccurate": result.inaccurate_count,
     }
     for block in result.blocks.values():
-        content.setdefault("cells", {name: block.axes[name].tolist() for name in CELLS})
-        further = [name for name in block.axes if name not in CELLS]
-        if further and result.name in ("paper_claims", "paper_joints", "paper_tolerance"):
-            content.setdefault("effects", {})[further[0]] = effects_of(result, block, further[0], at_rest(block))
+        content.setdefault("cells", {name: block.axes[name] for name in CELLS})
+        varied = [name for name in block.axes if name not in CELLS]
+        if varied and result.name in ("paper_claims", "paper_joints"):
+            content.setdefault("effects", {})[varied[0]] = effects_of(result, block, varied[0], at_rest(block))
     if result.name in WHOLE:
         key, reduce = WHOLE[result.name]
         content[key] = reduce(*result.blocks.values())
@@ -70,36 +62,31 @@ def content_digest(sweep: Mapping[str, Any]) -> str:
 
 
 def effects_of(result: SweepResult, block: Block, name: str, table: Cells) -> Numbers:
-    """What each value of a block's further axis `name` does to a quantity, against a reference on the axis.
-
-    Raises:
-        InputError: the reference is not on the axis.
-    """
-    values, reference = block.axes[name].tolist(), _reference(result, block, name)
-    if reference not in values:
+    """What each value of a block's further axis `name` does to a quantity, against that of the paper."""
+    if name in Parameters.model_fields:
+        given = next(each for each in result.sweep["blocks"] if each["name"] == block.name)
+        reference: Any = float(getattr(preset(given["preset"]), name))
+    else:
+        reference = further.REFERENCES[name]
+    if reference not in (values := block.axes[name].tolist()):
         raise InputError(f"{name}: {reference} is not among {values}; give a sweep that has it")
     return {"reference": reference, "values": values_of(table, name, reference)}
 
 
 def starts(block: Block) -> Numbers:
-    """Of each start means of Δx, bounces and losses, and the steps of Δx along both axes of the cells.
-
-    A loss is a share of the energy that a walk loses from its release to rest.
-    """
+    """Of each start means of Δx, bounces and shares of the losses of energy, and steps of Δx along both axes."""
     lost = {name: at_rest(block, name) for name in block.columns if name.startswith("loss_")}
     total = np.sum([values.values for values in lost.values()], axis=0)
     content: Numbers = {}
     for start in block.axes["start"].tolist():
         here, bounces = (at_rest(block, name).sel(start=start) for name in ("dx", "bounces"))
-        shares = {name.removeprefix("loss_"): mean((each / total).sel(start=start)) for name, each in lost.items()}
         content[start] = {
-            "count": here.notnull().sum("sample").values.tolist(),
-            "mean": mean(here).tolist(),
-            "sd": deviation(here).tolist(),
-            "bounces": mean(bounces).tolist(),
+            "mean": mean(here),
+            "sd": deviation(here),
+            "bounces": mean(bounces),
             "faster": unpaired(here.values[:, 1:], here.values[:, :-1]).plain,
             "longer": unpaired(here.values[1:], here.values[:-1]).plain,
-            "losses": {name: share.tolist() for name, share in shares.items()},
+            "losses": {name[len("loss_") :]: mean((each / total).sel(start=start)) for name, each in lost.items()},
         }
     return content
 
@@ -107,73 +94,55 @@ def starts(block: Block) -> Numbers:
 def friction(block: Block) -> Numbers:
     """The friction of the floor with which chains walk farthest, cell by cell."""
     means, values = mean(at_rest(block)), block.axes["floor_friction"]
-    best = values[np.argmax(np.nan_to_num(means, nan=-np.inf), axis=-1)]
-    return {"values": values.tolist(), "best": best.tolist(), "mean": means.tolist()}
+    return {"values": values, "best": values[np.argmax(np.nan_to_num(means, nan=-np.inf), axis=-1)], "mean": means}
 
 
 def spreads(blocks: Mapping[str, Block]) -> Numbers:
     """Relative standard deviation of Δx in each cell: everything drawn, the release alone, the parameters alone."""
     everything = at_rest(blocks["gravity"]).sel(gravity=preset("soft").gravity, method="nearest")
-    tables = {"both": everything, "release": at_rest(blocks["release_only"])}
-    tables["parameters"] = at_rest(blocks["parameters_only"])
-    return {name: spread(table).tolist() for name, table in tables.items()}
+    alone = {name: at_rest(blocks[f"{name}_only"]) for name in ("release", "parameters")}
+    return {name: spread(table) for name, table in {"both": everything, **alone}.items()}
 
 
 def tolerance(block: Block) -> Numbers:
     """How far walks and means differ at two tolerances."""
-    values = block.axes["tolerance"]
-    loose, tight = (at_rest(block).sel(end).values for end in extremes(block))
+    loose, tight = (at_rest(block).sel(end).values for end in further.extremes(block))
     single = np.abs(loose / tight - 1)
     single = single[np.isfinite(single)]
     return {
-        "loose": float(values.max()),
-        "tight": float(values.min()),
         "walks": len(single),
-        "within_a_tenth": int((single <= 0.1).sum()),
-        "median": float(np.median(single)),
-        "nine_of_ten": float(np.quantile(single, 0.9)),
-        "greatest": float(single.max()),
+        "within_a_tenth": (single <= 0.1).sum(),
+        "median": np.median(single),
+        "greatest": single.max(),
         "means": paired(loose, tight).plain,
     }
 
 
 def first_impacts(block: Block) -> Numbers:
-    """Changes of shape and speed in the first impact, means over the walks of each cell."""
+    """Changes of shape and speed in the first impact, means over the walks of each cell, and of all walks."""
     found, without = impacts(block)
-    shape = tuple(len(block.axes[name]) for name in CELLS)
     content: Numbers = {"walks": sum(map(len, found.values())), "without": without}
     for name in ("area", "height", "width", "speed", "moved", "duration"):
-        table = np.full(shape, np.nan)
+        table = np.full([len(block.axes[axis]) for axis in CELLS], np.nan)
         for cell, several in found.items():
             table[cell] = np.mean([getattr(impact, name) for impact in several])
-        content[name] = table.tolist()
+        content[name] = table
     every = [impact for several in found.values() for impact in several]
     for name in ("area", "height", "width", "speed"):
         values = np.array([getattr(impact, name) for impact in every])
-        tails = np.quantile(values, [0.05, 0.5, 0.95]) if len(values) else np.full(3, np.nan)
         content[f"{name}_of_walks"] = {
-            "quantiles": tails.tolist(),
-            "within_a_tenth": int((np.abs(values) <= 0.1).sum()),
-            "falls": int((values < 0).sum()),
-            "falls_by_less_than_a_fifth": int(((values < 0) & (values > -0.2)).sum()),
+            "quantiles": np.quantile(values, [0.05, 0.5, 0.95]),
+            "within_a_tenth": (np.abs(values) <= 0.1).sum(),
+            "falls": (values < 0).sum(),
+            "falls_by_less_than_a_fifth": ((values < 0) & (values > -0.2)).sum(),
         }
     return content
 
 
-def _reference(result: SweepResult, block: Block, name: str) -> float | str:
-    """The value that others are compared with: that of the paper, or what the paper begins with."""
-    if name == "start":
-        return "rest"
-    if name == "tolerance":
-        return float(block.axes[name].min())
-    if name in Parameters.model_fields:
-        given = next(each for each in result.sweep["blocks"] if each["name"] == block.name)
-        return float(getattr(preset(given["preset"]), name))
-    return DEFAULTS[name]
-
-
 def rounded(content: Any) -> Any:
-    """The same with floats of `DIGITS` significant digits, and None for what is no finite number."""
+    """Plain numbers: floats of `DIGITS` significant digits, and None for what is no finite number."""
+    if hasattr(content, "tolist"):
+        content = content.tolist()
     if isinstance(content, Mapping):
         return {name: rounded(value) for name, value in content.items()}
     if isinstance(content, list):
@@ -189,7 +158,19 @@ def text_of(content: Mapping[str, Any]) -> str:
     return re.sub(r"\[[^\[\]{}]*\]", lambda match: re.sub(r"\s+", " ", match[0]), text) + "\n"
 
 
-WHOLE: Final[dict[str, tuple[str, Callable[..., Any]]]] = {
+def read(text: str) -> Numbers:
+    """The numbers of such a file, with effects and arrays in their places."""
+
+    def found(content: Numbers) -> Any:
+        if "half_width" in content:
+            return Effect.of(content)
+        tables = {name: each for name, each in content.items() if isinstance(each, list) and isinstance(each[0], list)}
+        return content | {name: np.array(each, float) for name, each in tables.items()}
+
+    return json.loads(text, object_hook=found)
+
+
+WHOLE: dict[str, tuple[str, Callable[..., Any]]] = {
     "paper_tolerance": ("tolerance", tolerance),
     "paper_shapes": ("impacts", first_impacts),
     "paper_strands": ("strands", further.strands),
@@ -205,5 +186,4 @@ WHOLE: Final[dict[str, tuple[str, Callable[..., Any]]]] = {
     "paper_distributions": ("distributions", further.distributions),
 }
 """Sweeps that one function reduces, of its blocks: name → key of its numbers, and the function."""
-SWEEPS: Final = ("paper_claims", "paper_joints", *WHOLE)
-"""Sweeps that the page is made of."""
+SWEEPS = ("paper_claims", "paper_joints", *WHOLE)  # Sweeps that the page is made of

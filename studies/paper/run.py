@@ -1,9 +1,4 @@
-"""Makes studies/paper/README.md with its figures, from the folders of the sweeps that test what the paper says.
-
-    for each in claims joints tolerance shapes; do
-        warpchain sweep studies/paper/sweeps/paper_$each.yaml -o paper_$each
-    done
-    python -m studies.paper.run paper_claims paper_joints paper_tolerance paper_shapes
+"""Makes README.md with its figures, from the folders of the sweeps that test what the paper says.
 
 The numbers go to results/paper_claims.json, and the page is rendered from that file: without a folder only page and
 figures are made anew. Sweeps whose folder is not given keep their numbers.
@@ -11,19 +6,18 @@ figures are made anew. Sweeps whose folder is not given keep their numbers.
 
 import json
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any
 
 import typer
 
 import warpchain
-from studies.common import publish, run_study, write_text
+from studies.common import publish, run_study
 from studies.paper.drawing import figures
-from studies.paper.reduction import SWEEPS, reduced, text_of
+from studies.paper.reduction import SWEEPS, read, reduced, text_of
 from studies.paper.tables import page
 
-FOLDER: Final = Path(__file__).parent
-RESULTS: Final = Path("results/paper_claims.json")
-"""Where the numbers are, in the folder of the page."""
+FOLDER = Path(__file__).parent
+RESULTS = Path("results/paper_claims.json")  # Where the numbers are, in the folder of the page
 
 
 def make(folders: Annotated[list[Path] | None, typer.Argument()] = None, out: Path = FOLDER) -> None:
@@ -33,11 +27,12 @@ def make(folders: Annotated[list[Path] | None, typer.Argument()] = None, out: Pa
     known |= {name: reduced(sweep) for name, sweep in sweeps.items()}
     if missing := [name for name in SWEEPS if name not in known]:
         raise warpchain.InputError(f"{missing[0]}: no numbers of this sweep; give its folder")
-    numbers = {name: known[name] for name in SWEEPS}
+    text = text_of({name: known[name] for name in SWEEPS})
     if folders:
-        write_text(out / RESULTS, text_of(numbers))
-    write_text(out / "README.md", page(json.loads(text_of(numbers))))
-    publish(out, {}, dict(figures(numbers, sweeps)))
+        (out / RESULTS).write_text(text, encoding="utf-8")
+    numbers = read(text)
+    (out / "README.md").write_text(page(numbers), encoding="utf-8")
+    publish(out, {}, figures(numbers, sweeps))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,4 @@
-"""How far apart along the chain links are that touch: creases of one strand, and two strands of the loop.
-
-    python -m studies.paper.separations     # five minutes → results/separations.csv
+"""How far apart along the chain links are that touch, in walks of five minutes → results/separations.csv.
 
 Walks from the sprocket, frames 0.5 ms apart; touches before the collapse, of joints at least 2 links apart, that are no
 growth of an older one: no joint within 4 links of either has touched one within 4 of the other in a frame before.
@@ -9,47 +7,38 @@ growth of an older one: no joint within 4 links of either has touched one within
 from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
-from typing import Final
 
 import numpy as np
+from scipy.ndimage import maximum_filter
+from scipy.spatial.distance import cdist
 
 import warpchain
 from studies.common import Array, read_columns, table, write_rows
 
-RESULTS: Final = Path(__file__).parent / "results" / "separations.csv"
-LINKS: Final = (60, 90, 120, 150, 180)
-FREQUENCIES: Final = (10.0, 15.0, 20.0, 25.0, 30.0)
-RELEASES: Final = ((0.0, 0.008), (0.4, 0.0096))
-"""Phase and clearance [m]."""
-AROUND: Final = 4
-HIGH: Final = 0.04
-"""Height above the lowest joint [m] from which a touch is not one on the floor."""
-BINS: Final = ((2, 3), (4, 8), (9, 12), (13, 16), (17, 21), (22, 28), (29, 35), (36, 90))
-LEAST: Final = (2, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 30, 40)
-"""Values of m."""
+RESULTS = Path(__file__).parent / "results" / "separations.csv"
+LINKS = (60, 90, 120, 150, 180)
+FREQUENCIES = (10.0, 15.0, 20.0, 25.0, 30.0)
+RELEASES = ((0.0, 0.008), (0.4, 0.0096))  # Phase and clearance [m]
+HIGH = 0.04  # Height above the lowest joint [m] from which a touch is not one on the floor
+BINS = ((2, 3), (4, 8), (9, 12), (13, 16), (17, 21), (22, 28), (29, 35), (36, 90))
+LEAST = (2, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 30, 40)  # Values of m
 
 
 def touches(walk: warpchain.WalkResult) -> Iterator[tuple[float, int, float]]:
     """Time [s] over that of the collapse, links apart, and height [m] of each new touch."""
-    links = walk.setup.scene.links
-    reach = 2 * walk.setup.parameters.circle_radius
-    number = np.arange(links)
-    apart = np.abs(number[:, None] - number)
+    links, reach = walk.setup.scene.links, 2 * walk.setup.parameters.circle_radius
+    apart = np.abs(np.subtract.outer(np.arange(links), np.arange(links)))
     apart = np.minimum(apart, links - apart)
     end = walk.collapsed_at if np.isfinite(walk.collapsed_at) else walk.walk_time
     old: Array = np.zeros((links, links), dtype=bool)
     for time, joints in zip(walk.frame_time, walk.frame_joints, strict=True):
         if time > end:
             return
-        x, y = joints.T
-        now = ((x[:, None] - x) ** 2 + (y[:, None] - y) ** 2 < reach**2) & (apart >= 2)
+        y = joints[:, 1]
+        now = (cdist(joints, joints, "sqeuclidean") < reach**2) & (apart >= 2)
         for i, j in zip(*np.nonzero(np.triu(now & ~old)), strict=True):
             yield float(time / end), int(apart[i, j]), float(max(y[i], y[j]) - y.min())
-        shifts = range(-AROUND, AROUND + 1)
-        for first in shifts:
-            rolled = np.roll(now, first, axis=0)
-            for second in shifts:
-                old |= np.roll(rolled, second, axis=1)
+        old |= maximum_filter(now, 9, mode="wrap")  # 4 links around
 
 
 def main() -> None:

@@ -1,56 +1,55 @@
-"""Differences of mean distances between cells of a sweep, with their errors.
+"""Differences of mean distances between cells of a sweep, with their errors, and how pages have them.
 
 A cell is a number of links and a frequency. Values have the shape (..., samples). Walks that did not come to rest are
 NaN and take no part; what they leave is counted.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import t
 
-from studies.common import Array, OverCells, deviation, mean, over_cells, standard_error
+from studies.common import Array, OverCells, deviation, mean, minus, standard_error
 
-CONFIDENCE: Final = 0.95
-"""Confidence level of every test and interval."""
+CONFIDENCE = 0.95  # Confidence level of every test and interval
 
 
 @dataclass(frozen=True)
 class Effect:
-    """What a change does to the mean of a quantity, cell by cell; every array has the shape of the cells.
+    """What a change does to the mean of a quantity, cell by cell; every array has the shape of the cells."""
 
-    Attributes:
-        relative: mean after the change over that before it, less 1; NaN without two walks to compare.
-        half_width: half of the 95 % interval of `relative`; NaN likewise.
-        sign: 1 if the mean rises and −1 if it falls, at 95 %; 0 if neither can be said.
-        pairs: number of pairs of walks; of two independent samples the smaller number of walks.
-        lost: walks or pairs left out, because a walk did not come to rest.
-    """
-
-    relative: Array
-    half_width: Array
-    sign: Array
-    pairs: Array
-    lost: int
+    relative: Array  # Mean after the change over that before it, less 1; NaN without two walks to compare
+    half_width: Array  # Half of the 95 % interval of `relative`; NaN likewise
+    sign: Array  # 1 if the mean rises and −1 if it falls, at 95 %; 0 if neither can be said
+    pairs: Array  # Number of pairs of walks; of two independent samples the smaller number of walks
+    lost: int  # Walks or pairs left out, because a walk did not come to rest
+    notes: Mapping[str, Any] = field(default_factory=dict)  # What else a file has of it, such as the value it is of
 
     @classmethod
     def of(cls, content: Mapping[str, Any]) -> "Effect":
         """The effect that `plain` wrote, with its numbers rounded; null stands for NaN."""
         kinds = {"relative": float, "half_width": float, "sign": int, "pairs": int}
-        return cls(**{name: np.array(content[name], kind) for name, kind in kinds.items()}, lost=int(content["lost"]))
+        arrays = {name: np.array(content[name], kind) for name, kind in kinds.items()}
+        return cls(**arrays, lost=content["lost"], notes={name: content[name] for name in content if name not in kinds})
 
     @property
     def plain(self) -> dict[str, Any]:
-        """The effect as plain numbers."""
-        return {name: np.asarray(values).tolist() for name, values in vars(self).items() if name != "cells"}
+        """The numbers by their names."""
+        return {name: getattr(self, name) for name in ("relative", "half_width", "sign", "pairs", "lost")}
 
     def __getitem__(self, rows: Any) -> "Effect":
         """The effect in some of the cells."""
         return Effect(self.relative[rows], self.half_width[rows], self.sign[rows], self.pairs[rows], self.lost)
+
+    def __str__(self) -> str:
+        """Mean over the cells, or the effect in the only one, with its interval."""
+        if self.relative.ndim == 0:
+            return percent(float(self.relative), float(self.half_width))
+        return percent(self.cells.mean, 1.96 * self.cells.error)
 
     @property
     def known(self) -> Array:
@@ -60,7 +59,7 @@ class Effect:
     @cached_property
     def cells(self) -> OverCells:
         """All cells that could be compared together; the interval of their mean says nothing of other cells."""
-        return over_cells(self.relative, self.half_width / _factor(self.pairs - 1))
+        return OverCells(self.relative, self.half_width / _factor(self.pairs - 1))
 
     @property
     def count(self) -> int:
@@ -78,13 +77,26 @@ class Effect:
         return int((self.sign[self.known] < 0).sum())
 
 
-def paired(values: ArrayLike, reference: ArrayLike) -> Effect:
-    """Compare the same samples after and before a change, `reference`.
+def percent(value: float, half_width: float | None = None, *, sign: bool = True) -> str:
+    """A share in per cent with two significant digits of its interval, such as ``+3.1 ± 0.4 %``."""
+    if not np.isfinite(value):
+        return "—"
+    number, width = 100 * value, 100 * (half_width or np.nan)
+    if np.isfinite(width):
+        digits, end = 0 if width >= 2 else 1 if width >= 0.2 else 2, " ± {:.{}f}"
+    else:
+        digits, end = 0 if abs(number) >= 10 else 1, ""
+    return minus(f"{number:{'+' if sign else ''}.{digits}f}") + f"{end.format(width, digits)} %"
 
-    The sign is that of a t test of the mean difference; the interval of the ratio of the means follows from its
-    linearisation.
-    """
-    both = np.isfinite(values) & np.isfinite(reference)
+
+def plain(value: float) -> str:
+    """A share in per cent without a sign."""
+    return percent(float(value), sign=False)
+
+
+def paired(values: ArrayLike, reference: ArrayLike) -> Effect:
+    """Compare the same samples after and before a change by a t test; the interval is that of the linearised ratio."""
+    both = np.asarray(np.isfinite(values) & np.isfinite(reference))
     after, before = (np.where(both, each, np.nan) for each in (values, reference))
     pairs = both.sum(axis=-1)
 

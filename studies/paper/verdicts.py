@@ -1,50 +1,23 @@
 """Rules by which numbers become verdicts."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from contextvars import ContextVar
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
-from typing import Final
 
 
-@dataclass(frozen=True)
+@dataclass
 class Bounds:
-    """What the rules allow.
+    """What the rules allow."""
 
-    Attributes:
-        few: share of comparisons that may contradict a claim: a test at 95 % errs in one of twenty.
-        most: share of comparisons that must show what a claim says.
-        unseen: greatest relative effect that "no dependence" may mean: means of the paper's 12 walks, of which each
-            scatters by 5 to 10 %, differ by that much by chance.
-        little: greatest relative effect that "little effect" may mean.
-        moderate: greatest standard deviation of a walk over the mean of its cell that "moderately" may mean.
-    """
-
-    few: float = 0.1
-    most: float = 0.5
+    few: float = 0.1  # Share of comparisons that may contradict a claim: a test at 95 % errs in one of twenty
+    most: float = 0.5  # Share of comparisons that must show what a claim says
     unseen: float = 0.05
-    little: float = 0.1
-    moderate: float = 0.2
+    """Greatest relative effect that "no dependence" may mean: means of the paper's 12 walks, of which each scatters by
+    5 to 10 %, differ by that much by chance."""
+    little: float = 0.1  # Greatest relative effect that "little effect" may mean
+    moderate: float = 0.2  # Greatest standard deviation of a walk over its mean that "moderately" may mean
 
 
-USUAL: Final = Bounds()
-_bounds: ContextVar[Bounds] = ContextVar("bounds", default=USUAL)
-
-
-def bounds() -> Bounds:
-    """The bounds that hold now."""
-    return _bounds.get()
-
-
-@contextmanager
-def scaled(name: str, factor: float) -> Iterator[None]:
-    """Within it a bound is so many times as great."""
-    token = _bounds.set(replace(USUAL, **{name: factor * getattr(USUAL, name)}))
-    try:
-        yield
-    finally:
-        _bounds.reset(token)
+BOUNDS = Bounds()  # Those that hold now; the page tries others
 
 
 class Verdict(StrEnum):
@@ -60,9 +33,9 @@ def direction(with_claim: int, against: int, comparisons: int) -> Verdict:
     """A claim that something rises, or falls, from the significant comparisons with it and against it, and all."""
     if not comparisons:
         return Verdict.OPEN
-    if with_claim >= bounds().most * comparisons and against <= bounds().few * comparisons:
+    if with_claim >= BOUNDS.most * comparisons and against <= BOUNDS.few * comparisons:
         return Verdict.AGREES
-    in_part = with_claim > bounds().few * comparisons and with_claim >= against
+    in_part = with_claim > BOUNDS.few * comparisons and with_claim >= against
     return Verdict.PART if in_part else Verdict.DIFFERS
 
 
@@ -70,14 +43,12 @@ def share(fulfilled: int, cases: int) -> Verdict:
     """A claim about every case: agrees if nearly all fulfil it, in part if at least half do."""
     if not cases:
         return Verdict.OPEN
-    if fulfilled >= (1 - bounds().few) * cases:
+    if fulfilled >= (1 - BOUNDS.few) * cases:
         return Verdict.AGREES
-    return Verdict.PART if fulfilled >= bounds().most * cases else Verdict.DIFFERS
+    return Verdict.PART if fulfilled >= BOUNDS.most * cases else Verdict.DIFFERS
 
 
-def together(verdicts: list[Verdict]) -> Verdict:
+def together(*verdicts: Verdict) -> Verdict:
     """Verdict on a claim of several parts: theirs if they are the same, else in part."""
-    kinds = set(verdicts) - {Verdict.OPEN}
-    if not kinds:
-        return Verdict.OPEN
+    kinds = {*verdicts} - {Verdict.OPEN} or {Verdict.OPEN}
     return kinds.pop() if len(kinds) == 1 else Verdict.PART

@@ -5,8 +5,7 @@ the diagram share their deviations. Everything is of ln Δx, every cell counts a
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Final
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -16,27 +15,16 @@ from studies.common import table as markdown
 from studies.phase_diagram import laws, scales
 from studies.phase_diagram.laws import Points
 
-Prediction = Callable[[Points], Array]
-"""ln Δx of cells."""
-Fit = Callable[[Points], tuple[Array, Prediction]]
-"""Cells → the numbers of a law, and what it predicts."""
+Prediction = Callable[[Points], Array]  # ln Δx of cells
+Fit = Callable[[Points], tuple[Array, Prediction]]  # Cells → the numbers of a law, and what it predicts
 
-TIME: Final = scales.NORMAL_TIME
-"""τ = (R/g)^½ [s]."""
-BLOCKS: Final = ("links", "frequency")
-ROUNDS: Final = 40
-"""Samples of blocks."""
+TIME = scales.NORMAL_TIME  # τ = (R/g)^½ [s]
+BLOCKS = ("links", "frequency")
+ROUNDS = 40  # Samples of blocks
 
 
-@dataclass(frozen=True)
-class Candidate:
-    """A law.
-
-    Attributes:
-        name: in the table.
-        numbers: how many are fitted.
-        fit: of the law to cells.
-    """
+class Candidate(NamedTuple):
+    """A law: its name in the table, how many numbers are fitted, and its fit to cells."""
 
     name: str
     numbers: int
@@ -46,18 +34,15 @@ class Candidate:
 def sum_of_powers(power: float | None) -> Fit:
     """Fits Δx = a vτ + b nℓ (vτ/nℓ)^p, with p given or fitted; its numbers are a, b and p."""
 
-    def distance(numbers: Array, speed: Array, length: Array) -> Array:
-        exponent = numbers[2] if power is None else power
-        turns = speed * TIME / length
-        return np.log(length * (np.exp(numbers[0]) * turns + np.exp(numbers[1]) * turns**exponent))
+    def distance(numbers: Array, points: Points) -> Array:
+        turns, exponent = points.speed * TIME / points.length, numbers[2] if power is None else power
+        return np.log(points.length * (np.exp(numbers[0]) * turns + np.exp(numbers[1]) * turns**exponent))
 
     def fit(points: Points) -> tuple[Array, Prediction]:
-        def left(numbers: Array) -> Array:
-            return np.log(points.distance) - distance(numbers, points.speed, points.length)
-
-        found = least_squares(left, (-1.0, 0.5, 2.0) if power is None else (-1.0, 0.5)).x
+        start = (-1.0, 0.5, 2.0) if power is None else (-1.0, 0.5)
+        found = least_squares(lambda numbers: np.log(points.distance) - distance(numbers, points), start).x
         shown = np.array([*np.exp(found[:2]), found[2] if power is None else power])
-        return shown, lambda others: distance(found, others.speed, others.length)
+        return shown, lambda others: distance(found, others)
 
     return fit
 
@@ -77,14 +62,9 @@ def spline(c: float, d: float) -> Fit:
     return spline_of(lambda points: points.frequency * points.links**c, lambda points: points.links**d)
 
 
-def fitted_spline(powers: Callable[[Points], tuple[float, float]]) -> Fit:
-    """Fits that spline with c and d that are found first; its numbers are c and d."""
-
-    def fit(points: Points) -> tuple[Array, Prediction]:
-        found = powers(points)
-        return np.array(found), spline(*found)(points)[1]
-
-    return fit
+def fitted_spline(points: Points, *powers: float) -> tuple[Array, Prediction]:
+    """Fits that spline with c and d that were found; its numbers are these."""
+    return np.array(powers), spline(*powers)(points)[1]
 
 
 def power_law(points: Points) -> tuple[Array, Prediction]:
@@ -98,22 +78,19 @@ def residual(points: Points, candidate: Candidate) -> Array:
     return np.log(points.distance) - candidate.fit(points)[1](points)
 
 
-HANGING: Final = spline_of(lambda points: points.speed**2 / points.hanging, lambda points: points.hanging)
-"""Of Δx/H over v²/(g H), H the height of the hanging loop."""
-CANDIDATES: Final = (
+NUMBERS = laws.NUMBERS
+CANDIDATES = (
     Candidate("a vτ + b (vτ)²/(nℓ)", 2, sum_of_powers(2.0)),
     Candidate("a vτ + b nℓ (vτ/nℓ)^p", 3, sum_of_powers(None)),
-    Candidate("spline of Δx/(nℓ) over v/(nℓ)", laws.NUMBERS, spline(-1.0, 1.0)),
-    Candidate("spline, c fitted", laws.NUMBERS + 1, fitted_spline(lambda points: (laws.best_variable(points), 1.0))),
-    Candidate(
-        "spline, c and d fitted", laws.NUMBERS + 2, fitted_spline(lambda points: laws.best_powers(points, (-1.1, 1.1)))
-    ),
+    Candidate("spline of Δx/(nℓ) over v/(nℓ)", NUMBERS, spline(-1.0, 1.0)),
+    Candidate("spline, c fitted", NUMBERS + 1, lambda cells: fitted_spline(cells, laws.best_variable(cells), 1.0)),
+    Candidate("spline, c and d fitted", NUMBERS + 2, lambda cells: fitted_spline(cells, *laws.best_powers(cells))),
     Candidate("Δx ∝ ν^p n^q", 3, power_law),
-    Candidate("spline of Δx/(nℓ) over v²/(g nℓ)", laws.NUMBERS, spline(-0.5, 1.0)),
-    Candidate("spline of Δx/(nℓ) over ν²ℓ/g", laws.NUMBERS, spline(0.0, 1.0)),
-    Candidate("spline of Δx/H over v²/(g H)", laws.NUMBERS, HANGING),
-    Candidate("spline of Δx/ℓ over v²/(g nℓ)", laws.NUMBERS, spline(-0.5, 0.0)),
-    Candidate("spline of Δx/ℓ over ν²ℓ/g", laws.NUMBERS, spline(0.0, 0.0)),
+    Candidate("spline of Δx/(nℓ) over v²/(g nℓ)", NUMBERS, spline(-0.5, 1.0)),
+    Candidate("spline of Δx/(nℓ) over ν²ℓ/g", NUMBERS, spline(0.0, 1.0)),
+    Candidate("spline of Δx/H over v²/(g H)", NUMBERS, spline_of(lambda c: c.speed**2 / c.height, lambda c: c.height)),
+    Candidate("spline of Δx/ℓ over v²/(g nℓ)", NUMBERS, spline(-0.5, 0.0)),
+    Candidate("spline of Δx/ℓ over ν²ℓ/g", NUMBERS, spline(0.0, 0.0)),
 )
 """With a fixed drop h, its Froude number v²/(g h) is ν²ℓ/g but for a constant, and so is v²/(g R)."""
 
@@ -156,32 +133,28 @@ def table(cells: Columns, varied: scales.Cells) -> str:
     for candidate in CANDIDATES:
         row = [candidate.name, str(candidate.numbers)]
         for points in known.values():
-            own = laws.root_mean_square(residual(points, candidate))
-            others = [laws.root_mean_square(left_out(points, candidate, block)) for block in BLOCKS]
-            row.append(f"{own:.1f} / {others[0]:.1f} / {others[1]:.1f}")
+            left = [residual(points, candidate), *(left_out(points, candidate, block) for block in BLOCKS)]
+            row.append(" / ".join(f"{laws.root_mean_square(each):.1f}" for each in left))
         rows.append(row)
     heads = (f"{name} ({len(points.links)} cells)" for name, points in known.items())
     curves = "\n".join(f"- {name}: {laws.slopes(points)} {laws.drift(points)}" for name, points in known.items())
-    lines = [markdown(("law of Δx", "numbers", *heads), rows), curves, *errors(known), beyond(known["all"], varied)]
+    lines = [markdown(("law of Δx", "numbers", *heads), rows), curves, errors(known), beyond(known["all"], varied)]
     return "\n\n".join(lines)
 
 
-def errors(known: Mapping[str, Points]) -> list[str]:
-    """Markdown: numbers of laws with errors from blocks of links and of frequencies."""
+def errors(known: Mapping[str, Points]) -> str:
+    """Markdown: numbers of laws with errors from blocks of links and of frequencies; what is given has none."""
     rows = []
     for candidate in (CANDIDATES[0], CANDIDATES[1], *CANDIDATES[3:6]):
         for name, points in known.items():
             numbers = candidate.fit(points)[0]
-            of_blocks = [block_errors(points, candidate, block) for block in BLOCKS]
+            of_blocks = (block_errors(points, candidate, block) for block in BLOCKS)
             texts = [
-                f"{value:.2f} ± {one:.2f} ± {two:.2f}" for value, one, two in zip(numbers, *of_blocks, strict=True)
+                f"{value:.2f} ± {one:.2f} ± {two:.2f}" if one > 0 else f"{value:g}"
+                for value, one, two in zip(numbers, *of_blocks, strict=True)
             ]
-            if candidate is CANDIDATES[0]:
-                texts[2] = "2"
-            if candidate is CANDIDATES[3]:
-                texts[1] = "1"
             rows.append((candidate.name, name, ", ".join(texts)))
-    return [markdown(("law of Δx", "cells", "a, b, p or c, d or p, q ± over links ± over frequencies"), rows)]
+    return markdown("law of Δx | cells | a, b, p or c, d or p, q ± over links ± over frequencies", rows)
 
 
 def beyond(points: Points, varied: scales.Cells) -> str:

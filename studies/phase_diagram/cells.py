@@ -3,7 +3,6 @@
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
@@ -11,20 +10,16 @@ from studies.common import Array, Columns, deviation, mean, of_cells, standard_e
 from studies.phase_diagram.endings import Ending, endings
 from warpchain import InputError, Status, SweepResult
 
-Cell = tuple[int, float]
-"""Links, frequency [Hz]."""
+Cell = tuple[int, float]  # Links, frequency [Hz]
 
-CSV: Final = Path(__file__).parent / "results" / "cells.csv"
-MISSING: Final = -1
-"""Status of a walk that is not there yet, and any integer that is not known."""
-MOST_ENERGY_ERROR: Final = 0.05
-"""A walk with a greater energy error counts as inaccurate."""
-FAILURES: Final = tuple(code for code in Status if code not in (Status.RUNNING, Status.AT_REST, Status.FINISHED))
+CSV = Path(__file__).parent / "results" / "cells.csv"
+MISSING = -1  # Status of a walk that is not there yet, and any integer that is not known
+MOST_ENERGY_ERROR = 0.05  # A walk with a greater energy error counts as inaccurate
+FAILURES = tuple(code for code in Status if code not in (Status.RUNNING, Status.AT_REST, Status.FINISHED))
 """What a walk can end with instead of rest."""
-WAYS: Final = tuple(code for code in Ending if code != Ending.UNKNOWN)
-AVERAGED: Final = ("bounces", "walk_time", "hold_time", "collapsed_at")
-"""Columns of the sweep of which the file has means over the walks at rest. NaNs are left out."""
-COLUMNS: Final = (
+WAYS = tuple(code for code in Ending if code != Ending.UNKNOWN)
+AVERAGED = ("bounces", "walk_time", "hold_time", "collapsed_at")  # Columns of which the file has means at rest
+COLUMNS = (
     *("status", "dx", "steps_accepted", "steps_rejected", "energy_error", "flight_before_collapse"),
     *("bounces_before_collapse", *AVERAGED),
 )
@@ -32,11 +27,7 @@ COLUMNS: Final = (
 
 
 def walks_by_cell(parts: Sequence[SweepResult], names: Sequence[str] = COLUMNS) -> dict[Cell, dict[str, Array]]:
-    """The walks of all parts of a sweep by cell: columns of these names, shape (walks,), missing walks included.
-
-    Raises:
-        InputError: a part has other axes than links and frequency, other settings than the first, or its seed.
-    """
+    """The walks of all parts of a sweep by cell: columns of these names, shape (walks,), missing walks included."""
     found: dict[Cell, list[dict[str, Array]]] = {}
     for number, part in enumerate(parts):
         if axes := [block.axes for block in part.blocks.values() if set(block.axes) != {"links", "frequency"}]:
@@ -46,12 +37,11 @@ def walks_by_cell(parts: Sequence[SweepResult], names: Sequence[str] = COLUMNS) 
         if part.sweep["seed"] in [other.sweep["seed"] for other in parts[:number]]:
             raise InputError(f"{part.name}: walks of another part, the seed is the same; leave one out")
         for block in part.blocks.values():
-            for place, values in of_cells(block):
-                at = dict(zip(block.axes, values, strict=True))
+            for place, at in of_cells(block):
                 walks = {name: block.columns[name][place] for name in names}
                 found.setdefault((int(at["links"]), float(at["frequency"])), []).append(walks)
     return {
-        cell: {name: np.concatenate([walks[name] for walks in cells]) for name in cells[0]}
+        cell: {name: np.concatenate([walks[name] for walks in cells]) for name in names}
         for cell, cells in sorted(found.items())
     }
 
@@ -69,9 +59,10 @@ def settings_of(result: SweepResult) -> str:
 def reduced(links: int, frequency: float, walks: Columns) -> dict[str, float]:
     """Statistics of one cell: a row of the file. NaN where there are too few walks."""
     status = walks["status"]
+    known = {name: np.where(values == MISSING, np.nan, values) for name, values in walks.items()}
     rest = status == Status.AT_REST
     dx, codes = walks["dx"][rest].astype(float), endings(walks)[rest]
-    attempts = (_known(walks["steps_accepted"]) + _known(walks["steps_rejected"]))[status != MISSING]
+    attempts = (known["steps_accepted"] + known["steps_rejected"])[status != MISSING]
     deciles = np.quantile(dx, [0.1, 0.5, 0.9]) if len(dx) else np.full(3, np.nan)
     return {
         "links": links,
@@ -87,14 +78,15 @@ def reduced(links: int, frequency: float, walks: Columns) -> dict[str, float]:
         "dx_sd": float(deviation(dx)),
         "dx_se": float(standard_error(dx)),
         **dict(zip(("dx_10", "dx_50", "dx_90"), map(float, deciles), strict=True)),
-        **{f"{name}_mean": float(mean(_known(walks[name])[rest])) for name in AVERAGED},
-        "bounces_sd": float(deviation(_known(walks["bounces"])[rest])),
+        **{f"{name}_mean": float(mean(known[name][rest])) for name in AVERAGED},
+        "bounces_sd": float(deviation(known["bounces"][rest])),
         "attempts_mean": float(mean(attempts)),
         **{way.label: int((codes == way).sum()) for way in WAYS},
         **{f"dx_{way.label}": float(mean(dx[codes == way])) for way in WAYS},
     }
 
 
-def _known(values: Array) -> Array:
-    """As floats, NaN where a number is missing."""
-    return np.where(values == MISSING, np.nan, values)
+def places_in(cells: Columns, others: Columns) -> Array:
+    """Where the rows of others have these cells."""
+    places = {key: i for i, key in enumerate(zip(others["links"], others["frequency"], strict=True))}
+    return np.array([places[key] for key in zip(cells["links"], cells["frequency"], strict=True)])

@@ -1,6 +1,6 @@
 """Draws the maps and the master curves of the phase diagram."""
 
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,16 +12,9 @@ from matplotlib.ticker import LogLocator
 
 from studies.common import GROUND, INK, RED, Array, Columns, tidy
 from studies.phase_diagram import laws
-from studies.phase_diagram.endings import Ending
+from studies.phase_diagram.cells import WAYS
 
-COLORS: Final = {
-    Ending.KEPT: "#999999",
-    Ending.IN_FLIGHT: "#CC79A7",
-    Ending.FIRST: "#000000",
-    Ending.SECOND: "#0072B2",
-    Ending.LATER: "#56B4E9",
-}
-"""Of the ways of ending; those of Okabe and Ito."""
+COLORS = dict(zip(WAYS, ("#999999", "#CC79A7", "#000000", "#0072B2", "#56B4E9"), strict=True))  # Of Okabe and Ito
 
 
 class Grid:
@@ -84,34 +77,32 @@ def draw_failed(axes: Axes, share: Array, color: str = RED, rim: str = "white") 
 
 def draw_endings(axes: Axes, grid: Grid, cells: Columns) -> None:
     """The most frequent ending of each cell; the paler, the smaller its share. The legend is below."""
-    ways = list(COLORS)
-    counts = np.stack([cells[way.label] for way in ways], axis=1)
+    counts = np.stack([cells[way.label] for way in WAYS], axis=1)
     total, most = counts.sum(axis=1), counts.argmax(axis=1)
     share = counts.max(axis=1) / np.maximum(total, 1)
-    colors = 1 - share[:, None] * (1 - np.array([to_rgb(COLORS[ways[index]]) for index in most]))
+    colors = 1 - share[:, None] * (1 - np.array([to_rgb(COLORS[WAYS[index]]) for index in most]))
     grid.map(axes, np.column_stack([colors, total > 0]), "how the loop was lost; paler: a smaller share")
-    handles = [Patch(color=COLORS[ways[k]], label=ways[k].meaning) for k in np.unique(most[total > 0])]
+    handles = [Patch(color=COLORS[WAYS[k]], label=WAYS[k].meaning) for k in np.unique(most[total > 0])]
     axes.legend(handles=handles, fontsize="x-small", loc="upper center", bbox_to_anchor=(0.5, -0.16), frameon=False)
 
 
-def draw_laws(cells: Columns) -> Figure:
+def draw_laws(points: laws.Points) -> Figure:
     """Laws of Δx/(nℓ): cells coloured by links, and master curves; where the last one fails."""
-    points = laws.points_of(cells)
     figure = Figure(figsize=(11, 8.2), layout="constrained")
-    grid, y = list(figure.subplots(2, 2).flat), points.distance / points.length
+    grid, y = list(figure.subplots(2, 2).flat), points.lengths
     variables = {
         "ν²ℓ/g": points.frequency**2 * laws.LINK_LENGTH / laws.GRAVITY,
         "v²/(g nℓ)": points.speed**2 / (laws.GRAVITY * points.length),
-        "v/(nℓ), turns of the loop / s⁻¹": points.speed / points.length,
+        "v/(nℓ), turns of the loop / s⁻¹": points.turns,
     }
     for axes, (name, x) in zip(grid, variables.items(), strict=False):
         image = axes.scatter(x, y, c=points.links, s=12, cmap="viridis")
-        fine = np.geomspace(x.min(), x.max(), 200)
-        axes.plot(fine, np.exp(laws.master_curve(x, y)(fine)), color=INK, linewidth=1)
+        fine, curve = np.geomspace(x.min(), x.max(), 200), laws.master_curve(x, y)
+        axes.plot(fine, np.exp(curve(fine)), color=INK, linewidth=1)
         title = f"residual {laws.rms_residual(x, y):.1f} %"
         tidy(axes, title, grid="both", xscale="log", yscale="log", xlabel=name, ylabel="Δx/(nℓ)")
     figure.colorbar(image, ax=grid[:2], label="links", pad=0.02)
-    left = 100 * np.expm1(laws.residuals(x, y))
+    left = 100 * np.expm1(np.log(y) - curve(x))
     limit = float(np.quantile(np.abs(left), 0.98))
     title = "Δx over its curve in v/(nℓ), less 1 / %"
     used = Grid(points.links, points.frequency)

@@ -1,61 +1,48 @@
-"""Ways in which walks end: where and when the loop was lost, from the columns of a sweep.
+"""Ways in which walks end, from the columns of a sweep: every walk that is at rest has one.
 
-Every walk that is at rest has one ending. Its loop collapses when it first encloses less than half of its area at the
-release; `bounces_before_collapse` says in which bounce, counted from 1.
+Its loop collapses when it first encloses less than half of its area at the release; `bounces_before_collapse` says in
+which bounce, counted from 1.
 """
 
 from enum import IntEnum
-from typing import Final
 
 import numpy as np
 
 from studies.common import Array, Columns
 from warpchain import Status
 
-IN_FLIGHT: Final = 0.01
-"""Time since the last impulse on the floor [s] from which a chain is in flight; a later impulse begins a bounce."""
+IN_FLIGHT = 0.01  # Time since the last impulse on the floor [s] from which a chain is in flight
 
 
 class Ending(IntEnum):
-    """How a walk lost its loop."""
+    """How a walk lost its loop; `meaning` in words, as captions have it."""
 
-    UNKNOWN = -1
-    KEPT = 0
-    IN_FLIGHT = 1
-    FIRST = 2
-    SECOND = 3
-    LATER = 4
+    meaning: str
+
+    UNKNOWN = -1, "not at rest, or missing"
+    KEPT = 0, "at rest without having lost its loop"
+    IN_FLIGHT = 1, "collapsed in flight"
+    FIRST = 2, "collapsed in its first bounce"
+    SECOND = 3, "collapsed in its second bounce"
+    LATER = 4, "collapsed in a later bounce"
+
+    def __new__(cls, code: int, meaning: str) -> "Ending":
+        """A code with its meaning."""
+        ending = int.__new__(cls, code)
+        ending._value_, ending.meaning = code, meaning
+        return ending
 
     @property
     def label(self) -> str:
-        """Name in files and tables, such as `folded_at_first`."""
+        """Name in files and tables, such as `in_flight`."""
         return self.name.lower()
-
-    @property
-    def meaning(self) -> str:
-        """In words, as captions have it."""
-        return _MEANINGS[self]
-
-
-_MEANINGS: Final[dict[Ending, str]] = {
-    Ending.UNKNOWN: "not at rest, or missing",
-    Ending.KEPT: "at rest without having lost its loop",
-    Ending.IN_FLIGHT: "collapsed in flight",
-    Ending.FIRST: "collapsed in its first bounce",
-    Ending.SECOND: "collapsed in its second bounce",
-    Ending.LATER: "collapsed in a later bounce",
-}
 
 
 def endings(columns: Columns) -> Array:
     """The ending of each walk, as codes of `Ending`.
 
-    Args:
-        columns: of a sweep by name, such as those of a block: `status`, `collapsed_at`, `bounces_before_collapse` and
-            `flight_before_collapse`, of one shape.
-
-    Returns:
-        Codes of the shape of the columns.
+    Columns are those of a sweep, or of a block, by name, of one shape: `status`, `collapsed_at`,
+    `bounces_before_collapse` and `flight_before_collapse`.
     """
     collapse = columns["bounces_before_collapse"]
     cases = (
@@ -65,5 +52,4 @@ def endings(columns: Columns) -> Array:
         (collapse == 1, Ending.FIRST),
         (collapse == 2, Ending.SECOND),
     )
-    codes = np.select([case for case, _ in cases], [code for _, code in cases], Ending.LATER)
-    return codes.astype(np.int8)
+    return np.select(*zip(*cases, strict=True), Ending.LATER).astype(np.int8)

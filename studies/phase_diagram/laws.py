@@ -6,8 +6,6 @@ residual of the law, in per cent of Δx.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -16,24 +14,18 @@ from scipy.optimize import minimize, minimize_scalar
 from studies.common import Array, Columns
 from warpchain import preset
 
-PARAMETERS: Final = preset("soft")
-LINK_LENGTH: Final = PARAMETERS.link_length
-GRAVITY: Final = PARAMETERS.gravity
-RADIUS: Final = PARAMETERS.sprocket_radius + PARAMETERS.circle_radius
-"""At which joints ride on the sprocket [m]."""
+Points = np.recarray
 
-PIECES: Final = 6
-"""Of the spline."""
-NUMBERS: Final = PIECES + 3
-"""That a spline has."""
-FEWEST: Final = 3 * NUMBERS
-"""Cells that are enough for one."""
-MOST_FAILED: Final = 0.05
-"""Cells of which more walks failed are left out: those at rest may be another kind of walks than the rest."""
-FAST: Final = 12.0
-"""Frequency [Hz] from which most chains survive their second bounce."""
-PLACES: Final = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
-"""Turns of the loop per second at which a curve is described."""
+PARAMETERS = preset("soft")
+LINK_LENGTH = PARAMETERS.link_length
+GRAVITY = PARAMETERS.gravity
+RADIUS = PARAMETERS.sprocket_radius + PARAMETERS.circle_radius  # At which joints ride on the sprocket [m]
+
+PIECES = 6  # Of the spline
+NUMBERS = PIECES + 3  # That a spline has
+MOST_FAILED = 0.05  # Cells of which more failed are left out: walks at rest may be another kind than the rest
+FAST = 12.0  # Frequency [Hz] from which most chains survive their second bounce
+PLACES = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # Turns of the loop per second at which a curve is described
 
 
 def in_papers_range(links: Array, frequency: Array) -> Array:
@@ -41,66 +33,41 @@ def in_papers_range(links: Array, frequency: Array) -> Array:
     return (links >= 60) & (links <= 180) & (frequency >= 5) & (frequency <= 30)
 
 
-@dataclass(frozen=True)
-class Points:
-    """Cells as the laws take them, shape (cells,) each: links, frequency [Hz], mean Δx [m], walking time [s]."""
-
-    links: Array
-    frequency: Array
-    distance: Array
-    duration: Array
-
-    def __getitem__(self, chosen: Array) -> "Points":
-        """Some of the cells."""
-        return Points(*(values[chosen] for values in vars(self).values()))
-
-    @property
-    def speed(self) -> Array:
-        """Speed of the loop [m/s]."""
-        return 2 * np.pi * RADIUS * self.frequency
-
-    @property
-    def length(self) -> Array:
-        """Length of the chain nℓ [m]."""
-        return self.links * LINK_LENGTH
-
-    @property
-    def hanging(self) -> Array:
-        """Height of the loop that hangs on the sprocket [m]: straight sides and two half circles."""
-        return 2 * RADIUS + np.maximum(self.length / 2 - np.pi * RADIUS, 0.0)
-
-
 def points_of(cells: Columns) -> Points:
-    """The cells that have a mean, and few enough failures."""
+    """The cells that have a mean, and few enough failures, as the laws take them, shape (cells,).
+
+    Fields are links, frequency [Hz], the mean distance Δx [m] and duration [s] of walks; speed [m/s] of the loop,
+    length nℓ [m] of the chain, turns of the loop per second v/(nℓ), Δx/(nℓ) as lengths, and the height H [m] of the
+    loop that hangs on the sprocket, straight sides and two half circles.
+    """
     failed = cells["walks"] - cells["at_rest"]
     used = (cells["at_rest"] > 0) & (failed <= MOST_FAILED * cells["walks"]) & (cells["dx_mean"] > 0)
-    return Points(*(cells[name][used] for name in ("links", "frequency", "dx_mean", "walk_time_mean")))
+    links, frequency, distance, duration = (
+        cells[name][used] for name in ("links", "frequency", "dx_mean", "walk_time_mean")
+    )
+    speed, length = 2 * np.pi * RADIUS * frequency, links * LINK_LENGTH
+    height = 2 * RADIUS + np.maximum(length / 2 - np.pi * RADIUS, 0.0)
+    columns = links, frequency, distance, duration, speed, length, speed / length, distance / length, height
+    return np.rec.fromarrays(columns, names="links,frequency,distance,duration,speed,length,turns,lengths,height")
 
 
 def master_curve(x: Array, y: Array) -> Callable[[Array], Array]:
     """ln y as a cubic spline of ln x, by least squares; knots at equal shares of the points."""
     abscissa = np.log(x)
-    inner = np.unique(np.quantile(abscissa, np.linspace(0, 1, PIECES + 1)[1:-1]))
-    low, high = abscissa.min(), abscissa.max()
-    inner = inner[(inner > low) & (inner < high)]
-    knots = np.r_[[low] * 4, inner, [high] * 4]
+    inner, low, high = np.quantile(abscissa, np.linspace(0, 1, PIECES + 1)[1:-1]), abscissa.min(), abscissa.max()
+    knots = np.r_[[low] * 4, np.unique(inner[(inner > low) & (inner < high)]), [high] * 4]
 
     def design(values: Array) -> Array:
         clipped = np.clip(np.log(values), low, high)
         return BSpline.design_matrix(clipped, knots, 3).toarray()
 
-    weights, *_ = np.linalg.lstsq(design(x), np.log(y), rcond=None)
+    weights = np.linalg.lstsq(design(x), np.log(y), rcond=None)[0]
     return lambda values: design(values) @ weights
 
 
-def residuals(x: Array, y: Array) -> Array:
-    """ln y less the master curve, shape (cells,)."""
-    return np.log(y) - master_curve(x, y)(x)
-
-
 def rms_residual(x: Array, y: Array) -> float:
-    """Residual of a law, root mean square in per cent."""
-    return root_mean_square(residuals(x, y), NUMBERS)
+    """What the master curve leaves of ln y, root mean square in per cent."""
+    return root_mean_square(np.log(y) - master_curve(x, y)(x), NUMBERS)
 
 
 def residual_of(points: Points, c: float, d: float) -> float:
@@ -110,17 +77,15 @@ def residual_of(points: Points, c: float, d: float) -> float:
 
 def best_variable(points: Points) -> float:
     """Exponent c of x = ν n^c with the least residual of Δx/n."""
-    starts = np.linspace(-1.5, 1.0, 26)
-    first = starts[int(np.argmin([residual_of(points, c, 1.0) for c in starts]))]
+    first = min(np.linspace(-1.5, 1.0, 26), key=lambda c: residual_of(points, c, 1.0))
     settings = {"bounds": (first - 0.1, first + 0.1), "method": "bounded", "options": {"xatol": 1e-4}}
     return float(minimize_scalar(lambda c: residual_of(points, c, 1.0), **settings).x)
 
 
-def best_powers(points: Points, start: tuple[float, float]) -> tuple[float, float]:
-    """Exponents (c, d) of Δx/n^d over ν n^c with the least residual near a start."""
-    options = {"xatol": 1e-4, "fatol": 1e-5}
-    found = minimize(lambda powers: residual_of(points, *powers), start, method="Nelder-Mead", options=options)
-    return float(found.x[0]), float(found.x[1])
+def best_powers(points: Points) -> tuple[float, float]:
+    """Exponents (c, d) of Δx/n^d over ν n^c with the least residual."""
+    settings = {"method": "Nelder-Mead", "options": {"xatol": 1e-4, "fatol": 1e-5}}
+    return tuple(minimize(lambda powers: residual_of(points, *powers), (-1.1, 1.1), **settings).x)
 
 
 def power_law(values: Array, *factors: Array) -> tuple[Array, Array]:
@@ -137,8 +102,7 @@ def root_mean_square(left: Array, numbers: int = 0) -> float:
 
 def slopes(points: Points) -> str:
     """Steepness of the curve of Δx/(nℓ) over v/(nℓ) at some places, in words."""
-    x, y = points.speed / points.length, points.distance / points.length
-    curve, width = master_curve(x, y), 1.05
+    x, curve, width = points.turns, master_curve(points.turns, points.lengths), 1.05
     places = np.array([place for place in PLACES if x.min() * width < place < x.max() / width])
     rise = (curve(places * width) - curve(places / width)) / (2 * np.log(width))
     texts = [
@@ -152,10 +116,6 @@ def drift(points: Points) -> str:
     """Exponent c of Δx/(nℓ) over ν n^c for the slower and the faster half of the frequencies, in words."""
     frequencies = np.unique(points.frequency)
     half = len(frequencies) // 2
-    if not half:
-        return ""
-    slow, fast = points.frequency <= frequencies[half - 1], points.frequency >= frequencies[-half]
-    if min(slow.sum(), fast.sum()) < FEWEST:
-        return ""
-    (low, high), (until, since) = (best_variable(points[part]) for part in (slow, fast)), frequencies[[half - 1, -half]]
+    until, since = frequencies[half - 1], frequencies[-half]
+    low, high = (best_variable(points[part]) for part in (points.frequency <= until, points.frequency >= since))
     return f"With d = 1 given, c is {low:.2f} up to {until:g} Hz and {high:.2f} from {since:g} Hz on."

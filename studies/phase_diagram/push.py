@@ -1,23 +1,21 @@
-"""What the push of floor and links in the pile does to the distance of slow long chains.
+"""What the push of floor and links in the pile does to the distance of slow long chains: prints the table of the page.
 
-    python -m studies.phase_diagram.push                    # prints the table of the page
-    python -m studies.phase_diagram.push FOLDER FAST WITHOUT    # first reduces sweeps of sweeps/push.yaml
-
-FAST is of an engine that pushes ten times as fast, WITHOUT of one that does not push. Walks are compared one by one
-with those of joints that do not soften.
+Folders are reduced first: of the sweep push by the engine of today, by one that pushes ten times as fast, and by one
+that does not. Walks are compared one by one with those of joints that do not soften.
 """
 
-import csv
-import sys
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+import typer
 
 import warpchain
-from studies.common import at_rest, mean, standard_error, write_rows
-from studies.common import table as markdown
+from studies import common
+from studies.common import Array, at_rest
+from studies.phase_diagram import cells
 
-RESULTS = Path(__file__).parent / "results"
+CSV = Path(__file__).parent / "results" / "push.csv"
 GROUPS = {
     "today": "today",
     "fast": "with ten times the push",
@@ -25,74 +23,59 @@ GROUPS = {
     "stiff": "with joints of their own in the pile",
 }
 BANDS = (("100 to 160 links", 100, 160), ("220 and 240 links", 220, 240))
-Cells = dict[tuple[str, str], tuple[float, float]]
 
 
-def reduce(*folders: str) -> None:
+def reduce(folders: list[str]) -> None:
     """Write Δx of each cell of each group, and how much further its walks go than the same with stiff joints."""
     sweeps = [at_rest(next(iter(warpchain.load(folder).blocks.values()))) for folder in folders]
     stiff = sweeps[0].sel(soften_pile=False)
     rows = []
     for group, dx in zip(GROUPS, [*(sweep.sel(soften_pile=True) for sweep in sweeps), stiff], strict=True):
-        for i, links in enumerate(dx.links.values.tolist()):
-            for j, frequency in enumerate(dx.frequency.values.tolist()):
-                row = {"group": group, "links": links, "frequency": frequency}
-                for name, values in (("dx", dx[i, j]), ("more", dx[i, j] - stiff[i, j])):
-                    row |= {name: float(mean(values)), f"{name}_se": float(standard_error(values))}
-                rows.append(row)
-    write_rows(RESULTS / "push.csv", rows)
+        for i, j in np.ndindex(dx.shape[:2]):
+            row = {"group": group, "links": int(dx.links[i]), "frequency": float(dx.frequency[j])}
+            for name, values in (("dx", dx[i, j]), ("more", dx[i, j] - stiff[i, j])):
+                row |= {name: float(common.mean(values)), f"{name}_se": float(common.standard_error(values))}
+            rows.append(row)
+    common.write_rows(CSV, rows)
 
 
-def cells_of(path: Path, group: str | None, mean: str, error: str) -> Cells:
-    """Mean and standard error of a column [m] by links and frequency, in a group if the file has groups."""
-    with path.open(encoding="utf-8") as file:
-        return {
-            (row["links"], f"{float(row['frequency']):g}"): (float(row[mean]), float(row[error]))
-            for row in csv.DictReader(file)
-            if row.get("group") == group
-        }
-
-
-def over(cells: Cells, others: Cells) -> str:
+def over(dx: Array, error: Array, other: Array, its_error: Array) -> str:
     """Mean over cells of the distance over that of others, less 1, with its error."""
-    ratio, error = [], []
-    for key, (dx, se) in cells.items():
-        other, its = others[key]
-        ratio.append(dx / other - 1)
-        error.append(dx / other * np.hypot(se / dx, its / other))
-    return _shown(ratio, error)
+    ratio = dx / other
+    return shown(ratio - 1, ratio * np.hypot(error / dx, its_error / other))
 
 
-def further(more: Cells, stiff: Cells) -> str:
-    """Mean over cells of what walks go further than the same walks on stiff joints, as a share of those."""
-    return _shown(
-        *zip(*((value / stiff[key][0], se / stiff[key][0]) for key, (value, se) in more.items()), strict=True)
-    )
-
-
-def _shown(shares: list[float], errors: list[float]) -> str:
+def shown(shares: Array, errors: Array) -> str:
     """Mean of shares in per cent, with its standard error."""
-    return f"{100 * np.mean(shares):+.2f} ± {100 * np.linalg.norm(errors) / len(errors):.2f} %".replace("-", "−")
+    return common.minus(common.OverCells(100 * shares, 100 * errors).text(2))
 
 
 def table() -> str:
     """The table of the page."""
-    own = RESULTS / "push.csv"
-    million = cells_of(RESULTS / "cells.csv", None, "dx_mean", "dx_se")
-    stiff = cells_of(own, "stiff", "dx", "dx_se")
+    columns, million = common.read_columns(CSV), common.read_columns(cells.CSV)
+    own = {name: {key: values[columns["group"] == name] for key, values in columns.items()} for name in GROUPS}
+    links, stiff, at = own["stiff"]["links"], own["stiff"]["dx"], cells.places_in(own["stiff"], million)
+
+    def further(group: str, chosen: Array) -> str:
+        return shown(*(own[group][name][chosen] / stiff[chosen] for name in ("more", "more_se")))
+
     rows = []
     for group, title in GROUPS.items():
-        beside = "" if group == "stiff" else further(cells_of(own, group, "more", "more_se"), stiff)
-        rows.append([title, over(cells_of(own, group, "dx", "dx_se"), million), beside])
+        ratio = over(own[group]["dx"], own[group]["dx_se"], million["dx_mean"][at], million["dx_se"][at])
+        rows.append([title, ratio, "" if group == "stiff" else further(group, links > 0)])
     for group in ("today", "fast"):
-        more = cells_of(own, group, "more", "more_se")
         for name, fewest, most in BANDS:
-            band = {key: value for key, value in more.items() if fewest <= int(key[0]) <= most}
-            rows.append([f"{GROUPS[group]}, {name}", "", further(band, stiff)])
-    return markdown("walks | over the million | over the same walks with joints of their own", rows)
+            text = further(group, (links >= fewest) & (links <= most))
+            rows.append([f"{GROUPS[group]}, {name}", "", text])
+    return common.table("walks | over the million | over the same walks with joints of their own", rows)
+
+
+def main(folders: Annotated[list[str] | None, typer.Argument()] = None) -> None:
+    """Reduce sweeps that are given; print the table."""
+    if folders:
+        reduce(folders)
+    print(table())
 
 
 if __name__ == "__main__":
-    if len(sys.argv) > 1:
-        reduce(*sys.argv[1:])
-    print(table())
+    common.run_study(main)

@@ -1,17 +1,11 @@
-"""Makes the numbers, figures and tables of studies/phase_diagram/README.md.
+"""Makes the numbers, figures and tables of README.md from the files in results/, in one to two minutes.
 
-    python -m studies.phase_diagram.run                    # results/*.csv → figures and tables of the page
-    python -m studies.phase_diagram.run FOLDER…            # parts of the sweep phase_diagram → results/cells.csv, first
-    python -m studies.phase_diagram.run --scaling FOLDER   # the sweep scaling → results/scaling.csv, first
-    python -m studies.phase_diagram.run --meetings FOLDER…  # parts of the sweep strands → results/strands.csv, first
-
-Parts are folders of ``warpchain sweep``. They have other seeds; they may be unfinished, and their grids may differ.
-Without a folder it takes one to two minutes.
+Parts of the sweep `phase_diagram` that are given, of `strands` as --meetings or the sweep `scaling`, are reduced to
+these first. Parts have other seeds; they may be unfinished, and their grids may differ.
 """
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -22,33 +16,26 @@ from studies.phase_diagram import candidates, cells, drawing, laws, scales, stra
 from studies.phase_diagram.cells import FAILURES, WAYS
 from studies.phase_diagram.endings import Ending
 
-FOLDER: Final = Path(__file__).parent
-FEW: Final = 100
-"""Walks that each of two groups has in a cell in which they are compared, at least."""
+FOLDER = Path(__file__).parent
+FEW = 100  # Walks that each of two groups has in a cell in which they are compared, at least
 
 
 def table_of_cells(cells: Columns) -> str:
-    """Markdown: Δx ± s.d. for some links and frequencies."""
-    shown_links, shown_frequencies = chosen(cells["links"]), chosen(cells["frequency"])
+    """Markdown: Δx ± s.d. for about six links and frequencies, evenly spread, and the share that failed if any did."""
+    shown_links, shown_frequencies = (
+        known[np.unique(np.linspace(0, len(known) - 1, 6).round().astype(int))]
+        for known in (np.unique(cells[name]) for name in ("links", "frequency"))
+    )
     rows = []
-    for links in shown_links:
-        at = ((cells["links"] == links) & (cells["frequency"] == frequency) for frequency in shown_frequencies)
-        texts = (text_of_cell({name: float(column[here][0]) for name, column in cells.items()}) for here in at)
-        rows.append([f"{links:g}", *texts])
+    for number in shown_links:
+        texts = []
+        for frequency in shown_frequencies:
+            here = (cells["links"] == number) & (cells["frequency"] == frequency)
+            mean, sd, rest, walks = (cells[name][here][0] for name in ("dx_mean", "dx_sd", "at_rest", "walks"))
+            text = "–" if np.isnan(mean) else f"{mean:.3g} ± {sd:.2g}"
+            texts.append(text if rest == walks else f"{text} ({100 * (1 - rest / walks):.3g} % failed)")
+        rows.append([f"{number:g}", *texts])
     return table(("links", *(f"{frequency:g} Hz" for frequency in shown_frequencies)), rows)
-
-
-def text_of_cell(cell: Mapping[str, float]) -> str:
-    """Mean ± standard deviation, and the share that failed if any did."""
-    failed = 1 - cell["at_rest"] / cell["walks"]
-    text = "–" if np.isnan(cell["dx_mean"]) else f"{cell['dx_mean']:.3g} ± {cell['dx_sd']:.2g}"
-    return text if failed == 0 else f"{text} ({100 * failed:.3g} % failed)"
-
-
-def chosen(values: Array) -> Array:
-    """About six of the values that occur, evenly spread, the first and the last among them."""
-    known = np.unique(values)
-    return known[np.unique(np.linspace(0, len(known) - 1, 6).round().astype(int))]
 
 
 def over_others(cells: Columns, way: Ending) -> Array:
@@ -83,27 +70,25 @@ def table_of_endings(cells: Columns) -> str:
         texts = (text_of_ratios(ratios[where]) for where in (inside, ~inside))
         rows.append([way.meaning, f"{100 * share:.2g} %", f"{np.sum(most == number)}", *texts])
     text = f"{counts.sum():,.0f} walks of which this is known; a collapse in flight is known of {flights:,.0f} of them."
-    head = ("way of ending", "share", "cells where it is the most frequent", "Δx, paper's range", "elsewhere")
-    return "\n\n".join([table(head, rows), text])
+    head = "way of ending | share | cells where it is the most frequent | Δx, paper's range | elsewhere"
+    return f"{table(head, rows)}\n\n{text}"
 
 
 def table_of_failures(cells: Columns) -> str:
     """Markdown: walks by status."""
-    walks = cells["walks"].sum()
     rows = []
     for name in ("at_rest", *(code.label for code in FAILURES), "missing"):
-        number = cells[name]
-        if number.sum() == 0 and name != "at_rest":
-            continue
-        there = number > 0
-        where = "" if there.all() else f"{span(cells['links'][there])} links, {span(cells['frequency'][there])} Hz"
-        rows.append((f"`{name}`", f"{number.sum():,.0f}", f"{there.sum()}", where))
-    return f"{table(('status', 'walks', 'cells', 'where'), rows)}\n\n{walks:,.0f} walks in {len(cells['links'])} cells."
+        there = cells[name] > 0
+        if there.any() or name == "at_rest":
+            where = f"{span(cells['links'][there])} links, {span(cells['frequency'][there])} Hz"
+            rows.append((f"`{name}`", f"{cells[name].sum():,.0f}", there.sum(), "" if there.all() else where))
+    total = f"{cells['walks'].sum():,.0f} walks in {len(cells['links'])} cells."
+    return f"{table('status | walks | cells | where', rows)}\n\n{total}"
 
 
 def span(values: Array) -> str:
     """The least and the greatest of some values."""
-    least, greatest = (f"{value:g}" for value in (values.min(), values.max()))
+    least, greatest = f"{values.min():g}", f"{values.max():g}"
     return least if least == greatest else f"{least} to {greatest}"
 
 
@@ -120,14 +105,22 @@ def make(
         write_rows(scales.CSV, scales.reduced(warpchain.load(scaling)))
     if meetings:
         write_rows(strands.CSV, strands.reduced([warpchain.load(path) for path in meetings]))
-    found, varied = read_columns(cells.CSV), scales.Cells()
-    curve = scales.Curve(found)
-    tables = {"cells": table_of_cells(found), "failures": table_of_failures(found), "endings": table_of_endings(found)}
-    tables |= {"scales": scales.table(varied, curve), "candidates": candidates.table(found, varied)}
-    tables |= {"walking time": candidates.walking_time(found)}
-    tables |= strands.tables(read_columns(strands.CSV), found)
-    figures = {"maps": drawing.draw_maps(found), "laws": drawing.draw_laws(found), "scales": scales.draw(varied, curve)}
-    publish(FOLDER, tables, figures)
+    found, met, varied = read_columns(cells.CSV), read_columns(strands.CSV), scales.Cells()
+    points = laws.points_of(found)
+    tables = {
+        "cells": table_of_cells(found),
+        "failures": table_of_failures(found),
+        "endings": table_of_endings(found),
+        "scales": scales.table(varied, points),
+        "candidates": candidates.table(found, varied),
+        "walking time": candidates.walking_time(found),
+        "strands": strands.shares(met),
+        "by bounces": strands.by_bounces(met),
+        "ways with strands": strands.ways(met),
+        "against the million": strands.against_million(met, found),
+    }
+    figures = {"maps": drawing.draw_maps(found), "laws": drawing.draw_laws(points)}
+    publish(FOLDER, tables, figures | {"scales": scales.draw(varied, points)})
 
 
 if __name__ == "__main__":

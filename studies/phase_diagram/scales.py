@@ -4,143 +4,110 @@ In the phase diagram Δx/(nℓ) is a curve over v/(nℓ), turns of the loop per 
 and links, and shows with which time τ all of its cells are on that very curve, now over v τ/(nℓ).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 from matplotlib.figure import Figure
 from scipy.optimize import least_squares
 
 from studies import common
-from studies.common import FAINT, INK, LINE_COLORS, Array, Columns
-from studies.common import table as markdown
+from studies.common import FAINT, INK, LINE_COLORS, Array
 from studies.phase_diagram import laws
 from warpchain import InputError, Status, SweepResult, preset
 
-Exponents = tuple[float, float, float]
-"""Of gravity, of the radius at which joints ride on the sprocket, of the length of a link."""
+Curve = Callable[[Array], Array]  # Turns per second → ln Δx/(nℓ), beyond its ends as there
 
-CSV: Final = Path(__file__).parent / "results" / "scaling.csv"
-
-TIMES: Final[Mapping[str, Exponents]] = {
-    "a constant": (0, 0, 0),
-    "∝ g^-½": (-0.5, 0, 0),
-    "(ℓ/g)^½": (-0.5, 0, 0.5),
-    "(R/g)^½": (-0.5, 0.5, 0),
-}
-"""Times that are tried, by name."""
-NORMAL: Final = (laws.GRAVITY, laws.RADIUS, laws.LINK_LENGTH)
-"""The three quantities in the phase diagram [SI units]."""
-NORMAL_TIME: Final = (laws.RADIUS / laws.GRAVITY) ** 0.5
-"""(R/g)^½ there [s]."""
-PLACES: Final = (0.1, 0.3, 1.0, 3.0)
-"""Turns in this time at which the curve is described."""
-ROUNDS: Final = 100
-"""Samples of the bootstrap over cells."""
-BLOCKS: Final = {"sprocket_radius": "radius of the sprocket", "gravity": "gravity", "links": "length of links"}
+CSV = Path(__file__).parent / "results" / "scaling.csv"
+TIMES = {"a constant": (0, 0, 0), "∝ g^-½": (-0.5, 0, 0), "(ℓ/g)^½": (-0.5, 0, 0.5), "(R/g)^½": (-0.5, 0.5, 0)}
+"""Times that are tried, by name: exponents of gravity, of the radius at which joints ride, of the length of a link."""
+NORMAL = (laws.GRAVITY, laws.RADIUS, laws.LINK_LENGTH)  # The three quantities in the phase diagram [SI units]
+NORMAL_TIME = (laws.RADIUS / laws.GRAVITY) ** 0.5  # (R/g)^½ there [s]
+PLACES = (0.1, 0.3, 1.0, 3.0)  # Turns in this time at which the curve is described
+ROUNDS = 100  # Samples of the bootstrap over cells
+BLOCKS = {"sprocket_radius": "radius of the sprocket", "gravity": "gravity", "links": "length of links"}
 """What is varied: first word of the names of the blocks → name."""
 
 
-def reduced(result: SweepResult) -> list[dict[str, float | str]]:
-    """Statistics of the cells of the sweep: rows of the file.
-
-    Raises:
-        InputError: it has other axes, or a cell is unfinished.
-    """
-    rows: list[dict[str, float | str]] = []
+def reduced(result: SweepResult) -> Iterator[dict[str, float | str]]:
+    """Statistics of the cells of the sweep: rows of the file."""
     for content in result.sweep["blocks"]:
         name, block = content["name"], result.blocks[content["name"]]
         if not {"links", "frequency"} <= block.axes.keys():
             raise InputError(f"block {name}: no axes links and frequency; give a folder of the sweep scaling")
         if np.any(block.columns["status"] < 0):
             raise InputError(f"block {name}: walks are missing; run the sweep to its end")
-        for place, values in common.of_cells(block):
-            at = dict(zip(block.axes, map(float, values), strict=True))
-            known = content["parameters"] | at
-            varied = {each: known[each] for each in ("gravity", "sprocket_radius", "link_length") if each in known}
-            parameters = preset("soft").with_values(varied)
+        for place, at in common.of_cells(block):
+            links, frequency = int(at.pop("links")), float(at.pop("frequency"))
+            chain = preset("soft").with_values(content["parameters"] | {key: float(value) for key, value in at.items()})
             status = block.columns["status"][place]
             dx = block.columns["dx"][place][status == Status.AT_REST]
-            cell = {"block": name, "links": int(at["links"]), "frequency": at["frequency"]}
-            cell |= {"gravity": parameters.gravity, "radius": parameters.sprocket_radius + parameters.circle_radius}
-            cell |= {"link_length": parameters.link_length, "walks": len(status), "at_rest": len(dx)}
-            rows.append(cell | {"dx_mean": float(common.mean(dx)), "dx_se": float(common.standard_error(dx))})
-    return rows
+            yield {
+                "block": name,
+                "links": links,
+                "frequency": frequency,
+                "gravity": chain.gravity,
+                "radius": chain.sprocket_radius + chain.circle_radius,
+                "link_length": chain.link_length,
+                "walks": len(status),
+                "at_rest": len(dx),
+                "dx_mean": float(common.mean(dx)),
+                "dx_se": float(common.standard_error(dx)),
+            }
 
 
 class Cells:
-    """Cells with few failures, shape (cells,) each.
+    """Cells of the file with few failures, shape (cells,) each."""
 
-    Attributes:
-        names: of their blocks.
-        links, frequency: of the cells [Hz].
-        turns: of the loop per second, v/(nℓ) [1/s].
-        lengths: Δx/(nℓ).
-        scales: (3, cells), gravity, radius and length of links over those of the phase diagram.
-    """
-
-    def __init__(self, path: Path = CSV) -> None:
+    def __init__(self) -> None:
         """Read the file."""
-        rows = common.read_columns(path)
+        rows = common.read_columns(CSV)
         used = rows["at_rest"] >= (1 - laws.MOST_FAILED) * rows["walks"]
         rows = {name: values[used] for name, values in rows.items()}
         self.names, self.links, self.frequency = rows["block"], rows["links"], rows["frequency"]
-        self.turns = 2 * np.pi * rows["radius"] * self.frequency / (self.links * rows["link_length"])
-        self.lengths = rows["dx_mean"] / (self.links * rows["link_length"])
+        length = self.links * rows["link_length"]
+        self.turns = 2 * np.pi * rows["radius"] * self.frequency / length  # Of the loop per second, v/(nℓ) [1/s]
+        self.lengths = rows["dx_mean"] / length  # Δx/(nℓ)
         self.scales = np.stack([rows["gravity"], rows["radius"], rows["link_length"]]) / np.array(NORMAL)[:, None]
 
     def varied(self, word: str) -> Array:
         """Which cells are of blocks whose names begin so, shape (cells,)."""
         return np.char.startswith(self.names, word)
 
-    def scaled_turns(self, exponents: Sequence[float] | Array) -> Array:
+    def scaled_turns(self, exponents: Sequence[float]) -> Array:
         """Turns per second, times the time with these exponents over what it is in the phase diagram."""
-        times: Array = np.prod(self.scales ** np.asarray(exponents)[:, None], axis=0)
-        return self.turns * times
+        return self.turns * np.prod(self.scales ** np.asarray(exponents)[:, None], axis=0)
 
 
-class Curve:
-    """The curve of the phase diagram; what cells leave of it, ln Δx less the curve."""
-
-    def __init__(self, cells: Columns) -> None:
-        """Fit it to the cells of the phase diagram."""
-        points = laws.points_of(cells)
-        self.turns, self.lengths = points.speed / points.length, points.distance / points.length
-        self._curve = laws.master_curve(self.turns, self.lengths)
-
-    def __call__(self, turns: Array) -> Array:
-        """Δx/(nℓ) on the curve; beyond its ends it keeps the value there."""
-        return np.exp(self._curve(turns))
-
-    def left(self, cells: Cells, exponents: Sequence[float] | Array) -> Array:
-        """Residuals of cells, shape (cells,)."""
-        return np.log(cells.lengths) - self._curve(cells.scaled_turns(exponents))
-
-    def best_exponents(self, cells: Cells, chosen: Array) -> Array:
-        """Exponents with the least residuals of some cells; nothing of the curve is fitted to them."""
-        return np.asarray(least_squares(lambda numbers: self.left(cells, numbers)[chosen], (-0.5, 0.25, 0.25)).x)
+def left_of(cells: Cells, curve: Curve, exponents: Sequence[float]) -> Array:
+    """What cells leave of the curve of the phase diagram, ln Δx less that, shape (cells,)."""
+    return np.log(cells.lengths) - curve(cells.scaled_turns(exponents))
 
 
-def table(cells: Cells, curve: Curve) -> str:
+def best_exponents(cells: Cells, curve: Curve, chosen: Array) -> Array:
+    """Exponents with the least residuals of some cells; nothing of the curve is fitted to them."""
+    return least_squares(lambda numbers: left_of(cells, curve, numbers)[chosen], (-0.5, 0.25, 0.25)).x
+
+
+def table(cells: Cells, points: laws.Points) -> str:
     """Markdown: residuals of the cells with each time, and the best exponents."""
-    count, rows = len(cells.names), []
+    count, rows, curve = len(cells.names), [], laws.master_curve(points.turns, points.lengths)
     groups = {name: cells.varied(word) for word, name in BLOCKS.items()} | {"all": np.arange(count)}
     for name, exponents in TIMES.items():
-        left = curve.left(cells, exponents)
+        left = left_of(cells, curve, exponents)
         rows.append([name, *(f"{laws.root_mean_square(left[chosen]):.0f} %" for chosen in groups.values())])
-    best, rng = curve.best_exponents(cells, groups["all"]), np.random.default_rng(1)
-    samples = [curve.best_exponents(cells, rng.integers(0, count, count)) for _ in range(ROUNDS)]
+    best, rng = best_exponents(cells, curve, groups["all"]), np.random.default_rng(1)
+    samples = [best_exponents(cells, curve, rng.integers(0, count, count)) for _ in range(ROUNDS)]
     errors = np.std(samples, axis=0, ddof=1)
     shares = [f"{value:.2f} ± {error:.2f}" for value, error in zip(best, errors, strict=True)]
-    residual = laws.root_mean_square(curve.left(cells, best), 3)
-    left = curve.left(cells, TIMES["(R/g)^½"])
+    residual = laws.root_mean_square(left_of(cells, curve, best), 3)
+    left = left_of(cells, curve, TIMES["(R/g)^½"])
     order = np.argsort(-np.abs(left))[:4]
     farthest = ", ".join(f"{_cell(cells, i)} {100 * np.expm1(left[i]):+.0f} %" for i in order)
     g, r, link, lengths = (f"{each.min():.2g} to {each.max():.2g}" for each in (*cells.scales, cells.lengths))
-    described = [f"{curve(np.array([place / NORMAL_TIME]))[0]:.2g} at {place:g}" for place in PLACES]
+    described = [f"{np.exp(curve(np.array([place / NORMAL_TIME])))[0]:.2g} at {place:g}" for place in PLACES]
     return (
-        f"{markdown(('time τ', *groups), rows)}\n\n"
+        f"{common.table(('time τ', *groups), rows)}\n\n"
         f"{count} cells; g, R and ℓ are {g}, {r} and {link} times those of the phase diagram, Δx "
         f"is {lengths} lengths of the chain. The best exponents of g, R and ℓ are {', '.join(shares)} "
         f"and leave {residual:.0f} %. With (R/g)^½ the farthest cells are {farthest}.\n\n"
@@ -155,22 +122,23 @@ def _cell(cells: Cells, number: int) -> str:
     return f"{scale[which]:.2g} {'gRℓ'[which]}, {cells.links[number]:g} × {cells.frequency[number]:g} Hz"
 
 
-def draw(cells: Cells, curve: Curve) -> Figure:
+def draw(cells: Cells, points: laws.Points) -> Figure:
     """Δx/(nℓ) over turns per second, and over turns in the time (R/g)^½; the phase diagram in grey."""
     figure = Figure(figsize=(11, 4.8), layout="constrained")
     panels = (
         ("v/(nℓ), turns of the loop / s⁻¹", TIMES["a constant"], 1.0),
         ("v √(R/g)/(nℓ), turns of the loop in the time √(R/g)", TIMES["(R/g)^½"], NORMAL_TIME),
     )
-    fine = np.geomspace(curve.turns.min(), curve.turns.max(), 200)
+    curve = laws.master_curve(points.turns, points.lengths)
+    fine = np.geomspace(points.turns.min(), points.turns.max(), 200)
     for axes, (label, exponents, unit) in zip(figure.subplots(1, 2, sharey=True), panels, strict=True):
-        axes.scatter(curve.turns * unit, curve.lengths, s=8, color=FAINT, label="phase diagram")
+        axes.scatter(points.turns * unit, points.lengths, s=8, color=FAINT, label="phase diagram")
         for (word, name), color in zip(BLOCKS.items(), LINE_COLORS, strict=False):
             chosen = cells.varied(word)
             x = cells.scaled_turns(exponents)[chosen] * unit
             axes.scatter(x, cells.lengths[chosen], s=16, color=color, label=name)
-        axes.plot(fine * unit, curve(fine), color=INK, linewidth=1)
-        title = f"residual of the coloured cells {laws.root_mean_square(curve.left(cells, exponents)):.0f} %"
+        axes.plot(fine * unit, np.exp(curve(fine)), color=INK, linewidth=1)
+        title = f"residual of the coloured cells {laws.root_mean_square(left_of(cells, curve, exponents)):.0f} %"
         common.tidy(axes, title, grid="both", xscale="log", yscale="log", xlabel=label)
     figure.axes[0].set_ylabel("Δx/(nℓ)")
     figure.axes[0].legend(frameon=False, title="varied")

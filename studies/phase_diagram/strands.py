@@ -6,40 +6,31 @@ what is drawn held: Δx as a linear function of it, of sine and cosine of the ph
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
-from studies.common import DRAWN, Array, Columns, drawn_terms, mean, minus, over_cells, standard_error
+from studies.common import DRAWN, Array, Columns, OverCells, drawn_terms, mean, minus, standard_error
 from studies.common import table as markdown
 from studies.phase_diagram import laws
-from studies.phase_diagram.cells import walks_by_cell
+from studies.phase_diagram.cells import places_in, walks_by_cell
 from studies.phase_diagram.endings import Ending, endings
 from warpchain import Status, SweepResult
 
-CSV: Final = Path(__file__).parent / "results" / "strands.csv"
-EVENTS: Final = {"crease": "self_contact", "strands": "strands_met", "collapse": "collapse"}
-"""What happens to a loop: name → end of the name of its column."""
-BEGUN: Final = ("0", "1", "2", "3", "later", "never")
-"""Bounces begun before an event."""
-FEW: Final = 10
-"""Walks that each of two groups has in a cell in which they are compared, at least."""
-EARLY: Final = 2
-"""Strands that met by this bounce met early."""
-OTHERWISE: Final = (1, 3)
-"""Bounces by which they might be said to have met early instead."""
-WAYS: Final = (Ending.IN_FLIGHT, Ending.FIRST, Ending.SECOND, Ending.LATER)
-BEFORE: Final = ("a bounce or more before", "in that bounce", "not before")
-"""When strands met, of loops that collapse."""
-GROUPS: Final = ((30, 50), (60, 90), (100, 140), (150, 180), (190, 240))
-"""Numbers of links that are shown together."""
+CSV = Path(__file__).parent / "results" / "strands.csv"
+EVENTS = {"crease": "self_contact", "strands": "strands_met", "collapse": "collapse"}  # Name → end of its column
+BEGUN = ("0", "1", "2", "3", "later", "never")  # Bounces begun before an event
+FEW = 10  # Walks that each of two groups has in a cell in which they are compared, at least
+EARLY = 2  # Strands that met by this bounce met early
+OTHERWISE = (1, 3)  # Bounces by which they might be said to have met early instead
+WAYS = (Ending.IN_FLIGHT, Ending.FIRST, Ending.SECOND, Ending.LATER)
+BEFORE = ("a bounce or more before", "in that bounce", "not before")  # When strands met, of loops that collapse
+GROUPS = ((30, 50), (60, 90), (100, 140), (150, 180), (190, 240))  # Numbers of links that are shown together
 
 
 def reduced(parts: Sequence[SweepResult]) -> Iterator[dict[str, float | str]]:
     """Rows of the file, a cell each."""
     names = [f"bounces_before_{name}" for name in EVENTS.values()]
-    (block, *_) = parts[0].blocks.values()
-    names += [name for name in block.columns if name.endswith(DRAWN)]
+    names += [name for name in next(iter(parts[0].blocks.values())).columns if name.endswith(DRAWN)]
     names += ["status", "dx", "collapsed_at", "strands_met_at", "flight_before_collapse"]
     for (links, frequency), walks in walks_by_cell(parts, names).items():
         rest = walks["status"] == Status.AT_REST
@@ -59,15 +50,11 @@ def reduced(parts: Sequence[SweepResult]) -> Iterator[dict[str, float | str]]:
             begun = at_rest[f"bounces_before_{name}"]
             counts = [np.sum(begun == number) for number in range(4)] + [np.sum(begun > 3), np.sum(begun < 0)]
             row |= {f"{event}_{key}": int(count) for key, count in zip(BEGUN, counts, strict=True)}
-        row |= {f"{way.label}_{k}": int(np.sum((ways == way) & (when == k))) for way in WAYS for k in range(3)}
-        yield row
+        yield row | {f"{way.label}_{k}": int(np.sum((ways == way) & (when == k))) for way in WAYS for k in range(3)}
 
 
 def _early(dx: Array, early: Array, terms: Sequence[Array]) -> dict[str, float]:
-    """Δx of walks with an early meeting over that of the others, less 1: as it is, and with what is drawn held.
-
-    The error takes no equal scatter of both for granted (HC3).
-    """
+    """Δx of walks with an early meeting over that of the others, less 1: as it is, and with draws held (HC3)."""
     found = {"early": int(early.sum()), "raw": np.nan, "held": np.nan, "held_se": np.nan}
     if min(early.sum(), (~early).sum()) < FEW:
         return found
@@ -82,20 +69,27 @@ def _early(dx: Array, early: Array, terms: Sequence[Array]) -> dict[str, float]:
 
 def _over_cells(values: Array, errors: Array, digits: int = 1) -> tuple[str, str, str, str]:
     """Mean over cells ± its standard error in per cent, χ² of none, of one difference, cells that rise, that fall."""
-    over = over_cells(100 * values, 100 * np.where(errors > 0, errors, np.nan))
+    over = OverCells(100 * values, 100 * np.where(errors > 0, errors, np.nan))
     if not len(over):
         return "", "", "", ""
     texts = over.text(digits), f"{over.chi2:.0f} of {len(over)}", f"{over.chi2_of_one:.0f} of {len(over) - 1}"
     return *texts, f"{over.rises}, {over.falls}"
 
 
+def _groups(cells: Columns) -> Iterator[tuple[str, Array, Array]]:
+    """Name of each group of links, its cells from 5 to 30 Hz, and its slower or faster ones."""
+    inside = (cells["frequency"] >= 5) & (cells["frequency"] <= 30)
+    for low, high in GROUPS:
+        chosen = (cells["links"] >= low) & (cells["links"] <= high)
+        yield f"{low} to {high}", chosen & inside, chosen & ~inside
+
+
 def shares(cells: Columns) -> str:
     """Markdown: after how many bounces loops crease, strands meet and loops collapse, by links; early against late."""
-    inside = (cells["frequency"] >= 5) & (cells["frequency"] <= 30)
     rows = []
-    for name, frequencies in (("5 to 30 Hz", inside), ("slower or faster", ~inside)):
-        for low, high in GROUPS:
-            chosen = frequencies & (cells["links"] >= low) & (cells["links"] <= high)
+    for which, frequencies in enumerate(("5 to 30 Hz", "slower or faster")):
+        for links, *both in _groups(cells):
+            chosen = both[which]
             for event in EVENTS:
                 counts = np.array([cells[f"{event}_{key}"][chosen].sum() for key in BEGUN])
                 texts = (f"{100 * count / max(counts.sum(), 1):.0f} %" for count in counts)
@@ -103,24 +97,23 @@ def shares(cells: Columns) -> str:
                 if event == "strands" and np.isfinite(cells["raw"][chosen]).any():
                     raw = f"{100 * np.nanmean(cells['raw'][chosen]):+.1f} %"
                     compared = raw, *_over_cells(cells["held"][chosen], cells["held_se"][chosen])
-                rows.append((name, f"{low} to {high}", event, *texts, *compared))
-    head = ("", "links", "", "before", "after 1", "after 2", "after 3", "later", "never")
-    head = (*head, "early over late", "what is drawn held", "χ² of none", "of one value", "rise, fall")
+                rows.append((frequencies, links, event, *texts, *compared))
+    head = " | links |  | before | after 1 | after 2 | after 3 | later | never"
+    head += " | early over late | what is drawn held | χ² of none | of one value | rise, fall"
     return minus(markdown(head, rows))
 
 
 def by_bounces(cells: Columns) -> str:
     """Markdown: the difference from 5 to 30 Hz, with what is drawn held, for other bounds of what is early."""
-    inside, rows = (cells["frequency"] >= 5) & (cells["frequency"] <= 30), []
-    for low, high in GROUPS:
-        chosen, texts = inside & (cells["links"] >= low) & (cells["links"] <= high), []
-        for bounce in sorted((EARLY, *OTHERWISE)):
-            end = "" if bounce == EARLY else f"_{bounce}"
-            values, errors = cells[f"held{end}"][chosen], cells[f"held_se{end}"][chosen]
-            mean, _, _, ends = _over_cells(values, errors)
-            texts.append(minus(f"{mean} ({np.isfinite(values).sum()}: {ends})"))
-        rows.append((f"{low} to {high}", *texts))
-    return markdown(("links", "met by the first bounce", "by the second", "by the third"), rows)
+    rows = []
+    for links, chosen, _ in _groups(cells):
+        texts = []
+        for end in ("_1", "", "_3"):
+            values = cells[f"held{end}"][chosen]
+            mean, _, _, ends = _over_cells(values, cells[f"held_se{end}"][chosen])
+            texts.append(f"{mean} ({np.isfinite(values).sum()}: {ends})")
+        rows.append((links, *texts))
+    return minus(markdown("links | met by the first bounce | by the second | by the third", rows))
 
 
 def ways(cells: Columns) -> str:
@@ -133,14 +126,13 @@ def ways(cells: Columns) -> str:
         if count.sum():
             parts = (f"{100 * count[where].sum() / total[where].sum():.2g} %" for where in (papers, ~papers))
             rows.append((way.meaning, BEFORE[k], *parts, f"{np.sum((most == number) & (total > 0))}"))
-    head = ("way of ending", "strands met", "share, paper's range", "elsewhere", "cells where it is the most frequent")
+    head = "way of ending | strands met | share, paper's range | elsewhere | cells where it is the most frequent"
     return f"{markdown(head, rows)}\n\n{total.sum():,.0f} walks at rest of {cells['walks'].sum():,.0f}."
 
 
 def against_million(cells: Columns, million: Columns) -> str:
     """Whether these walks, of today's engine, go as far as those of the million, in words."""
-    places = {key: i for i, key in enumerate(zip(million["links"], million["frequency"], strict=True))}
-    at = np.array([places[key] for key in zip(cells["links"], cells["frequency"], strict=True)])
+    at = places_in(cells, million)
     failed = 1 - million["at_rest"][at] / million["walks"][at]
     used = (cells["at_rest"] > 10) & (failed <= laws.MOST_FAILED)
     ratio = cells["dx"] / million["dx_mean"][at] - 1
@@ -158,13 +150,3 @@ def against_million(cells: Columns, million: Columns) -> str:
         mean, chi2, _, ends = _over_cells(ratio[chosen], error[chosen], 2)
         texts.append(f"in {name} {mean} (χ² {chi2} cells; rise, fall: {ends})")
     return minus(f"Mean Δx of these walks over that of the million, less 1, mean over cells: {'; '.join(texts)}.")
-
-
-def tables(cells: Columns, million: Columns) -> dict[str, str]:
-    """The tables of the page by their markers."""
-    return {
-        "strands": shares(cells),
-        "by bounces": by_bounces(cells),
-        "ways with strands": ways(cells),
-        "against the million": against_million(cells, million),
-    }

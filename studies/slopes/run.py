@@ -1,11 +1,6 @@
-"""Draws the figure of studies/slopes/README.md and writes its tables, from the folder of the sweep.
-
-warpchain sweep studies/slopes/sweeps/slopes.yaml -o slopes --device cuda
-python -m studies.slopes.run slopes
-"""
+"""Draws the figure of README.md and writes its tables, from the folder of the sweep."""
 
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,9 +9,8 @@ import warpchain
 from studies import common
 from studies.common import DISTANCE, LINE_COLORS, Array, Block
 
-FOLDER: Final = Path(__file__).parent
-LIMIT: Final = 20.0
-"""`distance_limit` of the sweep [m]."""
+FOLDER = Path(__file__).parent
+LIMIT = 20.0  # `distance_limit` of the sweep [m]
 
 
 def share_without_end(block: Block) -> Array:
@@ -25,23 +19,16 @@ def share_without_end(block: Block) -> Array:
 
 
 def rows(block: Block) -> str:
-    """Markdown, a line for each cell: its axes, Δx, share and speed along the floor of walks without end, collapse.
-
-    The time of the collapse is the mean over the walks in which it came.
-    """
-    cells, share, collapse = block.statistics(), share_without_end(block), block.columns["collapsed_at"]
+    """Of each cell Δx, share and speed along the floor of walks without end, and when it collapsed, if it did."""
+    cells, share, collapsed = block.statistics(), share_without_end(block), common.mean(block.columns["collapsed_at"])
     endless = block.columns["status"] == warpchain.Status.DISTANCE_LIMIT
-    speed, collapsed = (
-        common.mean_where(endless, LIMIT / block.columns["walk_time"]),
-        common.mean_where(~np.isnan(collapse), collapse),
-    )
-    names = [*block.axes, "Δx / m", "±", "without end", "their speed / (m/s)", "collapse / s"]
+    speed = common.mean(np.where(endless, LIMIT / block.columns["walk_time"], np.nan))
     lines = []
-    for place, values in common.of_cells(block):
-        numbers = [f"{number:.3f}" for number in (cells.mean[place], cells.standard_error[place])]
-        numbers += [f"{share[place]:.0%}", f"{speed[place]:.2f}", f"{collapsed[place]:.2f}"]
-        lines.append([*(f"{value:g}" for value in values), *(text.replace("nan", "–") for text in numbers)])
-    return common.table(names, lines)
+    for place, at in common.of_cells(block):
+        numbers = cells.mean[place], cells.standard_error[place], share[place], speed[place], collapsed[place]
+        lines.append([*at.values(), *("–" if np.isnan(number) else number for number in numbers)])
+    heads = *block.axes, "Δx / m", "±", "without end", "their speed / (m/s)", "collapse / s"
+    return common.table(heads, lines, len(at) * "g " + ".3f .3f .0% .2f .2f")
 
 
 def draw(block: Block) -> Figure:

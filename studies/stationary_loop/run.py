@@ -1,12 +1,6 @@
-"""Prints the tables of studies/stationary_loop/README.md and draws its figures.
+"""Prints the tables of README.md and draws its figures, in a few minutes; that of the kinks from a folder."""
 
-    python -m studies.stationary_loop.run           # mean loops beside theory and the catenary, in a few minutes
-    python -m studies.stationary_loop.run FOLDER    # of the sweep kink: the figure of the kinks as well
-
-Numbers are printed.
-"""
-
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -21,7 +15,7 @@ from studies.stationary_loop import theory
 FOLDER = Path(__file__).parent
 SHOWN = (120, 20.0)
 CELLS = ((60, 20.0), (120, 20.0), (120, 10.0), (180, 30.0), (60, 30.0))
-OTHERS: Mapping[str, Mapping[str, float]] = {
+OTHERS = {
     "half of the inertia": {"inner_inertia": 8.45e-8, "outer_inertia": 6.46e-8},
     "a tenth of the inertia": {"inner_inertia": 1.69e-8, "outer_inertia": 1.292e-8},
     "three times the inertia": {"inner_inertia": 5.07e-7, "outer_inertia": 3.876e-7},
@@ -29,8 +23,8 @@ OTHERS: Mapping[str, Mapping[str, float]] = {
     "hardly any Coulomb friction": {"coulomb_friction": 1e-6},
 }
 """Changes of the chain whose loop is shown."""
-
-
+LESS = {"theory": (), "without Coulomb": ("coulomb_friction",), "without friction": ("viscous_friction",)}
+"""Frictions that theories leave out, one after the other."""
 UNDAMPED = {"load_factor": 1.0, "steady_time": 0.0, "steady_tolerance": 1.0, "further_hold": 40.0}
 
 
@@ -40,39 +34,42 @@ def held(links: int, frequency: float, values: Mapping[str, float]) -> warpchain
     return warpchain.walk(links=links, frequency=frequency, preset="soft", start="spinning", **settings)
 
 
-def compare(name: str, ours: theory.MeanLoop, theirs: theory.MeanLoop) -> None:
-    """Prints how far two loops are apart."""
+def compare(name: str, ours: Any, theirs: Any) -> None:
+    """Prints how far two mean loops are apart."""
     middle = np.abs(ours.s) < 0.45 * (ours.free[1] - ours.free[0])
     s = ours.s[middle]
-    place = np.stack([np.interp(s, theirs.s, column) for column in theirs.position.T], axis=1)
-    apart = np.hypot(*(ours.position[middle] - place).T)
+    apart = np.hypot(*(ours.position[middle] - theory.places(theirs, s)).T)
     tension = ours.effective_tension[middle] - np.interp(s, theirs.s, theirs.effective_tension)
     curvature = ours.curvature[middle] - np.interp(s, theirs.s, theirs.curvature)
-    height, width = (np.ptp(ours.position, axis=0) / np.ptp(theirs.position, axis=0) - 1)[[1, 0]]
+    width, height = np.ptp(ours.position, axis=0) / np.ptp(theirs.position, axis=0) - 1
     print(
         f"{name}: held under multiplied loads against 40 s under its own: height {100 * height:+.2f} %, "
-        f"width {100 * width:+.2f} %, places {1e3 * np.sqrt(np.mean(apart**2)):.2f} mm rms, curvature "
-        f"{np.sqrt(np.mean(curvature**2)):.2f} of {theirs.curvature.max():.1f} 1/m, tension "
-        f"{np.sqrt(np.mean(tension**2)):.4f} of {theirs.effective_tension.max():.2f} N"
+        f"width {100 * width:+.2f} %, places {1e3 * theory.rms(apart):.2f} mm rms, curvature "
+        f"{theory.rms(curvature):.2f} of {theirs.curvature.max():.1f} 1/m, tension "
+        f"{theory.rms(tension):.4f} of {theirs.effective_tension.max():.2f} N"
     )
 
 
-def row(name: str, loop: theory.MeanLoop, theory: theory.TheoreticalLoop) -> str:
-    """Bottom curvature, peak and dip of a predicted curve, and how far it is from the simulated one."""
-    near = np.abs(theory.s) < 0.35 * (loop.free[1] - loop.free[0])
-    peak = int(np.argmax(np.where(near, theory.curvature, -np.inf)))
-    dip = int(np.argmin(np.where(near, theory.curvature, np.inf)))
-    fine = np.linspace(loop.s[0], loop.s[-1], 20_000)
-    curve = np.stack([np.interp(fine, loop.s, column) for column in loop.position.T], axis=1)
-    apart = np.array([np.hypot(*(curve - point).T).min() for point in theory.position])
-    tension = theory.effective_tension - np.interp(theory.s, loop.s, loop.effective_tension)
-    return (
-        f"  {name:22} bottom {np.interp(0, theory.s, theory.curvature):6.2f} 1/m, "
-        f"greatest {theory.curvature[peak]:6.2f} at {100 * theory.s[peak]:5.1f} cm, "
-        f"least {theory.curvature[dip]:6.2f} at {100 * theory.s[dip]:5.1f} cm; "
-        f"shape {1e3 * np.sqrt(np.mean(apart**2)):.2f} mm rms, {1e3 * apart.max():.2f} at most; "
-        f"tension {np.sqrt(np.mean(tension**2)):.4f} N rms"
+def row(name: str, bottom: float, kink: Sequence[float], rest: str) -> None:
+    """Prints curvatures of a loop: at the lowest point, the greatest and the least with their places."""
+    peak, peak_at, dip, dip_at = kink
+    print(
+        f"  {name:22} bottom {bottom:6.2f} 1/m, greatest {peak:6.2f} at {100 * peak_at:5.1f} cm, "
+        f"least {dip:6.2f} at {100 * dip_at:5.1f} cm; {rest}"
     )
+
+
+def show_theory(name: str, loop: Any, found: theory.TheoreticalLoop) -> None:
+    """Prints bottom curvature, peak and dip of a predicted curve, and how far it is from the simulated one."""
+    near = np.abs(found.s) < 0.35 * (loop.free[1] - loop.free[0])
+    peak = int(np.argmax(np.where(near, found.curvature, -np.inf)))
+    dip = int(np.argmin(np.where(near, found.curvature, np.inf)))
+    curve = theory.places(loop, np.linspace(loop.s[0], loop.s[-1], 20_000))
+    apart = np.array([np.hypot(*(curve - point).T).min() for point in found.position])
+    tension = found.effective_tension - np.interp(found.s, loop.s, loop.effective_tension)
+    kink = found.curvature[peak], found.s[peak], found.curvature[dip], found.s[dip]
+    distances = f"shape {1e3 * theory.rms(apart):.2f} mm rms, {1e3 * apart.max():.2f} at most"
+    row(name, np.interp(0, found.s, found.curvature), kink, f"{distances}; tension {theory.rms(tension):.4f} N rms")
 
 
 def show(name: str, walk: warpchain.WalkResult) -> None:
@@ -80,31 +77,19 @@ def show(name: str, walk: warpchain.WalkResult) -> None:
     if walk.before_release is None:
         print(f"{name}: {walk.status.label}")
         return
-    loop = walk.mean_loop()
-    kink = loop.kink()
+    loop, chain = walk.mean_loop(), {}
     print(f"{name}: v = {loop.speed:.3f} m/s, held for {walk.hold_time:.2f} s, drift {100 * walk.drift:.2f} %")
-    print(
-        f"  {'simulation':22} bottom {loop.bottom_curvature:6.2f} 1/m, "
-        f"greatest {kink.peak:6.2f} at {100 * kink.peak_at:5.1f} cm, "
-        f"least {kink.dip:6.2f} at {100 * kink.dip_at:5.1f} cm; "
-        f"joints within {1e3 * loop.spread.max():.3f} mm"
-    )
-    chain: dict[str, float] = {}
-    for which, less in (
-        ("theory", ""),
-        ("without Coulomb", "coulomb_friction"),
-        ("without friction", "viscous_friction"),
-    ):
-        chain |= {less: 0.0} if less else {}
+    row("simulation", loop.bottom_curvature, loop.kink(), f"joints within {1e3 * loop.spread.max():.3f} mm")
+    for which, less in LESS.items():
+        chain |= {name: 0.0 for name in less}
         try:
-            print(row(which, loop, theory.predict(loop, chain)))
-        except theory.NoSolutionError as error:
+            show_theory(which, loop, theory.predict(loop, chain))
+        except ArithmeticError as error:
             print(f"  {which:22} {error}")
-    print(row("catenary", loop, theory.catenary_of(loop)))
-    balances = (
-        f"{key} {100 * rms:.1f} % ({100 * greatest:.1f} %)" for key, (rms, greatest) in theory.imbalances(loop).items()
-    )
-    print("  balances, rms (greatest):", ", ".join(balances))
+    show_theory("catenary", loop, theory.catenary_of(loop))
+    balances = theory.imbalances(loop).items()
+    texts = (f"{key} {100 * mean:.1f} % ({100 * greatest:.1f} %)" for key, (mean, greatest) in balances)
+    print("  balances, rms (greatest):", ", ".join(texts))
 
 
 def draw(walk: warpchain.WalkResult) -> Figure:
@@ -123,22 +108,16 @@ def draw(walk: warpchain.WalkResult) -> Figure:
 
 
 def draw_kinks(result: warpchain.SweepResult) -> Figure:
-    """Curvature and place of the kink against the frequency, a line for each number of links.
-
-    Raises:
-        InputError: no walk has frames of the time before its release.
-    """
+    """Curvature and place of the kink against the frequency, a line for each number of links."""
     kinks: dict[int, dict[float, list[Any]]] = {}
     for block in result.blocks.values():
-        for place in np.argwhere(block.kept):
-            walk = block.walk_motion(tuple(int(index) for index in place))
+        for place in np.argwhere(block.kept).tolist():
+            walk = block.walk_motion(tuple(place))
             if walk.before_release is not None:
                 scene = walk.setup.scene
                 kinks.setdefault(scene.links, {}).setdefault(scene.frequency, []).append(walk.mean_loop().kink())
     if not kinks:
-        raise warpchain.InputError(
-            f"{result.name}: no walk has frames before its release; give a folder of the sweep kink"
-        )
+        raise warpchain.InputError(f"{result.name}: no frames before a release; give a folder of the sweep kink")
     figure = Figure(figsize=(9.6, 3.6), layout="constrained")
     panels = figure.subplots(1, 3)
     for axes, name, label, scale in (

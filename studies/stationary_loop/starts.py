@@ -1,12 +1,8 @@
-"""Does Δx depend on how the loop came to spin, and how long it was held? Tables of studies/stationary_loop/README.md.
+"""Does Δx depend on how the loop came to spin, and how long it was held? Tables of README.md."""
 
-python -m studies.stationary_loop.starts             # results/starts.csv → tables of the page
-python -m studies.stationary_loop.starts FOLDER…     # sweeps steadiness, steadiness_long, swing → the file, first
-"""
-
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any
 
 import numpy as np
 import typer
@@ -15,15 +11,15 @@ import warpchain
 from studies import common
 from studies.common import DRAWN, Array
 
-Key = tuple[str, int, float, float]
-"""Block, links, frequency [Hz], time for which the loop was held on [s], 0 where that is no axis."""
+Key = tuple[str, int, float, float]  # Block, links, frequency [Hz], time for which loops were held on [s]
+Cells = Mapping[Key, Mapping[str, float]]
 
-CSV: Final = Path(__file__).parent / "results" / "starts.csv"
-PAGE: Final = Path(__file__).parent / "README.md"
-QUANTITIES: Final = ("dx", "release_center_x", "release_width", "release_height")
+CSV = Path(__file__).parent / "results" / "starts.csv"
+PAGE = Path(__file__).parent / "README.md"
+QUANTITIES = ("dx", "release_center_x", "release_width", "release_height")
 """Distance of the walk; place of the centre of mass, width and height of the loop at the release [m]."""
-STARTS: Final = ("spinning", "rest", "undamped")
-LOOPS: Final = {
+STARTS = ("spinning", "rest", "undamped")
+LOOPS = {
     "`rest`": (("rest", 0.0),),
     "`spinning`": (("spinning", 0.0), ("held_on", 0.0)),
     "held 30 s": (("undamped", 0.0), ("swing", 30.0)),
@@ -31,43 +27,38 @@ LOOPS: Final = {
     "held on": tuple(("held_on", time) for time in (5.0, 10.0, 20.0)),
 }
 """Loops of one kind: name → blocks, and times for which they held their loops on, of the same scene."""
-OURS: Final = ("`spinning`", "`rest`")
-COMPARED: Final = (
+OURS = ("`spinning`", "`rest`")
+COMPARED = (
     ("`rest`", "`spinning`"),
     ("`spinning`", "held 30 s"),
     ("`rest`", "held 30 s"),
     ("at once", "held on"),
     ("held 30 s", "held on"),
 )
-SLOW: Final = 10.0
-"""Frequency [Hz] at which loops hardly swing."""
-LONG: Final = 150
-"""Links from which loops are called long."""
+SLOW = 10.0  # Frequency [Hz] at which loops hardly swing
+LONG = 150  # Links from which loops are called long
 
 
-def reduced(paths: list[str]) -> list[dict[str, Any]]:
+def reduced(paths: list[str]) -> Iterator[dict[str, Any]]:
     """Mean and standard error of each quantity by cell; blocks of the same name are put together."""
     found: dict[Key, list[dict[str, Array]]] = {}
     for path in paths:
         for name, block in warpchain.load(path).blocks.items():
             names = [name for name in block.columns if name in QUANTITIES or name.endswith(DRAWN)]
-            columns = {name: np.asarray(block.columns[name], float) for name in names}
-            for place, numbers in common.of_cells(block):
-                at = dict(zip(block.axes, map(float, numbers), strict=True))
-                key = name, int(at["links"]), at["frequency"], at.get("further_hold", 0.0)
-                found.setdefault(key, []).append({name: values[place] for name, values in columns.items()})
+            for place, at in common.of_cells(block):
+                key = name, int(at["links"]), float(at["frequency"]), float(at.get("further_hold", 0))
+                found.setdefault(key, []).append({each: block.columns[each][place].astype(float) for each in names})
     cells = {}
     for key, parts in sorted(found.items()):
         walks = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
         cells[key] = {name: values[np.isfinite(walks["dx"])] for name, values in walks.items()}
-    held, rows = with_draws_held(cells), []
+    held = with_draws_held(cells)
     for key, walks in cells.items():
         row: dict[str, Any] = dict(zip(("block", "links", "frequency", "held_on"), key, strict=True))
         row["walks"] = len(walks["dx"])
         for quantity, each in ({name: walks[name] for name in QUANTITIES} | {"held": held[key]}).items():
             row |= {quantity: float(common.mean(each)), f"{quantity}_se": float(common.standard_error(each))}
-        rows.append(row)
-    return rows
+        yield row
 
 
 def with_draws_held(cells: Mapping[Key, Mapping[str, Array]]) -> dict[Key, Array]:
@@ -75,9 +66,11 @@ def with_draws_held(cells: Mapping[Key, Mapping[str, Array]]) -> dict[Key, Array
 
     Blocks draw their samples apart, so this takes scatter from their differences and no part of these.
     """
+    groups: dict[tuple[Any, ...], list[Key]] = {}
+    for key in cells:
+        groups.setdefault((key[0].startswith("paper"), *key[1:3]), []).append(key)
     held = {}
-    for group in {(key[0].startswith("paper"), *key[1:3]) for key in cells}:
-        keys = [key for key in cells if (key[0].startswith("paper"), *key[1:3]) == group]
+    for keys in groups.values():
         walks = {name: np.concatenate([cells[key][name] for key in keys]) for name in cells[keys[0]]}
         ends = np.cumsum([len(cells[key]["dx"]) for key in keys])
         own = np.repeat(np.eye(len(keys)), np.diff(ends, prepend=0), axis=0)
@@ -90,51 +83,35 @@ def with_draws_held(cells: Mapping[Key, Mapping[str, Array]]) -> dict[Key, Array
 def read() -> dict[Key, dict[str, float]]:
     """The rows of the file by cell."""
     names, columns = zip(*common.read_columns(CSV).items(), strict=True)
-    found = {}
-    for block, links, *numbers in zip(*columns, strict=True):
-        row = dict(zip(names[2:], map(float, numbers), strict=True))
-        found[str(block), int(links), row["frequency"], row["held_on"]] = row
-    return found
+    rows = (dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True))
+    return {(str(row["block"]), int(row["links"]), row["frequency"], row["held_on"]): row for row in rows}
 
 
-def _ratio(one: dict[str, float], other: dict[str, float]) -> tuple[float, float]:
+def _ratio(one: Mapping[str, float], other: Mapping[str, float]) -> tuple[float, float]:
     """Δx of one cell over that of the other, less 1, in per cent, with its standard error; what is drawn is held."""
     size = one["held"] / other["held"]
     error = size * float(np.hypot(one["held_se"] / one["held"], other["held_se"] / other["held"]))
     return 100 * (size - 1), 100 * error
 
 
-def _together(cells: dict[Key, dict[str, float]], loops: str, cell: tuple[int, float]) -> dict[str, float]:
+def _together(cells: Cells, loops: str, cell: tuple[int, float]) -> dict[str, float]:
     """Δx with what is drawn held, of all `LOOPS` of this name in a cell, weighted by their walks; empty without any."""
     parts = [cells[block, *cell, time] for block, time in LOOPS[loops] if (block, *cell, time) in cells]
     if not parts:
         return {}
     size, value, error = np.array([[part[name] for name in ("walks", "held", "held_se")] for part in parts]).T
-    return {
-        "held": np.average(value, weights=size),
-        "held_se": float(np.sqrt(np.sum((size * error) ** 2)) / size.sum()),
-    }
+    return {"held": np.average(value, weights=size), "held_se": np.linalg.norm(size * error) / size.sum()}
 
 
-def _mean(ratios: list[tuple[float, float]]) -> str:
-    """Mean over cells ± standard error, with χ² of none in any."""
-    found = common.over_cells(*zip(*ratios, strict=True))
-    return f"{found.text(2)} (χ² {found.chi2:.1f} of {len(found)})"
-
-
-def _with_error(cell: dict[str, float], quantity: str, scale: float = 1.0, digits: int = 4) -> str:
-    return f"{scale * cell[quantity]:.{digits}f} ± {scale * cell[f'{quantity}_se']:.{digits}f}"
-
-
-def starts(cells: dict[Key, dict[str, float]]) -> str:
+def starts(cells: Cells) -> str:
     """Δx of each start, and how far each is from the loops held for 30 s, in Δx and at the release."""
     rows = []
     for _, links, frequency, _ in sorted(key for key in cells if key[0] == "rest"):
         own = {start: cells[start, links, frequency, 0.0] for start in STARTS}
-        held, texts = own["undamped"], [_with_error(own[start], "dx") for start in STARTS]
+        held = own["undamped"]
+        texts = [f"{each['dx']:.4f} ± {each['dx_se']:.4f}" for each in own.values()]
         for start in OURS:
-            pair = (_together(cells, name, (links, frequency)) for name in (start, "held 30 s"))
-            size, error = _ratio(*pair)
+            size, error = _ratio(*(_together(cells, name, (links, frequency)) for name in (start, "held 30 s")))
             texts.append(f"{size:+.2f} ± {error:.2f}")
         for quantity in ("release_center_x", "release_width"):
             each = (f"{1e3 * (own[start][quantity] - held[quantity]):+.2f}" for start in STARTS[:2])
@@ -145,7 +122,7 @@ def starts(cells: dict[Key, dict[str, float]]) -> str:
     return common.table(f"{head} | place / mm | width / mm", rows)
 
 
-def means(cells: dict[Key, dict[str, float]]) -> str:
+def means(cells: Cells) -> str:
     """Means over the cells of the differences between starts, and of these from loops that were held on."""
     every = sorted(key[1:3] for key in cells if key[0] == "rest")
     long = [cell for cell in every if cell[0] >= LONG]
@@ -155,27 +132,27 @@ def means(cells: dict[Key, dict[str, float]]) -> str:
         texts = []
         for chosen in columns:
             pairs = [(_together(cells, one, cell), _together(cells, other, cell)) for cell in chosen]
-            texts.append(_mean([_ratio(*pair) for pair in pairs if all(pair)]))
+            found = common.OverCells(*zip(*(_ratio(*pair) for pair in pairs if all(pair)), strict=True))
+            texts.append(f"{found.text(2)} (χ² {found.chi2:.1f} of {len(found)})")
         rows.append((f"{one} over {other}", *texts))
     head = f"Δx | all cells | below {LONG} links | from {LONG} links on | those at 20 and 30 Hz"
     return common.table(head, rows)
 
 
-def over_time(cells: dict[Key, dict[str, float]], block: str, quantity: str, scale: float = 1, digits: int = 4) -> str:
+def over_time(cells: Cells, block: str, quantity: str, scale: float = 1, digits: int = 4) -> str:
     """A quantity by the time for which loops were held on, of a block; of Δx χ² of one value for all times, too."""
     times, tests = sorted({key[3] for key in cells if key[0] == block}), quantity == "held"
     rows = []
     for links, frequency in sorted({key[1:3] for key in cells if key[0] == block}):
         own = [cells[block, links, frequency, time] for time in times]
-        values = np.array([scale * cell[quantity] for cell in own])
-        errors = np.array([scale * cell[f"{quantity}_se"] for cell in own])
-        texts = [f"{value:.{digits}f}" for value in (*values, errors.mean())]
-        chi2 = [f"{common.over_cells(values, errors).chi2_of_one:.1f}"] if tests else []
+        values, errors = (scale * np.array([cell[name] for cell in own]) for name in (quantity, f"{quantity}_se"))
+        chi2 = [f"{common.OverCells(values, errors).chi2_of_one:.1f}"] if tests else []
+        texts = (f"{value:.{digits}f}" for value in (*values, errors.mean()))
         rows.append((links, f"{frequency:g}", *texts, *chi2))
     return common.table(("links", "Hz", *(f"{time:g} s" for time in times), "s.e.", *["χ²"] * tests), rows)
 
 
-def tables(cells: dict[Key, dict[str, float]]) -> dict[str, str]:
+def tables(cells: Cells) -> dict[str, str]:
     """The tables of the page by their markers."""
     texts = {
         "starts": starts(cells),

@@ -1,7 +1,6 @@
 """The theory of the free part of a stationary loop: its balances as a boundary value problem.
 
-With the signs of `walk.mean_loop()`, p = κ' and M = f(ℓ v p), where f(w) = β w + τ_c
-tanh(w/ω_c):
+With the signs of `walk.mean_loop()`, p = κ' and M = f(ℓ v p), where f(w) = β w + τ_c tanh(w/ω_c):
 
     x' = −cos φ    y' = sin φ    φ' = κ    κ' = p    T_e' = N κ + ρ g sin φ    N' = ρ g cos φ − T_e κ
     p' = (j v² p − N) / (ℓ v f'(ℓ v p))
@@ -20,37 +19,23 @@ loops of 60 to 180 links at 10 to 30 Hz change by at most 0.1 mm and 0.05 1/m.
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
+from scipy import fftpack
 from scipy.integrate import solve_bvp
 from scipy.optimize import brentq
 
 from studies.common import Array
 from warpchain import Parameters
 
-MeanLoop = Any
-"""What `walk.mean_loop()` returns."""
+MeanLoop = Any  # What `walk.mean_loop()` returns
 
-SMOOTHINGS: Final = (300.0, 100.0, 30.0, 10.0, 3.0, 1.0)
-"""Smoothings ω_c [rad/s] for which the problem is solved before that of the chain."""
-LEAST_SMOOTHING: Final = 0.3
-"""Least smoothing ω_c [rad/s]."""
-TOLERANCE: Final = 1e-4
-"""Relative tolerance of the solver."""
-MOST_NODES: Final = 20_000
-"""Greatest number of nodes of the solver."""
-POINTS: Final = 801
-"""Number of points of a theoretical loop."""
-IN_LINKS: Final = 1.0
-"""The theory begins and ends this many links inside of the free part: averages near it include links that touch."""
-
-EDGE: Final = 4.0
-"""Links at either end of the free part that balances leave out: averages there include links on the sprocket."""
-
-
-class NoSolutionError(ValueError):
-    """The boundary value problem was not solved."""
+SMOOTHINGS = (300.0, 100.0, 30.0, 10.0, 3.0, 1.0)  # Smoothings ω_c [rad/s] before that of the chain
+LEAST_SMOOTHING = 0.3  # Least smoothing ω_c [rad/s]
+POINTS = 801  # Number of points of a theoretical loop
+IN_LINKS = 1.0  # Theory ends this many links inside of the free part: averages near it include links that touch
+EDGE = 4.0  # Links at either end of the free part that balances leave out: averages there include links on the sprocket
 
 
 def bending_inertia(loop: MeanLoop) -> float:
@@ -64,19 +49,19 @@ def moment(p: Parameters, spin: Array, smoothing: float) -> Array:
     return p.viscous_friction * spin + p.coulomb_friction * np.tanh(spin / smoothing)
 
 
+def rms(values: Array) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def places(loop: MeanLoop, s: Array) -> Array:
+    """Points x, y of a loop at these arc lengths."""
+    return np.stack([np.interp(s, loop.s, column) for column in loop.position.T], axis=-1)
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TheoreticalLoop:
-    """The free part in theory, as functions of the arc length at g points; signs as of the mean loop.
-
-    Attributes:
-        s: arc length from the lowest point along the motion [m], shape (g,).
-        position: x, y [m], shape (g, 2).
-        angle: φ [rad], shape (g,).
-        curvature: κ [1/m], shape (g,).
-        effective_tension: T_e [N], shape (g,).
-        shear: N [N], shape (g,).
-        moment: M [N m], shape (g,).
-    """
+    """The free part in theory, at g points; all as `mean_loop()` has them, with its signs."""
 
     s: Array
     position: Array
@@ -88,15 +73,7 @@ class TheoreticalLoop:
 
 
 def predict(loop: MeanLoop, values: Mapping[str, float] | None = None) -> TheoreticalLoop:
-    """The free part in theory, with the ends and the speed of a mean loop.
-
-    Args:
-        loop: the mean loop, which is also the first guess.
-        values: of parameters that are others than those of the loop's chain.
-
-    Raises:
-        NoSolutionError: the solver has found no solution.
-    """
+    """The free part in theory, with the ends and the speed of a mean loop, the first guess, and other parameters."""
     p = loop.parameters.with_values(values or {})
     inset = IN_LINKS * loop.parameters.link_length
     first, last = loop.free[0] + inset, loop.free[1] - inset
@@ -126,10 +103,10 @@ def predict(loop: MeanLoop, values: Mapping[str, float] | None = None) -> Theore
 
     least = max(p.friction_smoothing, LEAST_SMOOTHING)
     for smoothing in (*(each for each in SMOOTHINGS if each > least and p.coulomb_friction > 0), least):
-        found = solve_bvp(partial(slope, smoothing), conditions, share, values, tol=TOLERANCE, max_nodes=MOST_NODES)
+        found = solve_bvp(partial(slope, smoothing), conditions, share, values, tol=1e-4, max_nodes=20_000)
         if not found.success:
             reason = found.message.lower().rstrip(".")
-            raise NoSolutionError(f"the boundary value problem was not solved ({reason})")
+            raise ArithmeticError(f"the boundary value problem was not solved ({reason})")
         share, values = found.x, found.y
     x, y, angle, curvature, *bending, tension, shear = found.sol(np.linspace(0.0, 1.0, POINTS))
     s, lowest = length * np.linspace(0.0, 1.0, POINTS), int(np.argmin(y))
@@ -146,27 +123,17 @@ def predict(loop: MeanLoop, values: Mapping[str, float] | None = None) -> Theore
 
 
 def catenary_of(loop: MeanLoop) -> TheoreticalLoop:
-    """The catenary between the ends of the free part of a mean loop and as long as it; errors as below."""
-    first, last = (np.array([np.interp(s, loop.s, column) for column in loop.position.T]) for s in loop.free)
+    """The catenary between the ends of the free part of a mean loop and as long as it."""
     weight = loop.density * loop.parameters.gravity
-    return catenary_between(first, last, loop.free[1] - loop.free[0], weight)
+    return catenary_between(*places(loop, np.array(loop.free)), loop.free[1] - loop.free[0], weight)
 
 
 def catenary_between(first: Array, last: Array, length: float, weight: float) -> TheoreticalLoop:
-    """The catenary of a given length between two ends, without shear and moment.
+    """The catenary of length L [m] and weight per length [N/m] between two ends x, y [m], the last one farther left.
 
     With the width w and the height difference h, a curve y = c cosh((x − x₀)/c) has 2 c sinh(w/2c) = √(L² − h²).
-
-    Args:
-        first: x, y [m] of the first end.
-        last: of the other one, which is farther left.
-        length: L [m].
-        weight: per length [N/m].
-
-    Raises:
-        ValueError: the length is not greater than the distance of the ends.
     """
-    width, rise = float(first[0] - last[0]), float(last[1] - first[1])
+    (width, _), rise = first - last, last[1] - first[1]
     square = length**2 - rise**2
     if width <= 0 or square <= width**2:
         raise ValueError("a catenary of this length does not reach from one end to the other; check both")
@@ -190,40 +157,31 @@ def catenary_between(first: Array, last: Array, length: float, weight: float) ->
 def imbalances(loop: MeanLoop) -> dict[str, tuple[float, float]]:
     """How well balances close on the free part of a mean loop, `EDGE` links at its ends left out.
 
-    Returns:
-        Of each balance the error relative to its greatest term, root mean square and greatest value:
+    Of each balance the error relative to its greatest term, root mean square and greatest value:
 
-        `force`: (T_e t + N n)(s), less its value at the lowest point and the weight in between, ρ g ŷ s.
-        `normal`: N' + T_e κ − ρ g cos φ.
-        `moment`: M' + N − j v² κ'.
-        `friction`: M − f(ℓ v κ'), where f is the moment of joints that turn like the mean curve.
+    - `force`: (T_e t + N n)(s), less its value at the lowest point and the weight in between, ρ g ŷ s.
+    - `normal`: N' + T_e κ − ρ g cos φ.
+    - `moment`: M' + N − j v² κ'.
+    - `friction`: M − f(ℓ v κ'), where f is the moment of joints that turn like the mean curve.
     """
     p, edge = loop.parameters, EDGE * loop.parameters.link_length
-    weight_of_length = loop.density * p.gravity
+    weight = loop.density * p.gravity
     inside = (loop.s > loop.free[0] + edge) & (loop.s < loop.free[1] - edge)
-    step = loop.length / len(loop.s)
-    tangent = np.stack([-np.cos(loop.angle), np.sin(loop.angle)], axis=1)
-    normal = np.stack([np.sin(loop.angle), np.cos(loop.angle)], axis=1)
-    force = loop.effective_tension[:, None] * tangent + loop.shear[:, None] * normal
-    bottom = np.array([np.interp(0.0, loop.s, force[:, axis]) for axis in (0, 1)])
-    weight = np.stack([np.zeros_like(loop.s), weight_of_length * loop.s], axis=1)
-    waves = 2j * np.pi * np.fft.rfftfreq(len(loop.s), step)
-    waves[-1] *= len(loop.s) % 2
-    shear_slope, moment_slope = (
-        np.fft.irfft(waves * np.fft.rfft(values), len(loop.s)) for values in (loop.shear, loop.moment)
-    )
-    bend, across = loop.effective_tension * loop.curvature, weight_of_length * np.cos(loop.angle)
+    # Forces are complex numbers x + iy; the tangent is −exp(−iφ), the normal i exp(−iφ).
+    force = (-loop.effective_tension + 1j * loop.shear) * np.exp(-1j * loop.angle)
+    unbalanced = force - np.interp(0.0, loop.s, force) - 1j * weight * loop.s
+    shear_slope, moment_slope = (fftpack.diff(values, period=loop.length) for values in (loop.shear, loop.moment))
+    bend, across = loop.effective_tension * loop.curvature, weight * np.cos(loop.angle)
     turned = bending_inertia(loop) * loop.speed**2 * loop.bending
     expected = moment(p, p.link_length * loop.speed * loop.bending, p.friction_smoothing)
     terms = {
-        "force": (np.hypot(*(force - bottom - weight).T), [np.hypot(*force.T)]),
+        "force": (unbalanced, [force]),
         "normal": (shear_slope + bend - across, [shear_slope, bend, across]),
         "moment": (moment_slope + loop.shear - turned, [moment_slope, loop.shear, turned]),
         "friction": (loop.moment - expected, [loop.moment]),
     }
     found = {}
     for name, (rest, parts) in terms.items():
-        scale = max(float(np.max(np.abs(part[inside]))) for part in parts)
-        share = np.abs(rest[inside]) / scale
-        found[name] = float(np.sqrt(np.mean(share**2))), float(share.max())
+        share = np.abs(rest[inside]) / max(np.max(np.abs(part[inside])) for part in parts)
+        found[name] = rms(share), float(share.max())
     return found

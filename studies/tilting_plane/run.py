@@ -1,16 +1,11 @@
-"""Writes the table of tilts and draws the figure of studies/tilting_plane/README.md, from the folder of the sweep.
-
-warpchain sweep tilt -o tilt --device cuda
-python -m studies.tilting_plane.run tilt      # → results/tilt.csv
-"""
+"""Writes the table of tilts of README.md and draws its figure, from the folder of the sweep `tilt`."""
 
 from pathlib import Path
-from typing import Final
 
 from studies import common
 from studies.tilting_plane import taps
 
-FOLDER: Final = Path(__file__).parent
+FOLDER = Path(__file__).parent
 
 
 def table(rows: list[dict[str, str]]) -> str:

@@ -1,34 +1,23 @@
-"""What taps that a hand could give do: reduces the sweep `taps` and writes its tables.
-
-warpchain sweep studies/tilting_plane/sweeps/taps.yaml -o taps --device cuda
-python -m studies.tilting_plane.taps taps     # → results/taps.csv, tables of the page
-python -m studies.tilting_plane.taps          # that file → tables of the page
-"""
+"""What taps that a hand could give do: reduces the sweep `taps`, if its folder is given, and writes its tables."""
 
 import csv
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 
 import warpchain
-from studies.common import Columns, mean, minus, over_cells, publish, run_study, standard_error, table, write_rows
+from studies.common import Columns, OverCells, mean, minus, publish, run_study, standard_error, table, write_rows
 
-FOLDER: Final = Path(__file__).parent
-UNITS: Final = {"tilt": "rad", "tilt_rate": "rad/s", "lateral_speed": "m/s", "yaw_rate": "rad/s"}
-STRAIGHT: Final = (0.1, 0.2)
-"""Greatest |drift| over Δx of a walk that counts as straight."""
-FEW: Final = 3
-"""Walks of a cell that are enough for a mean."""
+FOLDER = Path(__file__).parent
+UNITS = {"tilt": "rad", "tilt_rate": "rad/s", "lateral_speed": "m/s", "yaw_rate": "rad/s"}
+STRAIGHT = (0.1, 0.2)  # Greatest |drift| over Δx of a walk that counts as straight
+FEW = 3  # Walks of a cell that are enough for a mean
 
 
 def reduced(folder: str, needed: str) -> tuple[warpchain.SweepResult, list[dict[str, str]]]:
-    """A sweep, and rows: what each tap does, over the cells and, of those of one number of links, alone.
-
-    Raises:
-        InputError: it lacks the block `fixed` or the needed one.
-    """
+    """A sweep, and rows: what each tap does, over the cells and, of those of one number of links, alone."""
     result, found = warpchain.load(folder), []
     if not {"fixed", needed} <= result.blocks.keys():
         raise warpchain.InputError(f"{folder}: no blocks fixed and {needed}; give a folder of the page's sweep")
@@ -55,7 +44,7 @@ def _of_cells(columns: Columns, fixed: Any, rows: Any) -> dict[str, str]:
     dx, drift = (np.where(rest, columns[name][rows].astype(float), np.nan) for name in ("dx", "lateral_drift"))
     ratio = mean(dx) / fixed.mean[rows]
     own = standard_error(dx) / mean(dx)
-    over = over_cells(ratio, ratio * np.hypot(own, fixed.standard_error[rows] / fixed.mean[rows]))
+    over = OverCells(ratio, ratio * np.hypot(own, fixed.standard_error[rows] / fixed.mean[rows]))
     found = {
         "walks": str(rest.sum()),
         "fell": f"{100 * columns['fell_over'][rows].mean():.3g}",

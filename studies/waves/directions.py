@@ -1,17 +1,12 @@
 """Waves of either direction given to loops at their release: how far do these walk?
 
-    python -m studies.waves.directions run       # half an hour of one core → results/directions.csv
-    python -m studies.waves.directions           # that file → the table of the page
-    python -m studies.waves.directions impacts   # prints how large fast waves of this length are about a first impact
-    python -m studies.waves.directions given     # prints what else a wave changes of a loop
-
 Links turn by δθ cos(2πmj/n + φ), which bends the loop alike for both directions. Their rates say which way the wave
 runs: a slow one stands in the room, against the motion of the links; a fast one runs with them. φ is drawn.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -22,35 +17,29 @@ from studies.common import Array, Columns, OverCells
 from studies.waves import wave_drag
 from studies.waves.drag import END, NEAR, released
 from studies.waves.fields import normal_velocities
-from studies.waves.wave_drag import RIGID, RUNNING, inertia_of, loop_motions, wave_motion
+from studies.waves.wave_drag import RIGID, RUNNING, inertia_of, loop_motions, lowest, wave_motion
 
-FOLDER: Final = Path(__file__).parent
-RESULTS: Final = FOLDER / "results" / "directions.csv"
-CELLS: Final = tuple((links, frequency) for links in (60, 90, 120, 180) for frequency in (20.0, 30.0))
-SAMPLES: Final = 40
-SEED: Final = 3000
-LENGTH: Final = 12
-"""Links in a wave, about: a whole number of waves fits around the loop."""
-RIDING: Final = 0.0598
-"""Radius at which joints ride on the sprocket [m]."""
-APART: Final = 0.01
-"""Touches of the floor less apart [s] are one impact."""
-ALIKE: Final = "none, as slow and high as fast"
+FOLDER = Path(__file__).parent
+RESULTS = FOLDER / "results" / "directions.csv"
+CELLS = tuple((links, frequency) for links in (60, 90, 120, 180) for frequency in (20.0, 30.0))
+SAMPLES = 40
+SEED = 3000
+LENGTH = 12  # Links in a wave, about: a whole number of waves fits around the loop
+RIDING = 0.0598  # Radius at which joints ride on the sprocket [m]
+APART = 0.01  # Touches of the floor less apart [s] are one impact
+ALIKE = "none, as slow and high as fast"
 """A loop without a wave that runs as slowly along itself, and whose lowest joint is as high, as with a fast wave."""
-VARIANTS: Final = (("none", 0.0), *((way, size) for size in (0.05, 0.15) for way in ("slow", "fast", ALIKE)))
+VARIANTS = (("none", 0.0), *((way, size) for size in (0.05, 0.15) for way in ("slow", "fast", ALIKE)))
 """Direction, and the amplitude of the links' angles [rad]."""
 
 
 def with_wave(
     position: Array, velocity: Array, parameters: warpchain.Parameters, way: str, size: float, phase: float
 ) -> tuple[Array, Array]:
-    """The state (n, 3), (n, 3) of a loop with a wave, whose joints are as open as before.
-
-    Momentum stays, and angular momentum but for what the bend does to it.
-    """
+    """The state (n, 3), (n, 3) of a loop with a wave: joints are as open as before, momentum stays."""
     if way == ALIKE:
         moved, speeds = with_wave(position, velocity, parameters, "fast", size, phase)
-        lift = lowest(moved, parameters) - lowest(position, parameters)
+        lift = lowest(moved, parameters.link_length) - lowest(position, parameters.link_length)
         ratio = running(moved, speeds, parameters) / running(position, velocity, parameters)
         return position + np.array([0, lift, 0]), velocity * ratio
     links, length, inertia = len(position), parameters.link_length, inertia_of(len(position), parameters)
@@ -67,8 +56,9 @@ def with_wave(
 
     wanted = back * speed / length * np.sin(2 * np.pi * number / links) * (1j * wave).real
     rate = _closing(ends_of, wanted, angle)
-    places = _centers(length * (np.exp(1j * angle) - np.exp(1j * before)))
-    speeds = _centers(length * ends_of(rate))
+    # middles of links, from what their ends are moved
+    ends = (length * (np.exp(1j * angle) - np.exp(1j * before)), length * ends_of(rate))
+    places, speeds = (np.cumsum(end) - end / 2 for end in ends)
     moved = position + np.column_stack([places.real, places.imag, turn])
     moved[:, :2] += np.average(position[:, :2] - moved[:, :2], axis=0, weights=inertia[:, 0])
     change = np.column_stack([speeds.real, speeds.imag, rate])
@@ -83,12 +73,6 @@ def running(position: Array, velocity: Array, parameters: warpchain.Parameters) 
     return float(wave_motion(motions[:, RUNNING], velocity[None], inertia[None])[0][0, -1])
 
 
-def lowest(position: Array, parameters: warpchain.Parameters) -> float:
-    """Height [m] of the lowest joint of a loop."""
-    half = 0.5 * parameters.link_length * np.abs(np.sin(position[:, 2]))
-    return float((position[:, 1] - half).min())
-
-
 def _closing(ends: Callable[[Array], Array], values: Array, angle: Array) -> Array:
     """Values changed as little as may be so that the ends of all links add up to nothing, by Newton's method."""
     basis = np.stack([-np.sin(angle), np.cos(angle)], axis=1)
@@ -98,21 +82,14 @@ def _closing(ends: Callable[[Array], Array], values: Array, angle: Array) -> Arr
     return values
 
 
-def _centers(ends: Array) -> Array:
-    """Middles of links, from what their ends are moved."""
-    joints = np.cumsum(ends)
-    return joints - ends / 2
-
-
 def distances(links: int, frequency: float) -> tuple[Array, Array]:
     """Δx (variants, samples), and the phases."""
     phases = 2 * np.pi * np.random.default_rng(SEED).random(SAMPLES)
     chains, states = [], []
-    for sample in range(SAMPLES):
+    for sample, phase in enumerate(phases):
         position, velocity, parameters = released(links, frequency, SEED + sample)
-        for way, size in VARIANTS:
-            chains.append(parameters)
-            states.append(with_wave(position, velocity, parameters, way, size, phases[sample]))
+        chains += [parameters] * len(VARIANTS)
+        states += [with_wave(position, velocity, parameters, way, size, phase) for way, size in VARIANTS]
     position, velocity = (np.array(each) for each in zip(*states, strict=True))
     walking = warpchain.Chains(chains, position, velocity)
     walking.run(END, to_rest=True)
@@ -120,9 +97,8 @@ def distances(links: int, frequency: float) -> tuple[Array, Array]:
     return dx.reshape(SAMPLES, -1).T, phases
 
 
-def reduced(dx: Array, phases: Array) -> list[dict[str, str]]:
+def reduced(dx: Array, phases: Array) -> Iterator[dict[str, object]]:
     """Of each variant: mean change of Δx in pairs, and its part ∝ cos(φ − φ₀) over that of Δx, in per cent."""
-    rows = []
     for (way, size), walks in zip(VARIANTS[1:], dx[1:], strict=True):
         both = np.isfinite(walks) & np.isfinite(dx[0])
         change = 100 * (walks - dx[0])[both] / dx[0][both].mean()
@@ -130,21 +106,26 @@ def reduced(dx: Array, phases: Array) -> list[dict[str, str]]:
         found, left, *_ = np.linalg.lstsq(design, change, rcond=None)
         variance = left[0] / (both.sum() - 3)
         explained = change.var() * both.sum() - left[0]
-        numbers = {"change": change.mean(), "error": change.std(ddof=1) / np.sqrt(both.sum())}
+        numbers = {"change": change.mean(), "error": common.standard_error(change)}
         numbers |= {"by_phase": np.hypot(*found[1:]), "f": explained / 2 / variance}
-        words = {"wave": way, "size": f"{size:g}", "pairs": str(both.sum())}
-        rows.append(words | {name: f"{value:.3f}" for name, value in numbers.items()})
-    return rows
+        words = {"wave": way, "size": f"{size:g}", "pairs": int(both.sum())}
+        yield words | {name: f"{value:.3f}" for name, value in numbers.items()}
 
 
 def run() -> None:
     """Let all loops walk, and write the file."""
     rows = []
     for links, frequency in CELLS:
-        found = reduced(*distances(links, frequency))
-        rows += [{"links": str(links), "frequency": f"{frequency:g}", **row} for row in found]
-        print(links, frequency, found, flush=True)
+        print(links, frequency, flush=True)
+        cell = {"links": links, "frequency": f"{frequency:g}"}
+        rows += [cell | row for row in reduced(*distances(links, frequency))]
     common.write_rows(RESULTS, rows)
+
+
+def change(way: str, size: float) -> OverCells:
+    """What a wave changes of Δx, in per cent, from the file."""
+    rows = rows_of(way, size)
+    return common.OverCells(rows["change"], rows["error"])
 
 
 def rows_of(way: str, size: float) -> Columns:
@@ -154,46 +135,34 @@ def rows_of(way: str, size: float) -> Columns:
     return {name: values[chosen] for name, values in columns.items()}
 
 
-def change(way: str, size: float) -> OverCells:
-    """What a wave changes of Δx, in per cent."""
-    rows = rows_of(way, size)
-    return common.over_cells(rows["change"], rows["error"])
-
-
 def summary() -> str:
     """Each wave over the cells, in Markdown."""
     lines = []
     for way, size in VARIANTS[1:]:
         over, rows = change(way, size), rows_of(way, size)
         ends = f"{over.values.min():+.0f} to {over.values.max():+.0f} %"
-        texts = (
-            common.minus(over.text()),
-            common.minus(ends),
-            f"{over.typical:.1f} %",
-            f"{over.chi2:.0f} of {len(over)}",
-        )
+        texts = over.text(), ends, f"{over.typical:.1f} %", f"{over.chi2:.0f} of {len(over)}"
         lines.append([way, f"{size:g}", *texts, f"{rows['by_phase'].mean():.1f} %", f"{rows['f'].mean():.1f}"])
     head = "wave | amplitude / rad | Δx, mean of cells | cells | typical | χ² of none | ∝ cos φ | F of that"
-    return common.table(head, lines)
+    return common.minus(common.table(head, lines))
 
 
 def about_impact(links: int, frequency: float) -> tuple[float, float]:
     """Amplitude [rad] of fast waves of `LENGTH` links before the first impact, and between it and the next one."""
-    walk = warpchain.walk(
-        links=links, frequency=frequency, preset="soft", start="spinning", frame_interval=2.5e-4, walk_limit=0.4
-    )
+    scene = {"links": links, "frequency": frequency, "start": "spinning", "walk_limit": 0.4}
+    walk = warpchain.walk(preset="soft", **scene, frame_interval=2.5e-4)
     parameters, time, number = walk.setup.parameters, walk.frame_time, round(links / LENGTH)
     masses = inertia_of(links, parameters)[:, 0]
     modes = np.abs(np.fft.rfft(normal_velocities(time, walk.frame_joints, masses), axis=1))[:, number - 1 : number + 2]
     angles = np.sqrt(np.sum((2 * modes / links) ** 2, axis=1)) / (4 * np.pi * frequency * RIDING)
     touches = np.flatnonzero(np.interp(time, walk.time, walk.lowest) < NEAR)
-    gaps = np.flatnonzero(np.diff(time[touches]) > APART)
-    last, following = touches[gaps[0]], touches[gaps[0] + 1]
-    return tuple(float(np.sqrt(np.mean(part**2))) for part in (angles[: touches[0]], angles[last + 1 : following]))
+    gap = np.flatnonzero(np.diff(time[touches]) > APART)[0]
+    parts = angles[: touches[0]], angles[touches[gap] + 1 : touches[gap + 1]]
+    return tuple(float(np.sqrt(np.mean(part**2))) for part in parts)
 
 
-def given(links: int, frequency: float) -> dict[tuple[str, float], Array]:
-    """What waves of all phases change of a loop, (phases, 4): energy, angular momentum, run [%], lowest joint [mm]."""
+def given(links: int, frequency: float) -> Array:
+    """Energy, angular momentum, run [%] and lowest joint [mm] that waves change of a loop, (variants, phases, 4)."""
     position, velocity, parameters = released(links, frequency, SEED)
     inertia = inertia_of(links, parameters)
 
@@ -201,17 +170,15 @@ def given(links: int, frequency: float) -> dict[tuple[str, float], Array]:
         arms = at[:, :2] - np.average(at[:, :2], axis=0, weights=inertia[:, 0])
         spin = arms[:, 0] * speeds[:, 1] - arms[:, 1] * speeds[:, 0]
         turning = np.sum(inertia[:, 0] * spin + inertia[:, 2] * speeds[:, 2])
-        low = 1000 * lowest(at, parameters)
+        low = 1000 * lowest(at, parameters.link_length)
         return np.array([np.sum(inertia * speeds**2), turning, running(at, speeds, parameters), low])
 
-    before, found = numbers_of(position, velocity), {}
-    for way, size in VARIANTS[1:]:
-        rows = []
-        for phase in np.linspace(0, 2 * np.pi, 24, endpoint=False):
-            after = numbers_of(*with_wave(position, velocity, parameters, way, size, float(phase)))
-            rows.append([*(100 * (after[:3] / before[:3] - 1)), after[3] - before[3]])
-        found[way, size] = np.array(rows)
-    return found
+    def changed(way: str, size: float, phase: float) -> Array:
+        after = numbers_of(*with_wave(position, velocity, parameters, way, size, phase))
+        return np.append(100 * (after[:3] / before[:3] - 1), after[3] - before[3])
+
+    before, phases = numbers_of(position, velocity), np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    return np.array([[changed(way, size, phase) for phase in phases] for way, size in VARIANTS[1:]])
 
 
 def main(command: Annotated[str, typer.Argument()] = "") -> None:
@@ -221,11 +188,10 @@ def main(command: Annotated[str, typer.Argument()] = "") -> None:
             before, after = about_impact(links, frequency)
             print(f"{links} links, {frequency:g} Hz: {before:.4f} rad before the first impact, {after:.4f} after it")
     elif command == "given":
-        cells = [given(links, frequency) for links, frequency in CELLS]
-        for way, size in VARIANTS[1:]:
-            every = np.concatenate([cell[way, size] for cell in cells])
-            names = ("energy / %", "angular momentum / %", "run / %", "lowest joint / mm")
-            for name, values in zip(names, every.T, strict=True):
+        every = np.concatenate([given(links, frequency) for links, frequency in CELLS], axis=1)
+        names = ("energy / %", "angular momentum / %", "run / %", "lowest joint / mm")
+        for (way, size), numbers in zip(VARIANTS[1:], every, strict=True):
+            for name, values in zip(names, numbers.T, strict=True):
                 print(f"{way} {size:g}: {name} {values.mean():+.2f} ({values.min():+.1f} to {values.max():+.1f})")
     else:
         if command == "run":

@@ -1,11 +1,8 @@
 """Waves along a chain: the straight one under tension and the ring that circulates without gravity.
 
 Joints are closed and friction is viscous. Small changes of the links' angles ϑ_j ∝ exp(iκj + λt) have the phase κ per
-link and the rate λ = −γ − iω: ω > 0 runs towards greater j. Inner links have m̄ + μ and Ī + δ, outer ones m̄ − μ and
-Ī − δ. They couple the wave of phase κ with that of phase κ + π: two bands in 0 < κ ≤ π/2.
-
-README.md derives what is solved here: A(λ) B(λ) = h² λ⁴ with h = δ − ¼ μℓ², and A, B of the straight chain and of the
-ring; a single band, A = 0, if h = 0; and the continuous ring.
+link and the rate λ = −γ − iω: ω > 0 runs towards greater j. README.md derives what is solved here: A(λ) B(λ) = h² λ⁴
+with h = δ − ¼ μℓ², and A, B of the straight chain and of the ring, two bands in 0 < κ ≤ π/2; and the continuous ring.
 
 Coulomb friction is left out: it is not linear. `equivalent_friction` replaces it in joints that only swing. Joints that
 keep their sense of rotation, because the loop bends there, do not feel it in small waves.
@@ -14,7 +11,6 @@ keep their sense of rotation, because the loop bends there, do not feel it in sm
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import permutations
-from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,57 +23,22 @@ Factors = Callable[[Array, float], tuple[Array, Array, Array]]
 
 UPPER_BACKWARD, LOWER_BACKWARD, LOWER_FORWARD, UPPER_FORWARD = range(4)
 """Columns of `Waves.rate`: bands and directions. In the ring backward is the slow family, forward the fast one."""
-FRICTION_STEPS: Final = 64
-"""Friction rises from nothing in so many steps, while the branches are followed."""
-PHASE_STEP: Final = 1e-5
-"""Step of a central difference with respect to the phase [rad]."""
-ROUNDING: Final = 1e-12
-"""Damping below this part of a rate is rounding."""
+FRICTION_STEPS = 64  # Friction rises from nothing in so many steps, while the branches are followed
+PHASE_STEP = 1e-5  # Step of a central difference with respect to the phase [rad]
+ROUNDING = 1e-12  # Damping below this part of a rate is rounding
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class Waves:
-    """Free waves of k phases, four each.
+    """Free waves of k phases, four each; columns are `UPPER_BACKWARD` … `UPPER_FORWARD`."""
 
-    Attributes:
-        phase: κ per link [rad], shape (k,).
-        rate: λ = −γ − iω [1/s] in the chain's frame, shape (k, 4); columns as `UPPER_BACKWARD` … `UPPER_FORWARD`,
-            which are sorted by frequency without friction and followed from there.
-        slope: dλ/dκ [1/s], shape (k, 4).
-    """
-
-    phase: Array
-    rate: Array
-    slope: Array
-
-    @property
-    def frequency(self) -> Array:
-        """ω [rad/s], shape (k, 4); 0 if friction lets a wave creep back without swinging."""
-        return -self.rate.imag
-
-    @property
-    def damping(self) -> Array:
-        """γ, at which an amplitude falls [1/s], shape (k, 4)."""
-        return -self.rate.real
-
-    @property
-    def group_speed(self) -> Array:
-        """dω/dκ, the speed of a packet of waves [links/s], shape (k, 4)."""
-        return -self.slope.imag
-
-    @property
-    def phase_speed(self) -> Array:
-        """ω/κ, the speed of crests [links/s], shape (k, 4)."""
-        return self.frequency / self.phase[:, None]
-
-    @property
-    def reach(self) -> Array:
-        """How far a packet runs along the chain until its amplitude is 1/e of what it was [links], shape (k, 4).
-
-        Infinite for waves whose damping is nothing but rounding.
-        """
-        damped = self.damping > ROUNDING * np.abs(self.rate)
-        return np.where(damped, np.abs(self.group_speed) / np.where(damped, self.damping, 1.0), np.inf)
+    phase: Array  # κ [rad], (k,)
+    rate: Array  # λ = −γ − iω [1/s] in the chain's frame, (k, 4), as all below
+    frequency: Array  # ω [rad/s]; 0 if friction lets a wave creep back without swinging
+    damping: Array  # γ, at which an amplitude falls [1/s]
+    phase_speed: Array  # ω/κ, the speed of crests [links/s]
+    group_speed: Array  # dω/dκ, the speed of packets [links/s]
+    reach: Array  # How far a packet runs until its amplitude is 1/e [links]; infinite if its damping is rounding
 
 
 def straight_waves(parameters: Parameters, tension: float, phase: ArrayLike) -> Waves:
@@ -89,9 +50,10 @@ def straight_waves(parameters: Parameters, tension: float, phase: ArrayLike) -> 
             np.stack([tension * parameters.link_length * s, 4 * friction * s**2, inertia * s + quarter * c], axis=-1)
             for s, c in (squares, squares[::-1])
         )
-        return first.astype(np.complex128), second.astype(np.complex128), np.asarray(squares[0] * squares[1])
+        return first, second, squares[0] * squares[1]
 
-    inertia, quarter = _mean_inertia(parameters), _mean_mass(parameters) * parameters.link_length**2 / 4
+    mass, inertia, *_ = _links(parameters)
+    quarter = mass * parameters.link_length**2 / 4
     return _waves(parameters, np.asarray(phase, dtype=np.float64), factors)
 
 
@@ -99,14 +61,10 @@ def ring_waves(parameters: Parameters, links: int, speed: float, number: ArrayLi
     """Bending modes of a circulating ring without gravity, exact for rigid links and closed joints.
 
     Its N links, N even, move at `speed` [m/s]; `number` has whole wavelengths around it, from 2 to N/4, shape (k,).
-
-    Returns:
-        Rates in the frame that turns with the ring, at the phases 2πn/N.
+    Rates are those in the frame that turns with the ring, at the phases 2πn/N.
     """
-    mass, inertia = _mean_mass(parameters), _mean_inertia(parameters)
-    alpha, length = np.pi / links, parameters.link_length
-    spin = ring_spin(parameters, links, speed)
-    eighth = mass * length**2 / 8
+    mass, inertia, *_ = _links(parameters)
+    eighth, alpha, spin = mass * parameters.link_length**2 / 8, np.pi / links, ring_spin(parameters, links, speed)
 
     def factors(phases: Array, friction: float) -> tuple[Array, Array, Array]:
         forward, backward = phases / 2 + alpha, phases / 2 - alpha
@@ -126,18 +84,11 @@ def ring_waves(parameters: Parameters, links: int, speed: float, number: ArrayLi
 
 
 def continuous_ring(parameters: Parameters, links: int, speed: float, number: ArrayLike) -> Array:
-    """Rates of the continuous ring, slow and fast, in the frame that turns along: `ring_waves` for long waves.
-
-    The ring has the length Nℓ.
-
-    Returns:
-        λ [1/s], shape (k, 2).
-    """
-    n = np.asarray(number, dtype=np.float64)
-    length = parameters.link_length
-    density, radius = _mean_mass(parameters) / length, links * length / (2 * np.pi)
+    """Rates λ [1/s] of the continuous ring of length Nℓ, slow and fast, (k, 2): `ring_waves` for long waves."""
+    n, length, (mass, inertia, *_) = np.asarray(number, float), parameters.link_length, _links(parameters)
+    density, radius = mass / length, links * length / (2 * np.pi)
     spin, bend = speed / radius, (n**2 - 1) ** 2
-    rotary = (_mean_inertia(parameters) / length - density * length**2 / 6) / (density * radius**2)
+    rotary = (inertia / length - density * length**2 / 6) / (density * radius**2)
     friction = parameters.viscous_friction * length / (density * radius**4)
     leading = 1 + n**2 + bend * rotary
     half = (bend * n**2 * friction - 4j * n * spin) / (2 * leading)
@@ -150,13 +101,12 @@ def band_gap(parameters: Parameters, tension: float) -> tuple[float, float]:
     length = parameters.link_length
     one = parameters.outer_mass + 4 * parameters.inner_inertia / length**2
     other = parameters.inner_mass + 4 * parameters.outer_inertia / length**2
-    low, high = (float(np.sqrt(4 * tension / (length * pick(one, other)))) for pick in (max, min))
-    return low, high
+    return tuple(float(np.sqrt(4 * tension / (length * mass))) for mass in sorted((one, other), reverse=True))
 
 
 def long_wave_speed(parameters: Parameters, tension: float) -> float:
     """c = √(Tℓ/m̄), the speed of long waves along the chain under the tension T [N], in m/s."""
-    return float(np.sqrt(tension * parameters.link_length / _mean_mass(parameters)))
+    return float(np.sqrt(tension * parameters.link_length / _links(parameters)[0]))
 
 
 def ring_spin(parameters: Parameters, links: int, speed: float) -> float:
@@ -173,15 +123,13 @@ def equivalent_friction(parameters: Parameters, amplitude: float) -> float:
     ratio = amplitude / parameters.friction_smoothing
     # tanh(ratio · cos φ) cos φ turns over in about 1/ratio from a quarter of the period on
     mean = 2 / np.pi * quad(lambda x: np.tanh(ratio * np.sin(x)) * np.sin(x), 0, np.pi / 2, points=[3 / ratio])[0]
-    return float(parameters.viscous_friction + 2 * parameters.coulomb_friction * mean / amplitude)
+    return parameters.viscous_friction + 2 * parameters.coulomb_friction * mean / amplitude
 
 
-def _mean_mass(parameters: Parameters) -> float:
-    return (parameters.inner_mass + parameters.outer_mass) / 2
-
-
-def _mean_inertia(parameters: Parameters) -> float:
-    return (parameters.inner_inertia + parameters.outer_inertia) / 2
+def _links(p: Parameters) -> tuple[float, float, float, float]:
+    """m̄ and Ī, means of mass and moment of inertia, and half of what inner links have more than outer ones, μ and δ."""
+    pairs = (p.inner_mass, p.outer_mass), (p.inner_inertia, p.outer_inertia)
+    return *((inner + outer) / 2 for inner, outer in pairs), *((inner - outer) / 2 for inner, outer in pairs)
 
 
 def _waves(parameters: Parameters, phases: Array, factors: Factors) -> Waves:
@@ -190,9 +138,8 @@ def _waves(parameters: Parameters, phases: Array, factors: Factors) -> Waves:
     `factors` maps phases (k,) and friction to the coefficients of A and B, (k, 3) from λ⁰ on, each times any weight,
     and to the product of the weights, (k,).
     """
-    difference = (parameters.inner_mass - parameters.outer_mass) / 2
-    other = (parameters.inner_inertia - parameters.outer_inertia) / 2
-    coupling = other - difference * parameters.link_length**2 / 4
+    *_, mass, inertia = _links(parameters)
+    coupling = inertia - mass * parameters.link_length**2 / 4
 
     def quartic(phases: Array, friction: float) -> Array:
         first, second, weight = factors(phases, friction)
@@ -202,16 +149,20 @@ def _waves(parameters: Parameters, phases: Array, factors: Factors) -> Waves:
         product[:, 4] -= coupling**2 * weight
         return product
 
-    rates = _by_frequency(_roots(quartic(phases, 0.0)))
+    rates, orders = _by_frequency(_roots(quartic(phases, 0.0))), np.array(list(permutations(range(4))))
     for friction in parameters.viscous_friction * np.linspace(0.0, 1.0, FRICTION_STEPS + 1)[1:]:
-        rates = _matched(rates, _roots(quartic(phases, friction)))
-    friction = parameters.viscous_friction
+        found = _roots(quartic(phases, friction))
+        nearest = np.abs(found[:, orders] - rates[:, None, :]).sum(axis=2).argmin(axis=1)
+        rates = np.take_along_axis(found, orders[nearest], axis=1)
     ahead, behind = (quartic(phases + step, friction) for step in (PHASE_STEP, -PHASE_STEP))
     powers = rates[:, :, None] ** np.arange(5)
     by_phase = np.einsum("kp,krp->kr", (ahead - behind) / (2 * PHASE_STEP), powers)
     by_rate = np.einsum("kp,krp->kr", quartic(phases, friction)[:, 1:] * np.arange(1, 5), powers[:, :, :4])
+    frequency, damping = -rates.imag, -rates.real
     with np.errstate(divide="ignore", invalid="ignore"):  # where two roots meet there is no slope
-        return Waves(phase=phases, rate=rates, slope=-by_phase / by_rate)
+        speed = (by_phase / by_rate).imag
+        reach = np.where(damping > ROUNDING * np.abs(rates), np.abs(speed) / damping, np.inf)
+    return Waves(phases, rates, frequency, damping, frequency / phases[:, None], speed, reach)
 
 
 def _by_frequency(rates: Array) -> Array:
@@ -227,10 +178,3 @@ def _roots(coefficients: Array) -> Array:
     companion = np.tile(np.eye(degree, k=-1, dtype=np.complex128), (len(scaled), 1, 1))
     companion[:, :, -1] = -scaled[:, :-1] / scaled[:, -1:]
     return scale * np.linalg.eigvals(companion)
-
-
-def _matched(before: Array, after: Array) -> Array:
-    """The roots `after`, each row in the order in which they are nearest to those `before`."""
-    orders = np.array(list(permutations(range(before.shape[1]))))
-    apart = np.abs(after[:, orders] - before[:, None, :]).sum(axis=2)
-    return np.take_along_axis(after, orders[np.argmin(apart, axis=1)], axis=1)

@@ -1,36 +1,31 @@
-"""Tables of the dose and response of a drag on short waves, from what `studies.waves.drag` wrote.
-
-python -m studies.waves.doses drag60.npz drag90.npz …   # → results/doses.csv, tables of the page
-python -m studies.waves.doses                           # that file → tables of the page
-"""
+"""Tables of the dose and response of a drag on short waves; files of `studies.waves.drag` are reduced first."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated
 
 import numpy as np
 import typer
 
-from studies.common import Array, minus, over_cells, publish, read_columns, run_study, table, write_rows
+from studies import common
+from studies.common import Array
 from studies.waves.drag import CELLS, RATES, SAMPLES, SEEDS, VARIANTS
 
-FOLDER: Final = Path(__file__).parent
-RESULTS: Final = FOLDER / "results" / "doses.csv"
+FOLDER = Path(__file__).parent
+RESULTS = FOLDER / "results" / "doses.csv"
 
 
 def reduced(files: Sequence[Path]) -> Iterator[dict[str, object]]:
     """Rows: of each cell, variant and set of seeds the mean Δx, its change in pairs and the standard errors."""
     arrays = {name: values for file in files for name, values in np.load(file).items()}
+    parts = {"both": slice(None)} | {seed: slice(k * SAMPLES, (k + 1) * SAMPLES) for k, seed in enumerate(SEEDS)}
     for cell, (links, frequency) in enumerate(CELLS):
-        if f"dx{cell}" not in arrays:
-            continue
         dx = arrays[f"dx{cell}"]
-        for k, (when, rate) in enumerate(VARIANTS):
-            for number, seed in enumerate(("both", *SEEDS)):
-                chosen = slice(None) if number == 0 else slice((number - 1) * SAMPLES, number * SAMPLES)
-                walks, plain = dx[k, chosen], dx[0, chosen]
-                both = np.isfinite(walks) & np.isfinite(plain)
-                change, mean = (walks - plain)[both], plain[both].mean()
+        for walks, (when, rate) in zip(dx, VARIANTS, strict=True):
+            for seed, chosen in parts.items():
+                change = walks[chosen] - dx[0, chosen]
+                both = np.isfinite(change)
+                mean, plain = (common.mean(np.where(both, each[chosen], np.nan)) for each in (walks, dx[0]))
                 yield {
                     "links": links,
                     "frequency": frequency,
@@ -38,29 +33,24 @@ def reduced(files: Sequence[Path]) -> Iterator[dict[str, object]]:
                     "rate": f"{rate:g}",
                     "seeds": seed,
                     "pairs": int(both.sum()),
-                    "dx": f"{walks[both].mean():.5g}",
-                    "change_percent": f"{100 * change.mean() / mean:.4g}",
-                    "error_percent": f"{100 * change.std(ddof=1) / np.sqrt(both.sum()) / mean:.3g}",
+                    "dx": f"{mean:.5g}",
+                    "change_percent": f"{100 * common.mean(change) / plain:.4g}",
+                    "error_percent": f"{100 * common.standard_error(change) / plain:.3g}",
                 }
 
 
 def changes(when: str, rate: float, seeds: str = "both") -> tuple[Array, Array]:
     """Changes of Δx in per cent and their standard errors, (cells,), from the file."""
-    rows = read_columns(RESULTS)
+    rows = common.read_columns(RESULTS)
     chosen = (rows["when"] == when) & (rows["rate"] == rate) & (rows["seeds"] == seeds)
     return rows["change_percent"][chosen], rows["error_percent"][chosen]
 
 
-def _changes_table(drags: Sequence[tuple[str, float]]) -> str:
-    known = [changes(*drag) for drag in drags]
-    lines = []
-    for i, (links, frequency) in enumerate(CELLS):
-        texts = (minus(f"{values[i]:+.1f} ± {errors[i]:.1f}") for values, errors in known)
-        lines.append([f"{links}, {frequency:g}", *texts])
-    return table(["links, Hz", *(f"{rate:g}/s {when}" for when, rate in drags)], lines)
-
-
-ALWAYS, PARTLY = VARIANTS[2 : 2 + len(RATES)], VARIANTS[2 + len(RATES) :]
+def changes_table(drags: Sequence[tuple[str, float]]) -> str:
+    """What some drags change in each cell."""
+    known = [[f"{value:+.1f} ± {error:.1f}" for value, error in zip(*changes(*drag), strict=True)] for drag in drags]
+    lines = zip((f"{links}, {frequency:g}" for links, frequency in CELLS), *known, strict=True)
+    return common.minus(common.table(["links, Hz", *(f"{rate:g}/s {when}" for when, rate in drags)], lines))
 
 
 def summary_table() -> str:
@@ -69,25 +59,27 @@ def summary_table() -> str:
     for when, rate in VARIANTS[1:]:
         values, errors = changes(when, rate)
         (one, one_error), (two, two_error) = (changes(when, rate, str(seed)) for seed in SEEDS)
-        chi2 = over_cells(one - two, np.hypot(one_error, two_error)).chi2
-        over, ends = over_cells(values, errors), f"{values.min():+.0f} to {values.max():+.0f} %"
+        chi2 = common.OverCells(one - two, np.hypot(one_error, two_error)).chi2
+        over, ends = common.OverCells(values, errors), f"{values.min():+.0f} to {values.max():+.0f} %"
         texts = over.text(), f"{over.typical:.1f} %", ends, f"{over.rises}, {over.falls}"
         lines.append([f"{rate:g}/s", when, *texts, f"{chi2:.0f} of {len(over)}"])
-    head = ["drag", "acts", "mean of cells", "typical", "least to greatest", "rise, fall", "χ² between seeds"]
-    return minus(table(head, lines))
+    return common.minus(
+        common.table("drag | acts | mean of cells | typical | least to greatest | rise, fall | χ² between seeds", lines)
+    )
 
 
 def tables() -> dict[str, str]:
     """The tables of the page by their markers."""
-    return {"doses": _changes_table(ALWAYS), "halves": _changes_table(PARTLY), "all doses": summary_table()}
+    always, partly = VARIANTS[2 : 2 + len(RATES)], VARIANTS[2 + len(RATES) :]
+    return {"doses": changes_table(always), "halves": changes_table(partly), "all doses": summary_table()}
 
 
 def main(files: Annotated[list[Path] | None, typer.Argument()] = None) -> None:
     """Reduce files that are given, and write the tables."""
     if files:
-        write_rows(RESULTS, reduced(files))
-    publish(FOLDER, tables())
+        common.write_rows(RESULTS, reduced(files))
+    common.publish(FOLDER, tables())
 
 
 if __name__ == "__main__":
-    run_study(main)
+    common.run_study(main)

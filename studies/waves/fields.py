@@ -1,16 +1,12 @@
 """Waves along a chain, computed from its frames: tension, curvature, velocity, contacts, characteristics.
 
 Joint i ends link i. The number of a joint names the same piece of chain at all times: it is the place in the chain's
-own frame, in which long transverse waves run at ±c, c = √(Tℓ/m̄), with the tension T and the mean link mass m̄. The
-chain itself runs along its loop at the speed v, and v ≈ c because the tension bends the path of the links. In the frame
-of the room one of the two waves hence hardly moves, and the other one runs twice as fast as the chain.
+own frame, in which long transverse waves run at ±c, c = √(Tℓ/m̄), with the tension T and the mean link mass m̄.
 
 Functions take the `time` of f frames [s], shape (f,), `joints`, their x, y [m], shape (f, n, 2), and the `masses` of n
-links [kg]. Contacts are taken from the frames: a joint touches if its circle is not farther than a tolerance from the
-floor, or from the circle of a joint that is no neighbour. Inside, vectors are complex numbers x + iy.
+links [kg]. A joint touches if its circle is not farther than a tolerance from the floor, or from the circle of a joint
+that is no neighbour. Inside, vectors are complex numbers x + iy.
 """
-
-from typing import Final
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -18,26 +14,18 @@ from scipy.spatial import KDTree
 
 from studies.common import Array
 
-NEAR: Final = 0.02
-"""A circle touches if its distance is at most this part of its radius."""
-QUIET: Final = 0.01
-"""Contacts with the floor less than this time [s] apart are one impact, as in the number of bounces."""
+NEAR = 0.02  # A circle touches if its distance is at most this part of its radius
+QUIET = 0.01  # Contacts with the floor less than this time [s] apart are one impact, as in the number of bounces
+AVERAGED = 0.02  # Time [s] over which the mean tension is averaged for c; in an impact it swings to both sides
 
 
 def tensions(joints: Array, forces: Array) -> Array:
-    """Force in each joint along the chain [N], positive if it pulls, shape (f, n).
-
-    The direction of the chain at a joint is that of the line between its two neighbours.
-    `forces` are those on the link that the joint ends [N], shape (f, n, 2).
-    """
+    """Pull in each joint along the line between its neighbours [N], (f, n), of the forces on the link that it ends."""
     return np.real(np.conj(_tangents(_complex(joints))) * _complex(forces))
 
 
 def curvatures(joints: Array, link_length: float) -> Array:
-    """Angle between the two links at each joint over their length [1/m], shape (f, n).
-
-    It is positive where the chain bends as the loop of the first frame does, also if that runs clockwise.
-    """
+    """Angle of two links over their length [1/m], (f, n), positive where the chain bends as the first frame's loop."""
     places = _complex(joints)
     link = places - np.roll(places, 1, axis=1)
     return _turning(places) * np.angle(np.roll(link, -1, axis=1) * np.conj(link)) / link_length
@@ -50,27 +38,19 @@ def normal_velocities(time: Array, joints: Array, masses: Array) -> Array:
     return -_turning(places) * np.imag(np.conj(_tangents(places)) * velocity)
 
 
-def wave_speeds(tension: Array, link_length: float, mean_mass: float) -> Array:
-    """Speed c = √(Tℓ/m̄) of long transverse waves in the chain's frame [m/s] for each T; 0 where T is negative."""
+def wave_speeds(time: Array, joints: Array, forces: Array, link_length: float, mean_mass: float) -> Array:
+    """Speed c of long waves in the chain's frame [m/s], (f,), with its mean tension; 0 where that pushes."""
+    area = cumulative_trapezoid(tensions(joints, forces).mean(axis=1), time, initial=0.0)
+    first, last = np.maximum(time - AVERAGED / 2, time[0]), np.minimum(time + AVERAGED / 2, time[-1])
+    tension = (np.interp(last, time, area) - np.interp(first, time, area)) / (last - first)
     return np.sqrt(np.maximum(tension, 0.0) * link_length / mean_mass)
 
 
-def moving_average(time: Array, values: Array, width: float) -> Array:
-    """Mean of values (f,) over `width` [s] around each time, less at both ends."""
-    area = cumulative_trapezoid(values, time, initial=0.0)
-    first, last = np.maximum(time - width / 2, time[0]), np.minimum(time + width / 2, time[-1])
-    return (np.interp(last, time, area) - np.interp(first, time, area)) / (last - first)
-
-
 def stacked_power(values: Array, way: Array, modes: tuple[int, int] | None = None) -> float:
-    """Part of a field's variance along the loop that runs along given paths around it, 0 to 1.
+    """Part of the variance of a field (f, n) along the loop that runs along given paths around it, 0 to 1.
 
-    The field is moved back by the way of each frame and averaged over the frames: what runs along adds up.
-
-    Args:
-        values: at joints, shape (f, n).
-        way: how far the paths have come at each frame [links], shape (f,).
-        modes: first and last number of waves around the loop that count, from 1 to below n/2; None: all of these.
+    The field is moved back by the way of each frame [links] and averaged over the frames: what runs along adds up.
+    `modes` are the first and last number of waves around the loop that count, from 1 to below n/2; None: all of these.
     """
     links = values.shape[1]
     first, last = modes or (1, (links - 1) // 2)
@@ -83,8 +63,7 @@ def stacked_power(values: Array, way: Array, modes: tuple[int, int] | None = Non
 def bin_means(values: Array, most: int) -> Array:
     """Means of even frames next to one another, at most `most` of them, shape (b, n)."""
     edges = np.linspace(0, len(values), min(most, len(values)) + 1).astype(int)
-    means: Array = np.add.reduceat(values, edges[:-1], axis=0) / np.diff(edges)[:, None]
-    return means
+    return np.add.reduceat(values, edges[:-1], axis=0) / np.diff(edges)[:, None]
 
 
 def characteristic(time: Array, speed: Array, start: int, joint: float, link_length: float) -> Array:
@@ -92,7 +71,7 @@ def characteristic(time: Array, speed: Array, start: int, joint: float, link_len
 
     It begins at `joint` and runs at `speed` [m/s], shape (f,), in the order of the joints' numbers.
     """
-    return np.asarray(joint + cumulative_trapezoid(speed[start:], time[start:], initial=0.0) / link_length)
+    return joint + cumulative_trapezoid(speed[start:], time[start:], initial=0.0) / link_length
 
 
 def joints_below(joints: Array, masses: Array) -> Array:
@@ -111,16 +90,7 @@ def joints_below(joints: Array, masses: Array) -> Array:
 
 
 def in_room(values: Array, below: Array, points: int) -> Array:
-    """Values at places that stand still in the room: at `points` even distances from the point below the centre.
-
-    Args:
-        values: at joints, shape (f, n).
-        below: joint number of that point, shape (f,), see `joints_below`.
-        points: number of places.
-
-    Returns:
-        Values between joints, linear, shape (f, points), from half a loop behind that point to half a loop ahead.
-    """
+    """Values (f, n) at so many even distances from the point of `joints_below`, half a loop to both sides, linear."""
     frames, links = values.shape
     place = below[:, None] + links * ((np.arange(points) + 0.5) / points - 0.5)
     behind = np.floor(place)
@@ -129,16 +99,8 @@ def in_room(values: Array, below: Array, points: int) -> Array:
     return (1 - share) * values[row, first] + share * values[row, (first + 1) % links]
 
 
-def floor_contacts(joints: Array, radius: float) -> Array:
-    """Whether the circles of a joint are at the floor y = 0, at most `NEAR` of their radius [m] above; shape (f, n)."""
-    return np.asarray(joints[..., 1] <= (1 + NEAR) * radius)
-
-
 def self_contacts(joints: Array, radius: float) -> Array:
-    """Whether the circles of a joint touch those of one that is no neighbour, shape (f, n).
-
-    They are then at most `NEAR` of their diameter apart.
-    """
+    """Whether a joint's circles are at most `NEAR` of their diameter from those of one that is no neighbour, (f, n)."""
     touching = np.zeros(joints.shape[:2], dtype=np.bool_)
     for row, places in zip(touching, joints, strict=True):
         pairs = KDTree(places).query_pairs(2 * (1 + NEAR) * radius, output_type="ndarray")
@@ -154,18 +116,18 @@ def impacts(time: Array, touching: Array) -> list[tuple[int, int]]:
 
 
 def _complex(vectors: Array) -> Array:
-    return np.asarray(vectors[..., 0] + 1j * vectors[..., 1])
+    return vectors[..., 0] + 1j * vectors[..., 1]
 
 
 def _centers(places: Array, masses: Array) -> Array:
     """Centre of mass of links that lie between joints [m], shape (f, 1)."""
-    return np.asarray(((places + np.roll(places, 1, axis=1)) / 2 @ masses / masses.sum())[:, None])
+    return ((places + np.roll(places, 1, axis=1)) / 2 @ masses / masses.sum())[:, None]
 
 
 def _tangents(places: Array) -> Array:
     """Directions of the chain at its joints, from the joint behind to the one ahead."""
     span = np.roll(places, -1, axis=1) - np.roll(places, 1, axis=1)
-    return np.asarray(span / np.abs(span))
+    return span / np.abs(span)
 
 
 def _turning(places: Array) -> float:

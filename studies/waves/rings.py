@@ -4,12 +4,11 @@ A ring of links that turns like a rigid body is tapped; `warpchain.simulate` mov
 modes, the decaying oscillations that they are made of, and packets.
 """
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from scipy.signal import hilbert
 
 import warpchain
 from studies.common import BLUE, FAINT, GREEN, GROUND, INK, RED, Array, publish, table, tidy
@@ -17,21 +16,17 @@ from studies.waves import dispersion
 from studies.waves.dispersion import LOWER_BACKWARD, LOWER_FORWARD, UPPER_BACKWARD, UPPER_FORWARD, Waves
 from warpchain import Parameters, preset
 
-CHAIN = preset("soft").with_values({"coulomb_friction": 0.0})
-"""Table 1's chain with softened joints, without Coulomb friction."""
-SMOOTH = CHAIN.with_values({"viscous_friction": CHAIN.viscous_friction / 100})
-"""The same, with a hundredth of the viscous friction."""
+CHAIN = preset("soft").with_values({"coulomb_friction": 0.0})  # Joints softened, Coulomb friction left out
+SMOOTH = CHAIN.with_values({"viscous_friction": CHAIN.viscous_friction / 100})  # With a hundredth of β
 LENGTH = CHAIN.link_length
 DENSITY = (CHAIN.inner_mass + CHAIN.outer_mass) / 2 / LENGTH
 LINKS = 60
 FREQUENCIES = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0)
-SPINS = (0.01, 0.1, 1.0, 10.0, 60.0)
-"""Amplitudes of a joint's angular velocity [rad/s]; joints turn at 60 rad/s where a loop bends."""
+SPINS = (0.01, 0.1, 1.0, 10.0, 60.0)  # Amplitudes of a joint's angular velocity [rad/s]; 60 where a loop bends
 WAVELENGTHS = np.array([6.0, 12.0, 24.0])
 BOTH, FORWARD = [LOWER_BACKWARD, LOWER_FORWARD], [LOWER_FORWARD, UPPER_FORWARD]
 FOLDER = Path(__file__).parent
-INTERVAL = 2e-4
-"""Time between two instants of a tapped ring [s]."""
+INTERVAL = 2e-4  # Time between two instants of a tapped ring [s]
 
 
 def speed_at(frequency: float) -> float:
@@ -52,8 +47,8 @@ def tapped_ring(links: int, parameters: Parameters, speed: float, spins: Array) 
     ring only if the spins have no part ∝ exp(±2πij/n), so this part, which moves the ring without bending it, is left
     out.
 
-    `speed` [m/s] is that of the joints of the closed ring before the tap, anticlockwise if positive; `spins` are
-    further angular velocities [rad/s], (n,). Returns position and velocity (n, 3): x, y [m], θ [rad] and their rates.
+    Joints of the closed ring move at `speed` [m/s] before the tap, anticlockwise if positive; `spins` are the further
+    angular velocities [rad/s], (n,). Returns position and velocity (n, 3): x, y [m], θ [rad] and their rates.
     """
     alpha, length = np.pi / links, parameters.link_length
     spin, coupling = speed * 2 * np.sin(alpha) / length, 2 * np.cos(2 * alpha)
@@ -75,8 +70,8 @@ def tapped_ring(links: int, parameters: Parameters, speed: float, spins: Array) 
 def tapped(links: int, speed: float, spins: Array, times: Array, chain: Parameters = CHAIN) -> Array:
     """Angles (t, n) [rad] of the links of a tapped ring, less those of the ring that turns on."""
     position, velocity = tapped_ring(links, chain, speed, spins)
-    scene: dict[str, Any] = {"floor": False, "gravity": False, "self_contact": False, "tolerance": 1e-8}
-    motion = warpchain.simulate(chain, position, velocity, float(times[-1]), times=times, **scene)
+    scene = {"floor": False, "gravity": False, "self_contact": False, "tolerance": 1e-8, "times": times}
+    motion = warpchain.simulate(chain, position, velocity, float(times[-1]), **scene)
     if motion.status != warpchain.Status.FINISHED:
         raise RuntimeError(f"the tapped ring ended as {motion.status.label}")
     return motion.position[:, :, 2] - position[:, 2] - dispersion.ring_spin(chain, links, speed) * times[:, None]
@@ -88,74 +83,37 @@ def from_tap(links: int) -> Array:
 
 
 def mode_amplitudes(angles: Array, number: int) -> Array:
-    """Fourier components of links' angles [rad], shape (t, n), of inner and outer links apart.
-
-    Returns:
-        2/n Σ ϑ_j exp(−2πi · number · j/n) over even and over odd j [rad], shape (t, 2).
-    """
+    """2/n Σ ϑ_j exp(−2πi · number · j/n) of links' angles (t, n) [rad], over even and over odd j, shape (t, 2)."""
     links = angles.shape[1]
     wave = 2 / links * np.exp(-2j * np.pi * number * np.arange(links) / links)
     return np.stack([angles[:, part::2] @ wave[part::2] for part in (0, 1)], axis=1)
 
 
 def fit_rates(signals: Array, interval: float, count: int) -> Array:
-    """Rates λ of the sum of `count` exponentials Σ a exp(λt) that signals, shape (t, s), have in common.
+    """Rates λ [1/s] of `count` exponentials exp(λt) that complex signals (t, s) are sums of.
 
     ESPRIT (Roy and Kailath, IEEE Trans. ASSP 37 (1989) 984): stretches of the signals span a space that is the same one
     sample later but for the factors exp(λ · interval), which are the eigenvalues of the map between both.
-
-    Returns:
-        λ [1/s], by falling imaginary part, shape (count,).
-
-    Raises:
-        ValueError: there are too few instants.
     """
-    instants = len(signals)
-    stretch = 2 * instants // 3
-    if instants < 3 * count:
-        raise ValueError(f"{instants} instants do not tell {count} exponentials apart; give at least {3 * count}")
+    stretch = 2 * len(signals) // 3
     rows = np.concatenate([np.lib.stride_tricks.sliding_window_view(column, stretch) for column in signals.T])
     space = np.linalg.svd(rows, full_matrices=False)[2][:count].T
     shift = np.linalg.lstsq(space[:-1], space[1:], rcond=None)[0]
-    rates = np.log(np.linalg.eigvals(shift).astype(np.complex128)) / interval
-    return np.asarray(rates[np.argsort(-rates.imag)])
+    return np.log(np.linalg.eigvals(shift)) / interval
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Packet:
-    """A packet of waves at one instant.
-
-    Attributes:
-        place: centre of its squared envelope [links].
-        amplitude: root of the sum of its squared envelope [rad].
-        shares: of the modes 0, 1, … in the sum of its squared spectrum, shape (n/2,).
-    """
-
-    place: float
-    amplitude: float
-    shares: Array
-
-    def mean(self, values: Array) -> float:
-        """The mean of values of the modes from 2 on, as many as are given, by their shares."""
-        shares = self.shares[2 : 2 + len(values)]
-        return float(shares @ values / shares.sum())
-
-
-def find_packet(angles: Array, link: float, width: float) -> Packet:
+def find_packet(angles: Array, link: float, width: float) -> tuple[float, float, Array]:
     """The packet of a ring's angles (n,) at most `width` links from the place `link`, on an endless count of links.
 
-    The envelope is that of the waves with n > 0 in exp(2πinj/N), twice their absolute value.
+    Returns the centre of its squared envelope [links], the root of that envelope's sum [rad], and the shares of the
+    modes from 2 to n/4 in it.
     """
     links = len(angles)
-    spectrum = np.fft.fft(angles)
-    spectrum[0] = 0.0
-    spectrum[links // 2 :] = 0.0
     offset = (np.arange(links) - link + links / 2) % links - links / 2
-    signal = np.where(np.abs(offset) <= width, 2 * np.fft.ifft(spectrum), 0.0)
+    signal = np.where(np.abs(offset) <= width, hilbert(angles - angles.mean()), 0.0)
     energy = np.abs(signal) ** 2
-    total = float(energy.sum())
-    shares = np.abs(np.fft.fft(signal))[: links // 2] ** 2
-    return Packet(place=link + float(energy @ offset) / total, amplitude=total**0.5, shares=shares / shares.sum())
+    shares = np.abs(np.fft.fft(signal))[2 : links // 4 + 1] ** 2
+    return link + float(energy @ offset) / energy.sum(), energy.sum() ** 0.5, shares / shares.sum()
 
 
 def measured(angles: Array, waves: Waves, numbers: Array, columns: list[int]) -> Array:
@@ -177,14 +135,13 @@ def show_bands() -> None:
         low, high = dispersion.band_gap(CHAIN, tension)
         waves = dispersion.straight_waves(CHAIN, tension, phases)
         edge = waves.damping[-1, FORWARD]
-        swings = np.abs(waves.frequency[:, FORWARD]) > 1e-6
-        swinging = np.concatenate([phases, np.pi - phases[::-1]])[np.concatenate([swings[:, 0], swings[::-1, 1]])]
+        every, swings = extended(waves, np.abs(waves.frequency) > 1e-6, *FORWARD)
         gap = f"{low / 2 / np.pi:.1f} to {high / 2 / np.pi:.1f} ({100 * (high / low - 1):.1f} %)"
         damping = f"{edge[0]:.0f} and {edge[1]:.0f} ({edge.mean() / low:.2f} of ω)"
-        shortest = f"{2 * np.pi / swinging.max():.2f}"
-        rows.append((f"{frequency:g}", f"{speed:.3f}", f"{tension:.2f}", gap, damping, shortest))
+        rows.append((frequency, speed, tension, gap, damping, 2 * np.pi / every[swings == 1].max()))
     print("Bands of the straight chain under T = ρv²")
-    print(table("Hz | v, m/s | T, N | gap, Hz | damping there, 1/s | links of a wave below which it creeps", rows))
+    head = "Hz | v, m/s | T, N | gap, Hz | damping there, 1/s | links of a wave below which it creeps"
+    print(table(head, rows, "g .3f .2f s s .2f"))
 
 
 def show_reach() -> None:
@@ -194,19 +151,14 @@ def show_reach() -> None:
         speed = speed_at(frequency)
         waves = dispersion.straight_waves(CHAIN, DENSITY * speed**2, 2 * np.pi / WAVELENGTHS)
         for k, wavelength in enumerate(WAVELENGTHS):
-            packets, crests = (speed + LENGTH * speeds[k, BOTH] for speeds in (waves.group_speed, waves.phase_speed))
-            rate = f"{waves.frequency[k, LOWER_FORWARD]:.1f}", f"{waves.damping[k, LOWER_FORWARD]:.3f}"
-            reach = waves.reach[k, LOWER_FORWARD]
-            loops = f"{reach:.1f}", f"{reach / 60:.2f}", f"{reach / 120:.2f}"
-            both = (f"{packet:.2f} ({crest:.2f})" for packet, crest in zip(packets, crests, strict=True))
-            rows.append((f"{frequency:g}", f"{wavelength:.0f}", *rate, *loops, *both))
-        for pull in (1.0, 2.0):
-            c = dispersion.long_wave_speed(CHAIN, DENSITY * speed**2 + pull)
-            rows.append(
-                (f"{frequency:g}", f"long, T = ρv² + {pull} N", *[""] * 5, *(f"{speed + v:.2f}" for v in (-c, c)))
-            )
-    print("Waves of the straight chain under T = ρv²; speeds in the room in m/s: packet (crest)")
-    print(table("Hz | links | ω, 1/s | γ, 1/s | reach, links | of 60 | of 120 | slow | fast", rows))
+            rate, damping, reach = (each[k, LOWER_FORWARD] for each in (waves.frequency, waves.damping, waves.reach))
+            room = speed + LENGTH * waves.group_speed[k, BOTH]
+            rows.append((frequency, f"{wavelength:g}", rate, damping, reach, reach / 60, reach / 120, *room))
+        c = dispersion.long_wave_speed(CHAIN, DENSITY * speed**2 + 1)
+        rows.append((frequency, "long, T = ρv² + 1 N", *[""] * 5, speed - c, speed + c))
+    print("Waves of the straight chain under T = ρv²; speeds of packets in the room in m/s")
+    head = "Hz | links | ω, 1/s | γ, 1/s | reach, links | of 60 | of 120 | slow | fast"
+    print(table(head, rows, "g s .1f .3f .1f .2f .2f .2f .2f"))
 
 
 def show_coulomb() -> None:
@@ -214,37 +166,31 @@ def show_coulomb() -> None:
     rows = []
     for name in ("soft", "paper"):
         chain = preset(name)
-        rows.append(
-            [name, *(f"{dispersion.equivalent_friction(chain, spin) / chain.viscous_friction:.2f}" for spin in SPINS)]
-        )
+        rows.append([name, *(dispersion.equivalent_friction(chain, w) / chain.viscous_friction for w in SPINS)])
     print("Joint friction in units of β where joints swing about rest")
-    print(table(["", *(f"{spin:g} rad/s" for spin in SPINS)], rows))
+    print(table(["", *(f"{spin:g} rad/s" for spin in SPINS)], rows, "s" + len(SPINS) * " .2f"))
 
 
 def show_ring(speed: float, angles: Array, numbers: Array) -> None:
-    """Modes of the ring: exact, simulation, straight chain, continuous ring, string."""
+    """Modes of the ring: exact, simulation, straight chain, continuous ring."""
     waves = dispersion.ring_waves(CHAIN, LINKS, speed, numbers)
     spin = dispersion.ring_spin(CHAIN, LINKS, speed)
     exact, found = waves.rate[:, BOTH], measured(angles, waves, numbers, BOTH)
-    string = 1j * spin * np.stack([numbers, -numbers * (numbers**2 - 3.0) / (numbers**2 + 1)], axis=1)
     known = {
         "exact": exact,
         "simulated": found,
         "straight": dispersion.straight_waves(CHAIN, DENSITY * speed**2, waves.phase).rate[:, BOTH],
         "continuous": dispersion.continuous_ring(CHAIN, LINKS, speed, numbers),
-        "string": string,
     }
     rows = []
     for k, number in enumerate(numbers):
         crests = (number * spin + waves.frequency[k, BOTH]) / number / spin
-        packets = 1 + waves.group_speed[k, BOTH] * LENGTH / speed
         for name, rates in known.items():
-            texts = (text for rate in rates[k] for text in (f"{-rate.imag:.2f}", f"{-rate.real:.3f}"))
-            room = (f"{each:.3f}" for each in (*crests, *packets)) if name == "exact" else [""] * 4
-            rows.append((number, f"{LINKS / number:.1f}", name, *texts, *room))
+            numbers_of = (part for rate in rates[k] for part in (-rate.imag, -rate.real))
+            rows.append((number, LINKS / number, name, *numbers_of, *(crests if name == "exact" else ("", ""))))
     print(f"Ring of {LINKS} links, v = {speed:.3f} m/s, T = {DENSITY * speed**2:.2f} N; 1/s, in the room in v")
-    head = "n | links a wave |  | slow ω | γ | fast ω | γ | slow crests | fast | slow packets | fast"
-    print(table(head, rows))
+    head = "n | links a wave |  | slow ω | γ | fast ω | γ | slow crests | fast"
+    print(table(head, rows, "d .1f s .2f .3f .2f .3f .3f .3f"))
     off = [100 * np.abs(one / other - 1).max() for one, other in ((found.imag, exact.imag), (found.real, exact.real))]
     print(f"simulated against exact: ω within {off[0]:.3f} %, γ within {off[1]:.2f} %")
 
@@ -261,18 +207,14 @@ def packets(links: int, number: int, width: float, speed: float) -> list[tuple[f
         speeds, damping = waves.group_speed[:, column], waves.damping[:, column]
         guess = speeds[number - 2] * times
         reach = np.minimum(np.abs(guess), links / 2 - np.abs(guess))
-        found = [find_packet(*each) for each in zip(angles, guess, reach, strict=True)]
-        along = np.polyfit(times, [packet.place for packet in found], 1)[0]
-        expected = np.polyfit(times, [packet.mean(speeds) * t for packet, t in zip(found, times, strict=True)], 1)[0]
-        falls = -np.polyfit(times, np.log([packet.amplitude for packet in found]), 1)[0]
-        decay = float(np.mean([packet.mean(damping) for packet in found]))
+        places, amplitudes, shares = map(np.array, zip(*map(find_packet, angles, guess, reach), strict=True))
+        along, expected = (np.polyfit(times, way, 1)[0] for way in (places, shares @ speeds * times))
+        falls, decay = -np.polyfit(times, np.log(amplitudes), 1)[0], np.mean(shares @ damping)
         room = 1 + along * LENGTH / speed
-        in_room.append((float(np.mean([packet.mean(waves.phase) for packet in found])), room))
-        of_n = f"{LENGTH * speeds[number - 2]:.4f}"
-        one = f"{LENGTH * along:.4f}", f"{LENGTH * expected:.4f} ({100 * (along / expected - 1):+.2f} %)", of_n
-        other = f"{falls:.3f}", f"{decay:.3f} ({100 * (falls / decay - 1):+.2f} %)"
-        rows.append((f"{links}", f"{links / number:.0f}", name, *one, *other, f"{speed * room:.3f} m/s = {room:.3f} v"))
-    print(table("links | a wave |  | along the chain, m/s | theory | of n | damping, 1/s | theory | in the room", rows))
+        in_room.append((np.mean(shares @ waves.phase), room))
+        rows.append((links, links / number, name, LENGTH * along, LENGTH * expected, speed * room, falls, decay))
+    head = "links | a wave |  | along the chain, m/s | theory | in the room, m/s | damping, 1/s | theory"
+    print(table(head, rows, "d .0f s .3f .3f .2f .3f .3f"))
     return in_room
 
 
@@ -309,8 +251,8 @@ def draw(speed: float, angles: Array, numbers: Array, room: list[tuple[float, fl
             slow, lower = column in (LOWER_BACKWARD, UPPER_BACKWARD), column in BOTH
             place = waves.phase if lower else np.pi - waves.phase
             label = ("slow" if slow else "fast") + more if lower else None
-            style: dict[str, Any] = {"marker": "o", "linestyle": "none", "markersize": 4.0, "zorder": 4}
-            style |= {"color": BLUE if slow else RED, "markerfacecolor": face, "label": label}
+            style = {"color": BLUE if slow else RED, "markerfacecolor": face, "label": label}
+            style |= {"marker": "o", "linestyle": "none", "markersize": 4.0, "zorder": 4}
             left.plot(place, np.abs(rates.imag) / (2 * np.pi), **style)
             if face is None:
                 middle.plot(place, -rates.real, **style)
@@ -347,13 +289,10 @@ def main() -> None:
     show_bands()
     show_reach()
     show_coulomb()
-    at_20 = speed_at(20.0)
-    offset = from_tap(LINKS)
-    ring_angles = tapped(LINKS, at_20, 0.1 * offset * np.exp(-(offset**2) / 4.5), INTERVAL * np.arange(400))
-    ring_numbers = np.arange(2, 13)
-    show_ring(at_20, ring_angles, ring_numbers)
+    speed, offset, numbers, places = speed_at(20.0), from_tap(LINKS), np.arange(2, 13), []
+    angles = tapped(LINKS, speed, 0.1 * offset * np.exp(-(offset**2) / 4.5), INTERVAL * np.arange(400))
+    show_ring(speed, angles, numbers)
     print("Packets on larger rings")
-    places = []
-    for how_many, wave_number, spread in ((160, 20, 12.0), (180, 15, 10.0), (360, 15, 20.0)):
-        places += packets(how_many, wave_number, spread, at_20)
-    publish(FOLDER, {}, {"dispersion": draw(at_20, ring_angles, ring_numbers, places)})
+    for links, number, width in ((160, 20, 12.0), (180, 15, 10.0), (360, 15, 20.0)):
+        places += packets(links, number, width, speed)
+    publish(FOLDER, {}, {"dispersion": draw(speed, angles, numbers, places)})

@@ -1,9 +1,4 @@
-"""Prints all numbers of studies/waves/README.md and draws its figures, in a minute.
-
-    python -m studies.waves.run
-
-The theory is in dispersion.py, rings are tapped in rings.py; what is computed of the frames of a walk is in fields.py.
-"""
+"""Prints all numbers of README.md and draws its figures: of rings in rings.py, of the frames of walks here."""
 
 from pathlib import Path
 
@@ -12,35 +7,24 @@ import numpy as np
 import warpchain
 from studies.common import publish
 from studies.waves import fields, rings
-from studies.waves.picture import AVERAGED, waves_figure
+from studies.waves.picture import waves_figure
 from studies.waves.wave_drag import inertia_of
 
 FOLDER = Path(__file__).parent
-WALKS = ((120, 20.0, (0.10, 0.24)), (60, 15.0, (0.13, 0.33)))
-"""Links, frequency [Hz], and times [s] between two impacts in which speeds are measured."""
-MODES = (2, 3, 4, 5, 6, 8, 10)
-"""Numbers of waves around the loop."""
-RATIOS = np.arange(0.05, 1.51, 0.01)
-"""Speeds that are tried, as multiples of c."""
-
-
-def recorded(links: int, frequency: float) -> warpchain.WalkResult:
-    """The first 0.35 s of a walk of soft joints, with joint forces in frames 0.1 ms apart."""
-    scene = {"links": links, "frequency": frequency, "start": "spinning", "walk_limit": 0.35}
-    return warpchain.walk(preset="soft", **scene, record_loads=True, record_before=0.0, frame_interval=1e-4)
+WALKS = ((120, 20.0, 0.10, 0.24), (60, 15.0, 0.13, 0.33))  # Links, frequency [Hz], times [s] between impacts
+MODES = (2, 3, 4, 5, 6, 8, 10)  # Numbers of waves around the loop
+RATIOS = np.arange(0.05, 1.51, 0.01)  # Speeds that are tried, as multiples of c
 
 
 def print_speeds(walk: warpchain.WalkResult, begin: float, end: float) -> None:
     """Speeds of waves by their number around the loop, and the part of the variance that has this speed."""
-    parameters, scene, time = walk.setup.parameters, walk.setup.scene, walk.frame_time
+    parameters, scene, time, joints = walk.setup.parameters, walk.setup.scene, walk.frame_time, walk.frame_joints
     masses = inertia_of(scene.links, parameters)[:, 0]
     length, shown = parameters.link_length, (time >= begin) & (time < end)
-    tension = fields.tensions(walk.frame_joints, walk.frame_forces).mean(axis=1)
-    mean = fields.moving_average(time, tension, AVERAGED)
-    speed = fields.wave_speeds(mean, length, float(masses.mean()))[shown]
+    speed = fields.wave_speeds(time, joints, walk.frame_forces, length, masses.mean())[shown]
     way = fields.characteristic(time[shown], speed, 0, 0.0, length)
-    bend = fields.curvatures(walk.frame_joints, length)[shown]
-    across = fields.normal_velocities(time, walk.frame_joints, masses)[shown]
+    bend = fields.curvatures(joints, length)[shown]
+    across = fields.normal_velocities(time, joints, masses)[shown]
     print(f"{scene.links} links, {scene.frequency:g} Hz, {begin} s to {end} s, c = {speed.mean():.2f} m/s:")
     print(f"stretching: {length * np.sqrt(parameters.joint_stiffness / masses.mean()):.0f} m/s")
     print("waves around the loop | slow, curvature | part | fast, velocity | part")
@@ -56,8 +40,9 @@ def print_speeds(walk: warpchain.WalkResult, begin: float, end: float) -> None:
 def main() -> None:
     """Print all tables and draw the figures."""
     rings.main()
-    for number, (links, frequency, (begin, end)) in enumerate(WALKS):
-        walk = recorded(links, frequency)
+    for number, (links, frequency, begin, end) in enumerate(WALKS):
+        scene = {"links": links, "frequency": frequency, "start": "spinning", "walk_limit": 0.35}
+        walk = warpchain.walk(preset="soft", **scene, record_loads=True, record_before=0.0, frame_interval=1e-4)
         if number == 0:
             publish(FOLDER, {}, {"picture": waves_figure(walk, window=(0.0, 0.25))}, dpi=90)
         print_speeds(walk, begin, end)

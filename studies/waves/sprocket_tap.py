@@ -1,12 +1,8 @@
 """A tap of the running chain on its sprocket: the bottom of the loop touches the floor for some milliseconds.
 
-    python -m studies.waves.sprocket_tap     # ten seconds; prints the table of the page
-
 The sprocket dips by 8 mm and comes back (`release`), 5 mm above a floor, and once more far above it. The difference of
 both is the tap's alone. Places are counted along the loop from its lowest point, positive with the motion of the links.
 """
-
-from typing import Final
 
 import numpy as np
 
@@ -15,25 +11,19 @@ from studies.common import table
 from studies.waves.fields import curvatures, in_room, joints_below, normal_velocities
 from studies.waves.wave_drag import inertia_of
 
-LINKS: Final = 120
-FREQUENCIES: Final = (15.0, 20.0, 25.0)
-DIP: Final = 0.008
-INTERVAL: Final = 2.5e-4
-TOUCHING: Final = 1e-4
-"""Height of the lowest circle above the floor that it touches, at most [m]."""
-LATER: Final = np.arange(0.012, 0.027, 0.001)
-"""Times after the first touch [s]: after the tap, before the sprocket is reached."""
-SPAN: Final = 7
-"""So many of these times next to one another give a speed."""
+LINKS = 120
+TOUCHING = 1e-4  # Height of the lowest circle above the floor that it touches, at most [m]
+LATER = np.arange(0.012, 0.027, 0.001)  # Times after the first touch [s]: after the tap, before the sprocket is reached
+SPAN = 7  # So many of these times next to one another give a speed
 
 
 def dipping(frequency: float, clearance: float) -> warpchain.WalkResult:
-    """A loop of `LINKS` on a sprocket that dips within 0.06 s and stays for 0.12 s more."""
+    """A loop of `LINKS` on a sprocket that dips by 8 mm within 0.06 s and stays for 0.12 s more."""
     shares = np.linspace(0, 1, 13)[1:]
-    dip = [[0.05 + 0.06 * s, 0, -DIP * np.sin(np.pi * s) ** 2, frequency] for s in shares.tolist()]
+    dip = [[0.05 + 0.06 * s, 0, -0.008 * np.sin(np.pi * s) ** 2, frequency] for s in shares.tolist()]
     scene = {"links": LINKS, "frequency": frequency, "start": "spinning", "further_hold": 4, "clearance": clearance}
     release = [[0.05, 0, 0, frequency], *dip, [0.22, 0, 0, frequency]]
-    return warpchain.walk(preset="soft", **scene, release=release, walk_until=0.2, frame_interval=INTERVAL)
+    return warpchain.walk(preset="soft", **scene, release=release, walk_until=0.2, frame_interval=2.5e-4)
 
 
 def found(frequency: float) -> list[str]:
@@ -75,7 +65,7 @@ def found(frequency: float) -> list[str]:
 def main() -> None:
     """Print the table."""
     head = ("", "v / (m/s)", "touch / ms", "slow: place / cm", "fast: front", "energy across, on the other side")
-    print(table(head, map(found, FREQUENCIES)))
+    print(table(head, map(found, (15.0, 20.0, 25.0))))
 
 
 if __name__ == "__main__":

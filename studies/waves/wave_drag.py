@@ -1,28 +1,22 @@
 """A drag on the waves of a free loop that leaves its momenta and its run along itself.
 
 A loop that runs along itself, however fast, has no velocity across its path, seen from its centre of mass. A wave has:
-it moves the path. (So does a path that turns as a whole.) Of the two waves that a push starts, the fast one, which runs
-at about twice the links' speed in the room, has twice the velocity across that it has in the frame of the links; the
-slow one nearly stands still in the room and has nearly none. So a drag on the velocity across the path takes the fast
-wave and hardly touches the slow one, which is a lasting change of the loop's shape.
-
-The drag is an experiment, no physics of the chain: with it one asks whether the waves matter for how far a chain walks.
+it moves the path; the fast one of both directions twice as fast as in the frame of the links, the slow one hardly. So a
+drag on the velocity across the path takes the fast wave. It is an experiment, no physics of the chain: with it one asks
+whether the waves matter for how far a chain walks.
 """
 
-from typing import Final
-
 import numpy as np
+from numpy.typing import ArrayLike
 
 from studies.common import Array
 from warpchain import Chains, Parameters, Status
 
-TWELFTH: Final = 1.0 / 12.0
+TWELFTH = 1.0 / 12.0
 """A link is a chord: its direction is that of the path at its middle less this share of the second difference of θ."""
 
-RUNNING: Final = [0, 1, 3]
-"""Motions of `loop_motions` that leave the path in its shape and direction."""
-RIGID: Final = [0, 1, 2]
-"""Motions of `loop_motions` that hold momentum and angular momentum."""
+RUNNING = [0, 1, 3]  # Motions of `loop_motions` that leave the path in its shape and direction
+RIGID = [0, 1, 2]  # Motions of `loop_motions` that hold momentum and angular momentum
 
 
 def inertia_of(links: int, parameters: Parameters) -> Array:
@@ -33,21 +27,22 @@ def inertia_of(links: int, parameters: Parameters) -> Array:
 
 def distances(chains: Chains, inertia: Array) -> Array:
     """Δx [m] of chains, NaN of one that did not come to rest; `inertia` (W, n, 3) as of `wave_motion`."""
-    mass = inertia[..., 0]
-    dx: Array = np.sum(mass * chains.motions()[0][..., 0], axis=1) / mass.sum(axis=1)
+    dx = np.average(chains.motions()[0][..., 0], axis=1, weights=inertia[..., 0])
     return np.where(chains.status == Status.AT_REST, dx, np.nan)
 
 
+def lowest(position: Array, link_length: ArrayLike) -> Array:
+    """Height [m] of the lowest joint of loops (…, n, 3) of links of such length [m], (…)."""
+    half = 0.5 * np.expand_dims(link_length, -1) * np.abs(np.sin(position[..., 2]))
+    return np.min(position[..., 1] - half, axis=-1)
+
+
 def loop_motions(position: Array, link_length: Array) -> tuple[Array, Array]:
-    """Motions of W loops of n links that are no waves, and the normals of their paths.
+    """Motions of W loops of n links that are no waves, (W, 4, n, 3), and the normals of their paths, (W, n, 2).
 
-    Args:
-        position: (W, n, 3): x, y [m], θ [rad] of each link's centre.
-        link_length: (W,) [m].
-
-    Returns:
-        (W, 4, n, 3): velocities x, y and angular velocity of each link in a translation along x and along y, a rotation
-        about the origin at 1 rad/s, and a run along the path at 1 m/s towards links of higher number; and (W, n, 2).
+    Position is x, y [m], θ [rad] of each link's centre, (W, n, 3). Motions are velocities x, y and the angular velocity
+    of each link in a translation along x and along y, a rotation about the origin at 1 rad/s, and a run along the path
+    at 1 m/s towards links of higher number.
     """
     x, y, angle = np.moveaxis(position, -1, 0)
     ahead = _wrapped(np.roll(angle, -1, axis=1) - angle)
@@ -62,15 +57,9 @@ def loop_motions(position: Array, link_length: Array) -> tuple[Array, Array]:
 
 
 def wave_motion(motions: Array, velocity: Array, inertia: Array) -> tuple[Array, Array]:
-    """What of the velocities of W loops is none of some motions.
+    """Velocities (W, n, 3) taken apart: amounts of some of `loop_motions`, (W, j), and what is none of them, (W, n, 3).
 
-    Args:
-        motions: some of `loop_motions`, (W, j, n, 3).
-        velocity: (W, n, 3) [m/s, m/s, rad/s].
-        inertia: (W, n, 3): mass, mass [kg] and moment of inertia [kg m²] of each link.
-
-    Returns:
-        Amounts of the motions, (W, j), those nearest to the velocities in kinetic energy; and the rest, (W, n, 3).
+    Amounts are those nearest in kinetic energy; `inertia` is mass, mass [kg] and moment of inertia [kg m²], (W, n, 3).
     """
     weighted = motions * inertia[:, None]
     squares = np.einsum("wjnc,wknc->wjk", weighted, motions, optimize=True)
@@ -82,22 +71,13 @@ def wave_motion(motions: Array, velocity: Array, inertia: Array) -> tuple[Array,
 def drag_waves(
     position: Array, velocity: Array, inertia: Array, link_length: Array, share: Array, least_mode: Array
 ) -> tuple[Array, Array, Array]:
-    """Take a share of the waves out of the velocities of W loops of n links.
+    """Take a share (W,) of the waves out of the velocities (W, n, 3) of loops, but for those with fewer crests.
 
     Momentum and angular momentum stay, and very nearly the speed along the path. What goes is the velocity across the
     path, as seen from the centre of mass, with the rotation of the links that belongs to it.
 
-    Args:
-        position: (W, n, 3): x, y [m], θ [rad] of each link's centre.
-        velocity: (W, n, 3), their rates.
-        inertia: (W, n, 3): mass, mass [kg] and moment of inertia [kg m²] of each link.
-        link_length: (W,) [m].
-        share: (W,), of the velocity across the path that goes.
-        least_mode: (W,): waves with fewer crests around the loop are left alone.
-
-    Returns:
-        The new velocities, (W, n, 3); the kinetic energy of all velocities across the path [J], (W,), before; and the
-        speed along the path [m/s], (W,).
+    Returns the new velocities; the kinetic energy of all velocities across the path [J], (W,), before; and the speed
+    along the path [m/s], (W,).
     """
     motions, normal = loop_motions(position, link_length)
     amounts, rest = wave_motion(motions[:, RUNNING], velocity, inertia)
@@ -114,4 +94,4 @@ def drag_waves(
 
 def _wrapped(angle: Array) -> Array:
     """Angles [rad] within half a turn of zero."""
-    return np.asarray(angle - 2 * np.pi * np.round(angle / (2 * np.pi)))
+    return angle - 2 * np.pi * np.round(angle / (2 * np.pi))

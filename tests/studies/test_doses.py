@@ -27,7 +27,7 @@ def test_a_drag_acts_when_it_should(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(drag, "END", 0.21)
     monkeypatch.setattr(drag, "VARIANTS", (("always", 0.0), *((when, 50.0) for when in drag.WHEN)))
     position, velocity, parameters = drag.released(60, 15.0, 7)
-    found = drag.Loops(position[None], velocity[None], [parameters], "cpu").walk()["dragged_for"][:, 0]
+    found = drag.walked(position[None], velocity[None], [parameters], "cpu")["dragged_for"][:, 0]
     assert found[0] == 0 and found[1] == pytest.approx(0.2)
     assert 0.02 < min(found[2:]) and found[2] + found[3] == pytest.approx(0.2, abs=0.05)
 

@@ -159,5 +159,5 @@ def test_the_command_draws_and_writes_the_page(tmp_path: Path, monkeypatch: pyte
 def test_the_table_of_the_push_is_of_its_file() -> None:
     """The page holds what the command prints; a tenth further than others whose mean is known to a tenth."""
     assert push.table() in (run.FOLDER / "README.md").read_text(encoding="utf-8")
-    assert push.over({("60", "5"): (1.1, 0.0)}, {("60", "5"): (1.0, 0.1)}) == "+10.00 ± 11.00 %"
-    assert push.further({("60", "5"): (-0.1, 0.02)}, {("60", "5"): (2.0, 0.1)}) == "−5.00 ± 1.00 %"
+    assert push.over(*np.array([[1.1], [0.0], [1.0], [0.1]])) == "+10.00 ± 11.00 %"
+    assert push.shown(*np.array([[-0.05], [0.01]])) == "−5.00 ± 1.00 %"
