@@ -128,6 +128,7 @@ class Body:
     face: Any = nowhere  # ``face(ground)`` → its Face but for its motion
     motion: Any = unmoved  # ``motion(face, drive, world, time)`` → its Face at a time [s]
     in_cells: bool = False  # whether it has many faces, found through cells, and corners
+    is_plane: bool = False  # then rigid flights bound their steps by the speed of approach, not by any speed
     is_driven: bool = False  # whether it holds and drives a chain before its release, and is no floor
     # ``lesser_gap(chain, left_x, left_y, right_x, right_y)``, if that is less work than two surfaces
     lesser_gap: Any = None
@@ -135,10 +136,10 @@ class Body:
 
 BODIES = {
     "none": Body(surface=None),
-    "floor": Body(floor_surface),
+    "floor": Body(floor_surface, is_plane=True),
     "sprocket": Body(sprocket_surface, motion=turning_sprocket, is_driven=True, lesser_gap=lesser_sprocket_gap),
     "moving sprocket": Body(moving_sprocket_surface, motion=moved_sprocket),
-    "slope": Body(terrain.slope_surface, terrain.first_face),
+    "slope": Body(terrain.slope_surface, terrain.first_face, is_plane=True),
     "terrain": Body(terrain.terrain_surface, in_cells=True),
 }
 """Every body by its name."""

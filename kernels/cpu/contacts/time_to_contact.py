@@ -98,8 +98,8 @@ def step_bound(features: Features, has_flight: bool):
     has_self = features.self_contact
     count = list_layout(features.columns).count
     meeting = fastest_meeting(features.columns)
-    has_fixed_approach = has_fixed and not BODIES[features.fixed_body].in_cells
-    if has_fixed_approach:
+    is_plane = BODIES[features.fixed_body].is_plane
+    if is_plane:
         approaching = fastest_approach(features.fixed_body)
 
     @wp.func
@@ -113,7 +113,7 @@ def step_bound(features: Features, has_flight: bool):
         if wp.static(has_flight):
             if state.is_rigid[world] != 0:
                 approach = ZERO
-                if wp.static(has_fixed_approach):
+                if wp.static(is_plane):
                     approach = approaching(K, chain, face)
                 elif wp.static(has_fixed):
                     # what a circle approaches may be another face than that which is nearest to it
