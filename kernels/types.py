@@ -202,9 +202,7 @@ def read_ground(model: Model, world: int) -> Ground:
 def make_entry(module: wp.Module, is_block: bool):
     """Kernel that does nothing, with name, arguments and threads of a step kernel, see :func:`cpu.loop.make_advance`.
 
-    Args:
-        module: Where it stands.
-        is_block: Whether it is launched with ``wp.launch_tiled``, one block a world.
+    ``is_block``: whether it is launched with ``wp.launch_tiled``, one block a world.
     """
 
     def advance(

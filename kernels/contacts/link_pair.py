@@ -58,8 +58,7 @@ def circles_of_links(
     """Geometry of the contact of a circle of link A and one of link B, without branches.
 
     Arguments: the radii of the circles of A and B, their centres ``end`` and centres of mass ``center`` of the links
-    [m]. The depth is 0 without an overlap, and then only the depth has a meaning; concentric circles have no normal
-    and count as none.
+    [m]. Without an overlap the depth is 0, and nothing else has a meaning; so it is for concentric circles.
     """
     dx = end_b[0] - end_a[0]
     dy = end_b[1] - end_a[1]

@@ -1,7 +1,4 @@
-"""A chain whose plane may tilt, on a CPU: sums over its links, what its plane changes in a first stage, its floor.
-
-:func:`tilting_plane` makes hooks of the loop of them.
-"""
+"""A chain whose plane may tilt, as hooks of the CPU loop: sums over links, changes of a first stage, the floor."""
 
 import functools
 

@@ -41,10 +41,7 @@ class Ahead:
 
 @functools.cache
 def explicit_attempt(features: Features, block_dim: int, write_proximity: Any, read_proximity: Any):
-    """Warp function ``attempt(ends, forces, run, h)`` → Attempt, from the state and first stage on the board.
-
-    It takes two functions of :func:`gpu.contacts.proximity.block_proximity`.
-    """
+    """Warp function ``attempt(ends, forces, run, h)`` → Attempt, from the state and first stage on the board."""
     tableau = find_method(features.method).tableau
     stages, last = tableau.stages, tableau.stages - 1
     reuses_last = tableau.first_same_as_last

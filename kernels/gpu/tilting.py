@@ -64,10 +64,7 @@ def sum_up_source() -> str:
 
 @wp.func_native(sum_up_source())
 def add_up(memory: Row, lane: int, block_dim: int, x: vec8d):
-    """Writes the sums of eight values over each hardware warp into the memory; fibers those over the block.
-
-    After a barrier :func:`added_up` reads the sums over the block.
-    """
+    """Writes sums of eight values over each hardware warp, or all fibers; after a barrier :func:`added_up` reads."""
 
 
 @wp.func
@@ -89,10 +86,7 @@ def copy_plane(target: Row, source: Row):
 
 @functools.cache
 def block_tilting(block_dim: int, votes: int) -> BlockPlane:
-    """A plane that may tilt, above a flat floor, for blocks of this size.
-
-    votes: see :func:`gpu.threads.barrier_count`.
-    """
+    """A plane that may tilt above a flat floor, for blocks of this size; votes: slot of :func:`barrier_count`."""
 
     @wp.func
     def load(run: Run):

@@ -1,7 +1,4 @@
-"""Joints and links: spring, damper, friction, and the acceleration of a link.
-
-Scalar functions, one joint or one link a call.
-"""
+"""Joints and links: spring, damper, friction, and the acceleration of a link."""
 
 import warp as wp
 
@@ -14,18 +11,14 @@ def joint_force(chain: Chain, opening: wp.float64, opening_rate: wp.float64):
     """One component of F = k C + b Ċ [N] on the link left of the joint; the link right of it feels −F.
 
     X is the centre of the link left of the joint, u its direction (a unit vector) and a its half length; primes mark
-    the link right of it. The joint is open by C = (X' − a u') − (X + a u). F is −∂V_C/∂q + Q^D of the paper (its
-    section 2.1).
+    the link right of it. The joint is open by C = (X' − a u') − (X + a u). F is −∂V_C/∂q + Q^D (paper, section 2.1).
     """
     return chain.joint_stiffness * opening + chain.joint_damping * opening_rate
 
 
 @wp.func
 def friction_torque(viscous: wp.float64, coulomb: wp.float64, spin: wp.float64, inverse_smoothing: wp.float64):
-    """f(w) = β w + τ_c tanh(w / ω_c) [N m] of a joint's spin w [rad/s], with a smoothing given as 1/ω_c [s/rad].
-
-    The spin w of a joint is ω of the link left of it less ω of the link right of it.
-    """
+    """f(w) = β w + τ_c tanh(w / ω_c) [N m], with 1/ω_c [s/rad]; w is ω left of the joint less ω right of it [rad/s]."""
     return viscous * spin + coulomb * tanh(spin * inverse_smoothing)
 
 

@@ -105,11 +105,7 @@ def self_contacts(columns: int):
 
     @wp.func
     def resolve_self_contacts(K: Rows, L: Integers, chain: Chain, opening: wp.float64):
-        """Resolves all contacts of a chain whose list is made; ``opening``: greatest |C| [m].
-
-        Returns:
-            Number of impulses, number of those between strands, energy lost [J], greatest depth [m].
-        """
+        """Resolves all contacts → impulses, those of strands, energy lost [J], greatest depth [m]; opening: |C| [m]."""
         G = wp.array(
             ptr=L.ptr + wp.uint64(wp.static(4 * lists.geometry)),
             shape=(GEOMETRY_ROWS, GEOMETRY_COLUMNS),

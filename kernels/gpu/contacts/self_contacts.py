@@ -184,11 +184,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
 
     @wp.func
     def prepare(run: Run, chain: Chain, key: int):
-        """Stores the geometry of a thread's first contact.
-
-        Returns:
-            Its key, or DONE if the circles do not overlap, and its depth [m].
-        """
+        """Stores the geometry of a thread's first contact; its key, or DONE without an overlap, and its depth [m]."""
         lane = run.lane
         contact, inverse_nn, inverse_determinant = circles_at(run.K, chain, key)
         depth = contact[DEPTH]
