@@ -193,10 +193,7 @@ class Ground:
 @wp.func
 def read_ground(model: Model, world: int) -> Ground:
     """The floor of one world."""
-    ground = Ground()
-    ground.faces = model.faces[world]
-    ground.cells = model.cells[world]
-    return ground
+    return Ground(model.faces[world], model.cells[world])
 
 
 def make_entry(module: wp.Module, is_block: bool):

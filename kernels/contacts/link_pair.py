@@ -115,15 +115,9 @@ def touching_circles(K: Rows, chain: Chain, p: int, q: int, half: int, second: i
 
 @wp.func
 def collide(
-    K: Rows,
-    chain: Chain,
-    link_a: int,
-    link_b: int,
-    contact: Contact,
-    inverse_nn: wp.float64,
-    inverse_determinant: wp.float64,
+    K: Rows, chain: Chain, link_a: int, link_b: int, contact: Contact, inverse_nn: wp.float64, inverse_det: wp.float64
 ):
-    """Impulse between two overlapping links; returns energy lost [J] and number of impulses.
+    """Impulse between two overlapping links, see :func:`divisors`; returns energy lost [J] and number of impulses.
 
     They meet if they approach, or part more slowly than at ``chain.push_rate`` times the depth of the overlap [m]; the
     impulse is that of links which approach by so much faster.
@@ -155,7 +149,7 @@ def collide(
         e = chain.chain_restitution
         mu = chain.chain_friction
         jn, jt = collision_impulse(
-            chain, normal_speed, tangential_speed, w_nn, w_nt, w_tt, inverse_nn, inverse_determinant, e, mu
+            chain, normal_speed, tangential_speed, w_nn, w_nt, w_tt, inverse_nn, inverse_det, e, mu
         )
         jx = jn * nx - jt * ny
         jy = jn * ny + jt * nx

@@ -24,24 +24,14 @@ def friction_torque(viscous: wp.float64, coulomb: wp.float64, spin: wp.float64, 
 
 @wp.func
 def link_acceleration(
-    inverse_mass: wp.float64,
-    inverse_inertia: wp.float64,
-    arm_x: wp.float64,
-    arm_y: wp.float64,
-    left_x: wp.float64,
-    left_y: wp.float64,
-    right_x: wp.float64,
-    right_y: wp.float64,
-    left_torque: wp.float64,
-    right_torque: wp.float64,
+    inverse_mass: wp.float64, inverse_inertia: wp.float64, arm: wp.vec2d, left: wp.vec3d, right: wp.vec3d
 ):
-    """Accelerations (ẍ, ÿ [m/s²], θ̈ [rad/s²]) of a link by its joints.
+    """Accelerations (ẍ, ÿ [m/s²], θ̈ [rad/s²]) of a link by its joints, of which each has a force F and a torque f.
 
-    m Ẍ = F_right − F_left and I θ̈ = arm × (F_right + F_left) + f_left − f_right. F_left and F_right are the
-    forces of the joints at its two ends. f_left and f_right are their friction torques, each f(ω of the link left of
-    the joint − ω of the link right of it). The arm leads from the link's centre to its right end.
+    m Ẍ = F_right − F_left and I θ̈ = arm × (F_right + F_left) + f_left − f_right. ``left`` and ``right`` are (F, f) of
+    the joints at its two ends. The arm leads from the link's centre to its right end.
     """
-    ax = (right_x - left_x) * inverse_mass
-    ay = (right_y - left_y) * inverse_mass
-    lever = arm_x * (right_y + left_y) - arm_y * (right_x + left_x)
-    return ax, ay, (lever + left_torque - right_torque) * inverse_inertia
+    ax = (right[0] - left[0]) * inverse_mass
+    ay = (right[1] - left[1]) * inverse_mass
+    lever = arm[0] * (right[1] + left[1]) - arm[1] * (right[0] + left[0])
+    return ax, ay, (lever + left[2] - right[2]) * inverse_inertia

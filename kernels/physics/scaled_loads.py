@@ -43,12 +43,6 @@ NEVER = wp.constant(wp.float64(1e9))
 
 
 @wp.func
-def scaled_inertia(inertia: wp.float64, mass: wp.float64, length: wp.float64, factor: wp.float64):
-    """Rotary inertia [kg m²] of a link under scaled loads."""
-    return inertia + (factor - ONE) * (inertia - mass * length * length / SIX)
-
-
-@wp.func
 def under_load(own: Chain, factor: wp.float64) -> Chain:
     """The chain in a field of gravity that is multiplied by a factor; for a factor of 1 the same bits."""
     chain = own
@@ -61,7 +55,8 @@ def write_link(K: Rows, model: Model, world: int, i: int, factor: wp.float64):
     """Writes the constants of link i and of joint i, with loads multiplied by a factor, into their rows."""
     mass = model.links[world, OWN_MASS, i]
     length = TWO * model.chains[world].half_length
-    inertia = scaled_inertia(model.links[world, layout.OWN_INERTIA, i], mass, length, factor)
+    own = model.links[world, layout.OWN_INERTIA, i]
+    inertia = own + (factor - ONE) * (own - mass * length * length / SIX)
     K[MASS, i] = mass
     K[layout.INVERSE_MASS, i] = ONE / mass
     K[INERTIA, i] = inertia

@@ -70,19 +70,13 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
 
     @wp.func
     def meet(
-        run: Run,
-        drive: Drive,
-        state: State,
-        control: Control,
-        time: wp.float64,
-        proximity: Proximity,
-        pairs_before: int,
+        run: Run, drive: Drive, state: State, control: Control, time: wp.float64, proximity: Proximity, listed: int
     ):
         T = run.T
         lane = run.lane
         gap = proximity.gap
         opening = proximity.opening
-        pairs = pairs_before
+        pairs = listed
         slack = list_slack(run, opening, proximity.displacement)
         status = int(RUNNING)
         is_hit = bool(False)
