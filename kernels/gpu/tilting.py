@@ -160,11 +160,10 @@ def block_tilting(block_dim: int, votes: int) -> BlockPlane:
             if touches > wp.int64(0):
                 inverse = tilting_floor.copy_inverse(P, wp.float64(touching))
                 met = tilting_floor.meet_floor(chain, slope, inverse, link)
-                put(K, U, lane, wp.vec3d(met.u, met.v, met.omega))
+                put(K, U, lane, met.motion)
                 K[layout.BOARD_LOST_FIXED, lane] = K[layout.BOARD_LOST_FIXED, lane] + met.lost
-                summed[0] = met.push
-                summed[1] = met.moment_x
-                summed[2] = met.moment_y
+                for k in range(3):
+                    summed[k] = met.push[k]
                 hits = int(met.hits)
             motion = plane.motion_terms(K, run.column)
             if lane < run.links:
@@ -175,10 +174,10 @@ def block_tilting(block_dim: int, votes: int) -> BlockPlane:
             if lane == 0:
                 for k in range(wp.static(layout.SUMS_OF_MOTION)):
                     P[wp.static(layout.MOTION_SUMS + k)] = added_up(run.M, wp.static(3 + k), wp.static(block_dim))
-                push = added_up(run.M, 0, wp.static(block_dim))
-                moment_x = added_up(run.M, 1, wp.static(block_dim))
-                moment_y = added_up(run.M, 2, wp.static(block_dim))
-                lost = tilting_floor.push_plane_by(P, push, moment_x, moment_y)
+                push = wp.vec3d()
+                for k in range(3):
+                    push[k] = added_up(run.M, k, wp.static(block_dim))
+                lost = tilting_floor.push_plane_by(P, push)
                 K[layout.BOARD_LOST_FIXED, 0] = K[layout.BOARD_LOST_FIXED, 0] + lost
         return hits
 
