@@ -30,7 +30,7 @@ def listing_reach(chain: Chain, skin: wp.float64, opening: wp.float64):
 
 @wp.func
 def cell_width(chain: Chain, reach: wp.float64, is_far: bool):
-    """Width [m] of the grid's cells: the reach; far from itself two links, the most to a next joint but one."""
+    """Width [m] of cells: the reach or, while a chain is far from itself, two links: next joints but one are closer."""
     return wp.where(is_far, wp.max(reach, TWO * TWO * chain.half_length), reach)
 
 

@@ -34,7 +34,7 @@ def barrier():
 #endif
 """)
 def barrier_count(flags: Integers, slot: int, x: bool) -> int:
-    """A barrier that counts the threads with a true x, one instruction on a GPU; fibers use ``flags[slot]``, else 0."""
+    """A barrier that counts the threads with a true x, in one instruction; fibers use ``flags[slot]``, otherwise 0."""
 
 
 @wp.func_native("""
