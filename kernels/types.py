@@ -197,10 +197,7 @@ def read_ground(model: Model, world: int) -> Ground:
 
 
 def make_entry(module: wp.Module, is_block: bool):
-    """Kernel that does nothing, with name, arguments and threads of a step kernel, see :func:`cpu.loop.make_advance`.
-
-    ``is_block``: whether it is launched with ``wp.launch_tiled``, one block a world.
-    """
+    """Kernel without a body: name, arguments, threads of a step kernel; ``is_block``: for ``wp.launch_tiled``."""
 
     def advance(
         worlds: wp.array(dtype=wp.int32),

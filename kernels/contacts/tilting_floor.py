@@ -210,11 +210,9 @@ def meet_floor(chain: Chain, slope: wp.float64, B: wp.mat33d, link: Touching) ->
     """One link against the floor, its left roller first, together with its copy of the plane."""
     met = meet_roller(chain, slope, B, link, with_copy(chain, link), link.left_x, link.left_y)
     met = meet_roller(chain, slope, B, link, met, link.right_x, link.right_y)
-    u = met.motion[0]
-    v = met.motion[1]
-    omega = met.motion[2]
-    within = link.mass * ((link.u - u) * (link.u + u) + (link.v - v) * (link.v + v))
-    met.lost = HALF * (within + link.inertia * ((link.omega - omega) * (link.omega + omega)))
+    before = wp.vec3d(link.u, link.v, link.omega)
+    less = wp.cw_mul(before - met.motion, before + met.motion)  # of the squares
+    met.lost = HALF * (link.mass * (less[0] + less[1]) + link.inertia * less[2])
     return met
 
 

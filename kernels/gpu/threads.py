@@ -45,10 +45,7 @@ def barrier_count(flags: Integers, slot: int, x: bool) -> int:
 #endif
 """)
 def warp_greatest(x: wp.int32) -> wp.int32:
-    """Greatest x of the threads of a hardware warp, in one instruction (compute capability 8.0 and above).
-
-    ``wp.tile_max`` uses shuffles and four barriers instead.
-    """
+    """Greatest x in a hardware warp, one instruction (compute capability ≥ 8.0); ``wp.tile_max`` has four barriers."""
 
 
 @wp.func_native("""

@@ -166,10 +166,7 @@ def tanh(x: wp.float64):
 
 @wp.func
 def order_bits(x: wp.float64):
-    """Bits of a number ≥ 0 as an integer that orders as the number does, NaN above infinity.
-
-    Maxima of integers vectorise and keep a NaN; floating-point ones do neither.
-    """
+    """Bits of a number ≥ 0 as an integer in the same order, NaN highest; maxima of these vectorise and keep a NaN."""
     return wp.cast(wp.abs(x), wp.int64)
 
 

@@ -278,6 +278,4 @@ def end_step(P: Row, gravity: wp.float64, h: wp.float64):
 def plane_energy(P: Row):
     """Energy [J] of the motion across the plane, from the sums."""
     plane = read_plane(P, 0)
-    momentum = momenta(P, plane)
-    rates = plane.rates
-    return HALF * (rates[0] * momentum[0] + rates[1] * momentum[1] + rates[2] * momentum[2])
+    return HALF * wp.dot(plane.rates, momenta(P, plane))
