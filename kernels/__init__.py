@@ -1,8 +1,7 @@
 """Warp kernels of warpchain, installed as ``warpchain.kernels``.
 
 Arrays of structs go in, numbers come out; nothing here knows of files or options. Every module imports only ``warp``
-and its siblings. The physics functions are scalar ``wp.func``s, so that a loop over links (CPU) and one thread per link
-(GPU) call the same source.
+and its siblings. Physics is in scalar ``wp.func``s, which a loop over links (CPU) and one thread per link (GPU) share.
 """
 
 if __name__ != "warpchain.kernels":

@@ -193,19 +193,11 @@ class Ground:
 @wp.func
 def read_ground(model: Model, world: int) -> Ground:
     """The floor of one world."""
-    ground = Ground()
-    ground.faces = model.faces[world]
-    ground.cells = model.cells[world]
-    return ground
+    return Ground(model.faces[world], model.cells[world])
 
 
 def make_entry(module: wp.Module, is_block: bool):
-    """Kernel that does nothing, with name, arguments and threads of a step kernel, see :func:`cpu.loop.make_advance`.
-
-    Args:
-        module: Where it stands.
-        is_block: Whether it is launched with ``wp.launch_tiled``, one block a world.
-    """
+    """Kernel without a body: name, arguments, threads of a step kernel; ``is_block``: for ``wp.launch_tiled``."""
 
     def advance(
         worlds: wp.array(dtype=wp.int32),

@@ -2,8 +2,7 @@
 
 ``surface(chain, face, circle_x, circle_y)`` gives, for the circle of a link about that place, its gap [m] to the body,
 the unit vector n̂ from the body to the circle, the velocity [m/s] of the body's surface where they touch, and the
-coefficients e and μ. ``Face`` is what it needs to know besides the chain's constants. A new body is a surface and a
-line in ``BODIES``.
+coefficients e and μ. ``Face`` is what it needs besides the chain's constants. A new body needs a line in ``BODIES``.
 """
 
 import functools

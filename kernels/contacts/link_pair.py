@@ -58,8 +58,7 @@ def circles_of_links(
     """Geometry of the contact of a circle of link A and one of link B, without branches.
 
     Arguments: the radii of the circles of A and B, their centres ``end`` and centres of mass ``center`` of the links
-    [m]. The depth is 0 without an overlap, and then only the depth has a meaning; concentric circles have no normal
-    and count as none.
+    [m]. Without an overlap the depth is 0, and nothing else has a meaning; so it is for concentric circles.
     """
     dx = end_b[0] - end_a[0]
     dy = end_b[1] - end_a[1]
@@ -116,15 +115,9 @@ def touching_circles(K: Rows, chain: Chain, p: int, q: int, half: int, second: i
 
 @wp.func
 def collide(
-    K: Rows,
-    chain: Chain,
-    link_a: int,
-    link_b: int,
-    contact: Contact,
-    inverse_nn: wp.float64,
-    inverse_determinant: wp.float64,
+    K: Rows, chain: Chain, link_a: int, link_b: int, contact: Contact, inverse_nn: wp.float64, inverse_det: wp.float64
 ):
-    """Impulse between two overlapping links; returns energy lost [J] and number of impulses.
+    """Impulse between two overlapping links, see :func:`divisors`; returns energy lost [J] and number of impulses.
 
     They meet if they approach, or part more slowly than at ``chain.push_rate`` times the depth of the overlap [m]; the
     impulse is that of links which approach by so much faster.
@@ -156,7 +149,7 @@ def collide(
         e = chain.chain_restitution
         mu = chain.chain_friction
         jn, jt = collision_impulse(
-            chain, normal_speed, tangential_speed, w_nn, w_nt, w_tt, inverse_nn, inverse_determinant, e, mu
+            chain, normal_speed, tangential_speed, w_nn, w_nt, w_tt, inverse_nn, inverse_det, e, mu
         )
         jx = jn * nx - jt * ny
         jy = jn * ny + jt * nx

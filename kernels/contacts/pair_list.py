@@ -30,10 +30,7 @@ def listing_reach(chain: Chain, skin: wp.float64, opening: wp.float64):
 
 @wp.func
 def cell_width(chain: Chain, reach: wp.float64, is_far: bool):
-    """Width [m] of the grid's cells: the reach or, while a chain is far from itself, two links.
-
-    Next joints but one are never further apart than that.
-    """
+    """Width [m] of cells: the reach or, while a chain is far from itself, two links: next joints but one are closer."""
     return wp.where(is_far, wp.max(reach, TWO * TWO * chain.half_length), reach)
 
 
@@ -41,11 +38,8 @@ def cell_width(chain: Chain, reach: wp.float64, is_far: bool):
 def slack_of(chain: Chain, nearest: wp.int32, opening: wp.float64, displacement: wp.float64):
     """How far joints may still move [m] before the list may lack a pair of circles that touch; 0 or less: it is stale.
 
-    Args:
-        chain: Its constants.
-        nearest: Least distance of a pair that is not listed, as the list holds it.
-        opening: Greatest |C| now [m]: circles are so far from their joints.
-        displacement: Greatest of a joint since the list was built [m].
+    ``nearest``: least distance of a pair that is not listed, as the list holds it; ``opening``: greatest |C| [m]: so
+    far are circles from their joints; ``displacement``: greatest of a joint since the list was built [m].
     """
     return HALF * wp.float64(wp.cast(nearest, wp.float32)) - chain.circle_radius - opening - displacement
 

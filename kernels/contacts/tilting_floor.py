@@ -24,9 +24,9 @@ import warp as wp
 
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.impulse import Touching
-from warpchain.kernels.layout import INVERSE_01, INVERSE_11, INVERSE_12, PLANE_SPEED, PLANE_TURN_X, PLANE_TURN_Y
+from warpchain.kernels.layout import INVERSE_01, INVERSE_11, INVERSE_12
 from warpchain.kernels.physics.elementary import HALF, ONE, ZERO, quotient
-from warpchain.kernels.physics.plane import plane_times_inverse
+from warpchain.kernels.physics.plane import next_three, plane_times_inverse
 from warpchain.kernels.types import Chain, Row
 
 SMALLEST = wp.constant(wp.float64(1e-12))
@@ -37,15 +37,9 @@ SMALLEST = wp.constant(wp.float64(1e-12))
 class TiltingLink:
     """A link and its copy of the plane, while they meet the floor."""
 
-    u: wp.float64  # [m/s]
-    v: wp.float64
-    omega: wp.float64  # [rad/s]
-    plane_speed: wp.float64  # [m/s]
-    turn_x: wp.float64  # [rad/s]
-    turn_y: wp.float64
-    push: wp.float64  # Q, the generalised impulse on the plane [N s]
-    moment_x: wp.float64  # [N m s]
-    moment_y: wp.float64
+    motion: wp.vec3d  # u, v [m/s], ω [rad/s]
+    rates: wp.vec3d  # of the plane: u [m/s], ω1, ω2 [rad/s]
+    push: wp.vec3d  # Q, the generalised impulse on the plane [N s], [N m s]
     lost: wp.float64  # energy [J] of its motion within the plane
     hits: wp.int64  # impulses
 
@@ -89,13 +83,11 @@ def approaches(chain: Chain, slope: wp.float64, link: TiltingLink, at: Touching,
     point_y = y - chain.circle_radius * chain.up_y * inverse
     lever_x = x - at.x + (-chain.circle_radius * chain.up_x * inverse)
     lever_y = y - at.y + (-chain.circle_radius * chain.up_y * inverse)
-    across = link.plane_speed + link.turn_x * point_y - link.turn_y * point_x
-    middle = -(
-        chain.up_x * (link.u - link.omega * lever_y)
-        + chain.up_y * (link.v + link.omega * lever_x)
-        + chain.up_z * across
-    )
-    tipping = chain.half_width * (chain.up_y * link.turn_x - chain.up_x * link.turn_y)
+    across = link.rates[0] + link.rates[1] * point_y - link.rates[2] * point_x
+    u = link.motion[0] - link.motion[2] * lever_y
+    v = link.motion[1] + link.motion[2] * lever_x
+    middle = -(chain.up_x * u + chain.up_y * v + chain.up_z * across)
+    tipping = chain.half_width * (chain.up_y * link.rates[1] - chain.up_x * link.rates[2])
     height = middle_height(chain, slope, x, y)
     rise = chain.half_width * chain.up_z
     front = wp.where(height + rise < ZERO, wp.max(middle + tipping - chain.push_rate * (height + rise), ZERO), ZERO)
@@ -132,9 +124,11 @@ def meet_roller(
     n2 = chain.up_y
     n3 = chain.up_z
     rise = chain.push_rate * wp.max(ZERO, -(middle_height(chain, slope, circle_x, circle_y) + z * n3))
-    v1 = before.u - before.omega * lever_y + z * before.turn_y - rise * n1
-    v2 = before.v + before.omega * lever_x - z * before.turn_x - rise * n2
-    v3 = before.plane_speed + before.turn_x * y - before.turn_y * x - rise * n3
+    motion = before.motion
+    rates = before.rates
+    v1 = motion[0] - motion[2] * lever_y + z * rates[2] - rise * n1
+    v2 = motion[1] + motion[2] * lever_x - z * rates[1] - rise * n2
+    v3 = rates[0] + rates[1] * y - rates[2] * x - rise * n3
     c0 = B[0, 0] + B[0, 1] * y - B[0, 2] * x
     c1 = B[0, 1] + B[1, 1] * y - B[1, 2] * x
     c2 = B[0, 2] + B[1, 2] * y - B[2, 2] * x
@@ -181,15 +175,14 @@ def meet_roller(
     q1 = y * j3 - z * j2
     q2 = z * j1 - x * j3
     after = TiltingLink()
-    after.u = before.u + j1 * inverse_mass
-    after.v = before.v + j2 * inverse_mass
-    after.omega = before.omega + (lever_x * j2 - lever_y * j1) * inverse_inertia
-    after.plane_speed = before.plane_speed + B[0, 0] * j3 + B[0, 1] * q1 + B[0, 2] * q2
-    after.turn_x = before.turn_x + B[0, 1] * j3 + B[1, 1] * q1 + B[1, 2] * q2
-    after.turn_y = before.turn_y + B[0, 2] * j3 + B[1, 2] * q1 + B[2, 2] * q2
-    after.push = before.push + j3
-    after.moment_x = before.moment_x + q1
-    after.moment_y = before.moment_y + q2
+    turn = (lever_x * j2 - lever_y * j1) * inverse_inertia
+    after.motion = motion + wp.vec3d(j1 * inverse_mass, j2 * inverse_mass, turn)
+    after.rates = wp.vec3d(
+        rates[0] + B[0, 0] * j3 + B[0, 1] * q1 + B[0, 2] * q2,
+        rates[1] + B[0, 1] * j3 + B[1, 1] * q1 + B[1, 2] * q2,
+        rates[2] + B[0, 2] * j3 + B[1, 2] * q1 + B[2, 2] * q2,
+    )
+    after.push = before.push + wp.vec3d(j3, q1, q2)
     after.hits = before.hits + wp.where(hit, wp.int64(1), wp.int64(0))
     return after
 
@@ -198,12 +191,8 @@ def meet_roller(
 def with_copy(chain: Chain, touching: Touching) -> TiltingLink:
     """A link before it meets the floor, with a copy of the chain's plane."""
     link = TiltingLink()
-    link.u = touching.u
-    link.v = touching.v
-    link.omega = touching.omega
-    link.plane_speed = chain.plane_speed
-    link.turn_x = chain.turn_x
-    link.turn_y = chain.turn_y
+    link.motion = wp.vec3d(touching.u, touching.v, touching.omega)
+    link.rates = wp.vec3d(chain.plane_speed, chain.turn_x, chain.turn_y)
     return link
 
 
@@ -221,19 +210,17 @@ def meet_floor(chain: Chain, slope: wp.float64, B: wp.mat33d, link: Touching) ->
     """One link against the floor, its left roller first, together with its copy of the plane."""
     met = meet_roller(chain, slope, B, link, with_copy(chain, link), link.left_x, link.left_y)
     met = meet_roller(chain, slope, B, link, met, link.right_x, link.right_y)
-    within = link.mass * ((link.u - met.u) * (link.u + met.u) + (link.v - met.v) * (link.v + met.v))
-    met.lost = HALF * (within + link.inertia * ((link.omega - met.omega) * (link.omega + met.omega)))
+    before = wp.vec3d(link.u, link.v, link.omega)
+    less = wp.cw_mul(before - met.motion, before + met.motion)  # of the squares
+    met.lost = HALF * (link.mass * (less[0] + less[1]) + link.inertia * less[2])
     return met
 
 
 @wp.func
-def push_plane_by(P: Row, push: wp.float64, moment_x: wp.float64, moment_y: wp.float64):
+def push_plane_by(P: Row, push: wp.vec3d):
     """Gives the plane the sum of the impulses on its copies; returns the energy [J] that it loses."""
-    du, d1, d2 = plane_times_inverse(P, push, moment_x, moment_y)
-    u = P[PLANE_SPEED]
-    w1 = P[PLANE_TURN_X]
-    w2 = P[PLANE_TURN_Y]
-    P[PLANE_SPEED] = u + du
-    P[PLANE_TURN_X] = w1 + d1
-    P[PLANE_TURN_Y] = w2 + d2
-    return -((u + HALF * du) * push + (w1 + HALF * d1) * moment_x + (w2 + HALF * d2) * moment_y)
+    change = plane_times_inverse(P, push)
+    mean = next_three(P, layout.PLANE_SPEED) + HALF * change
+    for k in range(3):
+        P[layout.PLANE_SPEED + k] = P[layout.PLANE_SPEED + k] + change[k]
+    return -(mean[0] * push[0] + mean[1] * push[1] + mean[2] * push[2])

@@ -137,21 +137,13 @@ def explicit_method(tableau: Tableau, acceleration: Any):
         put(K, layout.FORCE_X, 0, three(K, layout.FORCE_X, n))
         i = int(0)
         while i < lanes:
-            ax, ay, spin_rate = link_acceleration(
-                K[layout.INVERSE_MASS, i],
-                K[layout.INVERSE_INERTIA, i],
-                K[layout.STAGE_ARM_X, i],
-                K[layout.STAGE_ARM_Y, i],
-                K[layout.FORCE_X, i],
-                K[layout.FORCE_Y, i],
-                K[layout.FORCE_X, i + 1],
-                K[layout.FORCE_Y, i + 1],
-                K[layout.TORQUE, i],
-                K[layout.TORQUE, i + 1],
-            )
-            load_x, load_y, load_turn = acceleration(
-                chain, i, link_in_stage(K, i), K[layout.INVERSE_MASS, i], K[layout.INVERSE_INERTIA, i]
-            )
+            inverse_mass = K[layout.INVERSE_MASS, i]
+            inverse_inertia = K[layout.INVERSE_INERTIA, i]
+            arm = two(K, layout.STAGE_ARM_X, i)
+            left = three(K, layout.FORCE_X, i)
+            right = three(K, layout.FORCE_X, i + 1)
+            ax, ay, spin_rate = link_acceleration(inverse_mass, inverse_inertia, arm, left, right)
+            load_x, load_y, load_turn = acceleration(chain, i, link_in_stage(K, i), inverse_mass, inverse_inertia)
             put(K, row, i, wp.vec3d(ax + load_x, ay + load_y, spin_rate + load_turn))
             i += 1
 

@@ -60,9 +60,8 @@ def state_is_finite(K: Rows, chain: Chain):
 def make_advance(features: Features):
     """Kernel ``advance(worlds, model, drive, state, record, scratch, lists, control)``, one thread per chain.
 
-    worlds: (launched,) int32, the worlds to carry on; those whose status is not RUNNING are left alone. scratch: (W,
-    rows, columns) float64, lists: (W, size) int32, see :mod:`layout` and :mod:`contacts.list_layout`; both belong to a
-    world until its run ends.
+    worlds: (launched,) int32; those whose status is not RUNNING are left alone. scratch: (W, rows, columns) float64,
+    lists: (W, size) int32; both belong to a world until its run ends, see :mod:`layout`, :mod:`contacts.list_layout`.
     """
     columns = features.columns
     rows = scratch_rows(features.method, columns)

@@ -1,7 +1,4 @@
-"""A chain whose plane may tilt, on a CPU: sums over its links, what its plane changes in a first stage, its floor.
-
-:func:`tilting_plane` makes hooks of the loop of them.
-"""
+"""A chain whose plane may tilt, as hooks of the CPU loop: sums over links, changes of a first stage, the floor."""
 
 import functools
 
@@ -13,7 +10,7 @@ from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.cpu.contacts.proximity import FURTHEST, any_negative, placed_link
 from warpchain.kernels.cpu.joints import Joints
 from warpchain.kernels.cpu.upright import Plane
-from warpchain.kernels.layout import LEFT_X, LOST_FIXED, OMEGA, STAGES, SUMS_OF_MOTION, U, V
+from warpchain.kernels.layout import LEFT_X, LOST_FIXED, STAGES, SUMS_OF_MOTION, U
 from warpchain.kernels.physics import plane
 from warpchain.kernels.physics.elementary import ZERO, from_order_key, order_key
 from warpchain.kernels.physics.geometry import LANES, whole_lanes
@@ -133,20 +130,17 @@ def resolve_tilting_floor(K: Rows, P: Row, own: Chain, _ground: Ground, _face: F
                 own = with_circles(chain, K[layout.RADIUS, i])
                 link = tilting_floor.meet_floor(own, slope, B, placed_link(K, i))
                 touches = K[wp.static(TOUCHES), i] < ZERO
-                K[U, i] = wp.where(touches, link.u, K[U, i])
-                K[V, i] = wp.where(touches, link.v, K[V, i])
-                K[OMEGA, i] = wp.where(touches, link.omega, K[OMEGA, i])
+                for k in range(wp.static(SUMMED_IN_CONTACT)):
+                    K[U + k, i] = wp.where(touches, link.motion[k], K[U + k, i])
+                    K[wp.static(SUMS + k), i] = wp.where(touches, link.push[k], ZERO)
                 K[LOST_FIXED, i] = K[LOST_FIXED, i] + wp.where(touches, link.lost, ZERO)
-                K[wp.static(SUMS), i] = wp.where(touches, link.push, ZERO)
-                K[wp.static(SUMS + 1), i] = wp.where(touches, link.moment_x, ZERO)
-                K[wp.static(SUMS + 2), i] = wp.where(touches, link.moment_y, ZERO)
                 impulses += wp.where(touches, link.hits, wp.int64(0))
                 lane += 1
         first += wp.static(LANES)
-    push = row_sum(K, wp.static(SUMS), count)
-    moment_x = row_sum(K, wp.static(SUMS + 1), count)
-    moment_y = row_sum(K, wp.static(SUMS + 2), count)
-    K[LOST_FIXED, 0] = K[LOST_FIXED, 0] + tilting_floor.push_plane_by(P, push, moment_x, moment_y)
+    push = wp.vec3d()
+    for k in range(wp.static(SUMMED_IN_CONTACT)):
+        push[k] = row_sum(K, wp.static(SUMS + k), count)
+    K[LOST_FIXED, 0] = K[LOST_FIXED, 0] + tilting_floor.push_plane_by(P, push)
     write_sums_of_motion(K, P, chain)
     return impulses
 

@@ -33,9 +33,7 @@ def keep_sample(state: State, record: Record, world: int, time: wp.float64):
 def write_load(loads: Rows, row: int, K: Rows, chain: Chain, i: int):
     """Writes force F = k C + b Ċ [N] and friction moment [N m] of joint i, both as they act on the link before it."""
     n = chain.link_count
-    j = i + 1
-    if j == n:
-        j = int(0)
+    j = wp.where(i + 1 == n, 0, i + 1)
     a = chain.half_length
     rate_x = (K[U, j] + a * K[OMEGA, j] * K[SINE, j]) - (K[U, i] - a * K[OMEGA, i] * K[SINE, i])
     rate_y = (K[V, j] - a * K[OMEGA, j] * K[COSINE, j]) - (K[V, i] + a * K[OMEGA, i] * K[COSINE, i])

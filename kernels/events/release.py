@@ -12,8 +12,7 @@ loop is stationary when, over all windows of a watch,
 - the averages of its shape and place agree to within ``steady_tolerance`` of its height (vertical quantities) or width
   (horizontal ones). For shape and place the free watch counts the last loaded window as its first;
 - the averages of its speed agree to within ``steady_tolerance`` of the sprocket's speed, or 0.02 m/s if that is more,
-  and each differs from the sprocket's speed by at most 25 %, or 0.02 m/s. The watch of the speed starts afresh when
-  the loop becomes free.
+  and each differs from the sprocket's speed by at most 25 %, or 0.02 m/s. Once free, its speed is watched afresh.
 
 A window that breaks these rules begins a new watch. The loop is released ``further_hold`` + phase × loop period after
 it is found stationary.

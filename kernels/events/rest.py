@@ -17,8 +17,7 @@ from warpchain.kernels.types import Control, Drive, Row, State
 def watch_rest(state: State, drive: Drive, control: Control, world: int, sample: Row):
     """Status AT_REST once both speeds, the centre's and the rms, have been low for the rest time, else RUNNING.
 
-    DISTANCE_LIMIT once the centre is as far away as a walk may go.
-    A run that is to finish at a given time is not ended earlier.
+    DISTANCE_LIMIT once the centre is as far as a walk may go. Runs that finish at a given time are not ended earlier.
     """
     if state.stop_status[world] == FINISHED:
         return RUNNING

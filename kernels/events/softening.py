@@ -18,8 +18,7 @@ them for long, and an impulse stops a circle only after a step in which it has s
 
 A change of k at openings C releases the energy ½ (k_before − k_after) Σ C², which is booked. Softening is one jump: C
 grows to T/k_after within a few periods of the soft springs. When joints stiffen, C must shrink by a factor of 100 to
-1000. One jump would make a pull 100 to 1000 times T; so joints stiffen in many small jumps, each damped before the
-next.
+1000. One jump would make a pull 100 to 1000 times T; so joints stiffen in small jumps, each damped before the next.
 """
 
 import warp as wp
@@ -71,8 +70,7 @@ def watch_collapse(
 ):
     """Makes joints soft, for good, when the loop's area [m²] has fallen below a fraction of that at the first sample.
 
-    Below half of that fraction they become softest. Joints of a model that is as soft itself stay as they are, and no
-    time of softening is noted.
+    Below half of that fraction they become softest. Joints that are as soft themselves stay so, and no time is noted.
     """
     if is_first:
         return

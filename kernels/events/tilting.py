@@ -36,10 +36,7 @@ def across_speed(P: Row, x: wp.float64, y: wp.float64):
 
 @wp.func
 def move_into_room(K: Rows, P: Row, chain: Chain, sample: Row):
-    """Changes sums in the plane to sums in the room and adds the further columns.
-
-    Height, width and speed of the loop stay those in the plane.
-    """
+    """Makes sums in the plane those in the room, but for height, width and speed of the loop; adds further columns."""
     n = chain.link_count
     square = sample[layout.RMS_SPEED] * sample[layout.RMS_SPEED] * wp.float64(n)
     bottom = order_key(wp.float64(wp.inf))

@@ -11,19 +11,9 @@ from typing import Any
 import warp as wp
 
 from warpchain.kernels.features import Features
-from warpchain.kernels.gpu.stage import (
-    Attempt,
-    Run,
-    block_stage,
-    greater,
-    greatest_of_three,
-    read_first_stage,
-    read_link,
-    vec3d,
-    vec5d,
-    velocity_of,
-)
+from warpchain.kernels.gpu.stage import Attempt, Run, block_stage, read_first_stage, read_link, vec3d, vec5d
 from warpchain.kernels.layout import INVERSE_INERTIA, INVERSE_MASS, THETA
+from warpchain.kernels.methods.controller import error_scale
 from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.physics.elementary import LARGEST_TURN, ONE, ZERO, cos_sin
 from warpchain.kernels.physics.geometry import Link, turned
@@ -39,12 +29,35 @@ class Ahead:
     sums: vec3d  # Σ a_ij k_j so far, without the term of the preceding stage
 
 
+@wp.func
+def greater(error_a: wp.float64, scale_a: wp.float64, error_b: wp.float64, scale_b: wp.float64):
+    """The greater of two quotients |error| / scale with positive scales; a NaN is the greatest."""
+    keeps_a = wp.abs(error_a) * scale_b >= wp.abs(error_b) * scale_a or error_a != error_a
+    return wp.where(keeps_a, error_a, error_b), wp.where(keeps_a, scale_a, scale_b)
+
+
+@wp.func
+def velocity_of(link: Link) -> vec3d:
+    """ẋ, ẏ [m/s] and θ̇ [rad/s] of a link."""
+    return vec3d(link.u, link.v, link.omega)
+
+
+@wp.func
+def greatest_of_three(error: vec3d, value: vec3d, rate: vec3d, h: wp.float64):
+    """The greatest of the errors of three values with these rates over their scales, as numerator and divisor.
+
+    Quotients are compared by cross-multiplication, so that a single division remains.
+    """
+    top = error[0]
+    scale = error_scale(value[0], rate[0], h)
+    for k in range(1, 3):
+        top, scale = greater(top, scale, error[k], error_scale(value[k], rate[k], h))
+    return top, scale
+
+
 @functools.cache
 def explicit_attempt(features: Features, block_dim: int, write_proximity: Any, read_proximity: Any):
-    """Warp function ``attempt(ends, forces, run, h)`` → Attempt, from the state and first stage on the board.
-
-    It takes two functions of :func:`gpu.contacts.proximity.block_proximity`.
-    """
+    """Warp function ``attempt(ends, forces, run, h)`` → Attempt, from the state and first stage on the board."""
     tableau = find_method(features.method).tableau
     stages, last = tableau.stages, tableau.stages - 1
     reuses_last = tableau.first_same_as_last
@@ -62,7 +75,6 @@ def explicit_attempt(features: Features, block_dim: int, write_proximity: Any, r
 
         @wp.func
         def ahead(link: Link, h: wp.float64, rates: Stages):
-            row = Ahead()
             sums = vec3d()
             moved = vec3d()
             for j in range(wp.static(s - 1)):
@@ -71,11 +83,7 @@ def explicit_attempt(features: Features, block_dim: int, write_proximity: Any, r
                 if wp.static(position[s][j] != 0.0):
                     moved += wp.static(wp.float64(position[s][j])) * rates[j]
             moved = wp.static(wp.float64(nodes[s])) * h * velocity_of(link) + h * h * moved
-            row.x = link.x + moved[0]
-            row.y = link.y + moved[1]
-            row.turn = moved[2]
-            row.sums = sums
-            return row
+            return Ahead(link.x + moved[0], link.y + moved[1], moved[2], sums)
 
         return ahead
 
@@ -101,19 +109,12 @@ def explicit_attempt(features: Features, block_dim: int, write_proximity: Any, r
         sums = vec3d()
         velocity_error = vec3d()
         for s in range(1, wp.static(stages)):
-            there = Link()
-            there.x = row.x
-            there.y = row.y
             arm_x, arm_y = turned(link.arm_x, link.arm_y, row.turn)
-            there.arm_x = arm_x
-            there.arm_y = arm_y
             sums = row.sums
             if wp.static(velocity[s][s - 1] != 0.0):
                 sums += wp.static(wp.float64(velocity[s][s - 1])) * rates[s - 1]
-            new_velocity = velocity_of(link) + h * sums
-            there.u = new_velocity[0]
-            there.v = new_velocity[1]
-            there.omega = new_velocity[2]
+            rate = velocity_of(link) + h * sums
+            there = Link(row.x, row.y, rate[0], rate[1], rate[2], arm_x, arm_y)
             next_end = exchange_ends(ends, run, there)
             # what does not depend on this stage is evaluated while its friction is
             if wp.static(s < last or not reuses_last):

@@ -41,13 +41,9 @@ REGISTERS_OF_MULTIPROCESSOR = 65536
 def make_advance_block(features: Features, block_dim: int, registers: int | None = None):
     """Kernel with the arguments of :func:`cpu.loop.make_advance`, launched with ``wp.launch_tiled``, one block a world.
 
-    Args:
-        features: What the kernel is compiled for.
-        block_dim: Threads in a block, at least the number of links of every chain: a multiple of 4, on a GPU of 32.
-        registers: Most registers of a thread on a GPU; None: as many as a block of this size can have.
-
-    Arrays of the kernel:
-        scratch: (W, ≥ :func:`gpu.functions.board_rows`, columns) float64; lists are as on a CPU.
+    ``block_dim`` is at least the number of links of every chain: a multiple of 4, on a GPU of 32. ``registers``: most
+    of a thread on a GPU; None: as many as a block of this size can have. A world's scratch has at least
+    :func:`gpu.functions.board_rows` rows; lists are as on a CPU.
     """
     available = REGISTERS_OF_MULTIPROCESSOR // block_dim // 8 * 8
     if available < 255:

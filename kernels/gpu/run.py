@@ -28,10 +28,7 @@ SHARES = 5
 
 @wp.func
 def write_bounds(run: Run, drive: Drive, state: State, control: Control, is_driven: bool):
-    """Writes what bounds steps until the next sample on the board, when that or a frame is due, and when the run stops.
-
-    For one thread.
-    """
+    """For one thread: writes on the board what bounds steps, when the next sample or frame is due, and when to stop."""
     K = run.K
     K[BOARD_VALUES, layout.VALUE_CONTACT_STEP] = contact_step(state, control, run.world, is_driven)
     K[BOARD_VALUES, layout.VALUE_TOLERANCE] = spring_tolerance(drive, state, control, run.world, is_driven)

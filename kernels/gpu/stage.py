@@ -13,7 +13,7 @@ import warp as wp
 
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
-from warpchain.kernels.methods.controller import error_scale, quick_quotient
+from warpchain.kernels.methods.controller import quick_quotient
 from warpchain.kernels.physics import geometry
 from warpchain.kernels.physics.elementary import order_bits_single
 from warpchain.kernels.physics.geometry import Link, end_positions, end_velocities
@@ -126,13 +126,6 @@ def felt_plane(run: Run) -> Chain:
 
 
 @wp.func
-def greater(error_a: wp.float64, scale_a: wp.float64, error_b: wp.float64, scale_b: wp.float64):
-    """The greater of two quotients |error| / scale with positive scales; a NaN is the greatest."""
-    keeps_a = wp.abs(error_a) * scale_b >= wp.abs(error_b) * scale_a or error_a != error_a
-    return wp.where(keeps_a, error_a, error_b), wp.where(keeps_a, scale_a, scale_b)
-
-
-@wp.func
 def error_of(result: Attempt, tolerance: wp.float64):
     """Error ratio of a link as ordered bits, NaN above all numbers; turning too far counts as a ratio of 2."""
     scale = wp.float32(result.scale * tolerance)
@@ -140,25 +133,6 @@ def error_of(result: Attempt, tolerance: wp.float64):
     if result.turns_far and ratio < wp.float32(2.0):
         ratio = wp.float32(2.0)
     return order_bits_single(ratio)
-
-
-@wp.func
-def velocity_of(link: Link) -> vec3d:
-    """ẋ, ẏ [m/s] and θ̇ [rad/s] of a link."""
-    return vec3d(link.u, link.v, link.omega)
-
-
-@wp.func
-def greatest_of_three(error: vec3d, value: vec3d, rate: vec3d, h: wp.float64):
-    """The greatest of the errors of three values with these rates over their scales, as numerator and divisor.
-
-    Quotients are compared by cross-multiplication, so that a single division remains.
-    """
-    top = error[0]
-    scale = error_scale(value[0], rate[0], h)
-    for k in range(1, 3):
-        top, scale = greater(top, scale, error[k], error_scale(value[k], rate[k], h))
-    return top, scale
 
 
 @functools.cache
@@ -201,11 +175,10 @@ def block_stage(features: Features, block_dim: int):
         torque = friction_torque(K[layout.VISCOUS, column], K[layout.COULOMB, column], spin, chain.inverse_smoothing)
         friction = torque * spin
         damping = cu * cu + cv * cv
-        forces[run.lane] = vec3d(force_x, force_y, torque)
-        left = forces[run.before]
-        ax, ay, at = link_acceleration(
-            inverse_mass, inverse_inertia, link.arm_x, link.arm_y, left[0], left[1], force_x, force_y, left[2], torque
-        )
+        right = vec3d(force_x, force_y, torque)
+        forces[run.lane] = right
+        arm = wp.vec2d(link.arm_x, link.arm_y)
+        ax, ay, at = link_acceleration(inverse_mass, inverse_inertia, arm, forces[run.before], right)
         felt = constants(K)
         if wp.static(features.tilts):
             felt = felt_plane(run)

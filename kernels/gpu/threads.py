@@ -34,10 +34,7 @@ def barrier():
 #endif
 """)
 def barrier_count(flags: Integers, slot: int, x: bool) -> int:
-    """A barrier that returns to all threads in how many of them x is true; one instruction on a GPU.
-
-    Fibers use ``flags[slot]`` instead, which is 0 before and after.
-    """
+    """A barrier that counts the threads with a true x, in one instruction; fibers use ``flags[slot]``, otherwise 0."""
 
 
 @wp.func_native("""
@@ -48,10 +45,7 @@ def barrier_count(flags: Integers, slot: int, x: bool) -> int:
 #endif
 """)
 def warp_greatest(x: wp.int32) -> wp.int32:
-    """Greatest x of the threads of a hardware warp, in one instruction (compute capability 8.0 and above).
-
-    ``wp.tile_max`` uses shuffles and four barriers instead.
-    """
+    """Greatest x in a hardware warp, one instruction (compute capability ≥ 8.0); ``wp.tile_max`` has four barriers."""
 
 
 @wp.func_native("""
@@ -121,10 +115,8 @@ def read_four(memory: wp.uint64, index: int) -> vec4i:
 def block_maxima(block_dim: int):
     """Warp functions for maxima over the threads of a block.
 
-    Returns:
-        ``greatest(tile, lane, value)`` → the greatest value; ``write_maxima(memory, lane, values)``, then a barrier of
-        the caller, then ``read_maxima(memory)`` → the greatest of each of four values. Tile and memory may be used
-        again after the next barrier.
+    ``greatest(tile, lane, value)`` → the greatest value; ``write_maxima(memory, lane, values)``, then a barrier of the
+    caller, then ``read_maxima(memory)`` → the greatest of each of four values. Both may be used again after a barrier.
     """
 
     @wp.func

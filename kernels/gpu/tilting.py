@@ -64,10 +64,7 @@ def sum_up_source() -> str:
 
 @wp.func_native(sum_up_source())
 def add_up(memory: Row, lane: int, block_dim: int, x: vec8d):
-    """Writes the sums of eight values over each hardware warp into the memory; fibers those over the block.
-
-    After a barrier :func:`added_up` reads the sums over the block.
-    """
+    """Writes sums of eight values over each hardware warp, or all fibers; after a barrier :func:`added_up` reads."""
 
 
 @wp.func
@@ -89,10 +86,7 @@ def copy_plane(target: Row, source: Row):
 
 @functools.cache
 def block_tilting(block_dim: int, votes: int) -> BlockPlane:
-    """A plane that may tilt, above a flat floor, for blocks of this size.
-
-    votes: see :func:`gpu.threads.barrier_count`.
-    """
+    """A plane that may tilt above a flat floor, for blocks of this size; votes: slot of :func:`barrier_count`."""
 
     @wp.func
     def load(run: Run):
@@ -166,11 +160,10 @@ def block_tilting(block_dim: int, votes: int) -> BlockPlane:
             if touches > wp.int64(0):
                 inverse = tilting_floor.copy_inverse(P, wp.float64(touching))
                 met = tilting_floor.meet_floor(chain, slope, inverse, link)
-                put(K, U, lane, wp.vec3d(met.u, met.v, met.omega))
+                put(K, U, lane, met.motion)
                 K[layout.BOARD_LOST_FIXED, lane] = K[layout.BOARD_LOST_FIXED, lane] + met.lost
-                summed[0] = met.push
-                summed[1] = met.moment_x
-                summed[2] = met.moment_y
+                for k in range(3):
+                    summed[k] = met.push[k]
                 hits = int(met.hits)
             motion = plane.motion_terms(K, run.column)
             if lane < run.links:
@@ -181,10 +174,10 @@ def block_tilting(block_dim: int, votes: int) -> BlockPlane:
             if lane == 0:
                 for k in range(wp.static(layout.SUMS_OF_MOTION)):
                     P[wp.static(layout.MOTION_SUMS + k)] = added_up(run.M, wp.static(3 + k), wp.static(block_dim))
-                push = added_up(run.M, 0, wp.static(block_dim))
-                moment_x = added_up(run.M, 1, wp.static(block_dim))
-                moment_y = added_up(run.M, 2, wp.static(block_dim))
-                lost = tilting_floor.push_plane_by(P, push, moment_x, moment_y)
+                push = wp.vec3d()
+                for k in range(3):
+                    push[k] = added_up(run.M, k, wp.static(block_dim))
+                lost = tilting_floor.push_plane_by(P, push)
                 K[layout.BOARD_LOST_FIXED, 0] = K[layout.BOARD_LOST_FIXED, 0] + lost
         return hits
 

@@ -71,12 +71,8 @@ def step_controller(order: int, error_order: int, real: type = wp.float64):
 
     Standard: Boost odeint's ``default_step_adjuster`` (K. Ahnert, M. Mulansky, AIP Conf. Proc. 1389 (2011) 1586), which
     lets steps grow only if the error is below half of the tolerance. Proportional-integral: K. Gustafsson, ACM TOMS 17
-    (1991) 533, with the exponents 0.7/k and 0.4/k of E. Hairer and G. Wanner, Solving ODEs II, section IV.2.
-
-    Args:
-        order: Of the solution that is propagated.
-        error_order: Of the embedded solution.
-        real: Type of errors and factors: ``wp.float64``, or on a GPU ``wp.float32``.
+    (1991) 533, with the exponents 0.7/k and 0.4/k of E. Hairer and G. Wanner, Solving ODEs II, section IV.2. ``order``
+    is of the propagated solution, ``error_order`` of the embedded one; ``real`` is ``wp.float32`` on a GPU.
     """
     least_error = 5.0**-order
     least_shrinkage = float(LEAST_SHRINKAGE)

@@ -200,8 +200,7 @@ with c₄ = 1/6 · 39/200, c₅ = c₄ · 3/25, c₆ = c₅ · 23/400 free to ch
 in the sense of D. I. Ketcheson and A. J. Ahmadia (Commun. Appl. Math. Comput. Sci. 7 (2012) 247), which allows the
 largest h with |P(hλ)| ≤ 1 on the eigenvalues λ. Eigenvalues of joints with k and b of Table 1 lie on a curve that ends
 at |λ| = 1.08e6/s, 57° off the negative axis; those of sticking friction lie on that axis. Steps may be 6.2/|λ| on the
-curve and 7.3/|λ| on the axis; with `dp5`, which has as many stages, 3.4 and 3.3; with `bs32`, which has half as many,
-2.5 and 2.5.
+curve and 7.3/|λ| on the axis; with `dp5`, which has as many stages, 3.4 and 3.3; with `bs32`, with half as many, 2.5.
 """
 
 for _tableau in (RKF78, DP5, BS32, OS32):

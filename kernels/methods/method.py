@@ -1,7 +1,6 @@
 """Every method by the name that a user writes, with the facts that step loops and host need.
 
-Every entry of :data:`TABLEAUS` is a method, and nothing else names it. ``hybrid`` takes one of them near contacts and
-rigid joints between them.
+Every entry of :data:`TABLEAUS` is a method; nothing else names it. ``hybrid`` has one near contacts, else rigid joints.
 """
 
 from dataclasses import dataclass
@@ -40,11 +39,7 @@ def method_names() -> tuple[str, ...]:
 
 
 def find_method(name: str) -> Method:
-    """The method of this name.
-
-    Raises:
-        KeyError: There is none.
-    """
+    """The method of this name; a ``KeyError`` if there is none."""
     if name != HYBRID:
         return Method(name, TABLEAUS[name].title, TABLEAUS[name], has_rigid_flight=False)
     title = f"rigid joints between impulses, {HYBRID_SPRINGS} around them"

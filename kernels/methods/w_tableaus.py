@@ -1,8 +1,7 @@
 """Coefficients of ROS34PW2, a W-method: a Rosenbrock method that keeps its order with any matrix for the Jacobian.
 
 Of y' = f(y), with a matrix A: y + Σ b k with (1 − hγ A) k_i = h f(y + Σ_j<i α_ij k_j) + h A Σ_j<i γ_ij k_j.
-Four stages, order 3 with any A, stiffly accurate, R(∞) = 0: J. Rang, L. Angermann, BIT Numerical Mathematics 45 (2005)
-761-787.
+Four stages, order 3 with any A, stiffly accurate, R(∞) = 0: J. Rang, L. Angermann, BIT Numer. Math. 45 (2005) 761-787.
 """
 
 STAGES = 4

@@ -152,8 +152,7 @@ def tanh(x: wp.float64):
     """Hyperbolic tangent to 1e-15 absolute: 1 − 2/(exp(2|x|) + 1), with |x| capped where the result is 1.
 
     Every stage of a step waits for it, so its latency counts on a GPU. The polynomial's terms are summed in pairs.
-    exp(2|x|) = 2ᵏ exp(2 r) is reduced by one product with a rounded ln2/2: the error grows as k, its weight in the
-    result falls as 2⁻ᵏ.
+    exp(2|x|) = 2ᵏ exp(2 r) is reduced by one product with a rounded ln2/2: the error grows as k, its weight as 2⁻ᵏ.
     """
     y = capped(x)
     shifted = y * TWO_LOG2_E + ROUNDER
@@ -167,10 +166,7 @@ def tanh(x: wp.float64):
 
 @wp.func
 def order_bits(x: wp.float64):
-    """Bits of a number ≥ 0 as an integer that orders as the number does, NaN above infinity.
-
-    Maxima of integers vectorise and keep a NaN; floating-point ones do neither.
-    """
+    """Bits of a number ≥ 0 as an integer in the same order, NaN highest; maxima of these vectorise and keep a NaN."""
     return wp.cast(wp.abs(x), wp.int64)
 
 

@@ -31,15 +31,9 @@ class Link:
 @wp.func
 def read_link(K: Rows, chain: Chain, i: int) -> Link:
     """Link i, from the rows of the state."""
-    link = Link()
-    link.x = K[layout.X, i]
-    link.y = K[layout.Y, i]
-    link.u = K[layout.U, i]
-    link.v = K[layout.V, i]
-    link.omega = K[layout.OMEGA, i]
-    link.arm_x = chain.half_length * K[layout.COSINE, i]
-    link.arm_y = chain.half_length * K[layout.SINE, i]
-    return link
+    arm_x = chain.half_length * K[layout.COSINE, i]
+    arm_y = chain.half_length * K[layout.SINE, i]
+    return Link(K[layout.X, i], K[layout.Y, i], K[layout.U, i], K[layout.V, i], K[layout.OMEGA, i], arm_x, arm_y)
 
 
 @wp.func

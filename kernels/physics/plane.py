@@ -97,13 +97,9 @@ def place_terms(K: Rows, chain: Chain, i: int):
     mx = mass * x
     my = mass * y
     side = mass * chain.half_width * chain.half_width * THIRD
-    return (
-        mx,
-        my,
-        mx * x + side + inertia * cosine * cosine,
-        mx * y + inertia * cosine * sine,
-        my * y + side + inertia * sine * sine,
-    )
+    xx = mx * x + side + inertia * cosine * cosine
+    yy = my * y + side + inertia * sine * sine
+    return mx, my, xx, mx * y + inertia * cosine * sine, yy
 
 
 @wp.func
@@ -136,12 +132,12 @@ def invert_mass(P: Row):
 
 
 @wp.func
-def plane_times_inverse(P: Row, q0: wp.float64, q1: wp.float64, q2: wp.float64):
+def plane_times_inverse(P: Row, q: wp.vec3d):
     """A⁻¹ q: rates of (u, ω1, ω2) under generalised forces, or their change by impulses."""
-    return (
-        P[layout.INVERSE_00] * q0 + P[layout.INVERSE_01] * q1 + P[layout.INVERSE_02] * q2,
-        P[layout.INVERSE_01] * q0 + P[layout.INVERSE_11] * q1 + P[layout.INVERSE_12] * q2,
-        P[layout.INVERSE_02] * q0 + P[layout.INVERSE_12] * q1 + P[layout.INVERSE_22] * q2,
+    return wp.vec3d(
+        P[layout.INVERSE_00] * q[0] + P[layout.INVERSE_01] * q[1] + P[layout.INVERSE_02] * q[2],
+        P[layout.INVERSE_01] * q[0] + P[layout.INVERSE_11] * q[1] + P[layout.INVERSE_12] * q[2],
+        P[layout.INVERSE_02] * q[0] + P[layout.INVERSE_12] * q[1] + P[layout.INVERSE_22] * q[2],
     )
 
 
@@ -149,34 +145,30 @@ def plane_times_inverse(P: Row, q0: wp.float64, q1: wp.float64, q2: wp.float64):
 class Plane:
     """Values of a plane, see :mod:`layout`."""
 
-    speed: wp.float64
-    turn_x: wp.float64
-    turn_y: wp.float64
+    rates: wp.vec3d  # u, ω1, ω2
     ahead: wp.vec3d
     up: wp.vec3d
     origin: wp.vec3d
 
 
 @wp.func
+def next_three(P: Row, first: int):
+    """Three values from this row on."""
+    return wp.vec3d(P[first], P[first + 1], P[first + 2])
+
+
+@wp.func
 def read_plane(P: Row, first: int) -> Plane:
     """The plane whose values begin at this row."""
-    plane = Plane()
-    plane.speed = P[first + layout.PLANE_SPEED]
-    plane.turn_x = P[first + layout.PLANE_TURN_X]
-    plane.turn_y = P[first + layout.PLANE_TURN_Y]
-    plane.ahead = wp.vec3d(P[first + AHEAD], P[first + AHEAD + 1], P[first + AHEAD + 2])
-    plane.up = wp.vec3d(P[first + UP], P[first + UP + 1], P[first + UP + 2])
-    plane.origin = wp.vec3d(P[first + ORIGIN], P[first + ORIGIN + 1], P[first + ORIGIN + 2])
-    return plane
+    rates = next_three(P, first + layout.PLANE_SPEED)
+    return Plane(rates, next_three(P, first + AHEAD), next_three(P, first + UP), next_three(P, first + ORIGIN))
 
 
 @wp.func
 def write_plane(P: Row, first: int, plane: Plane):
     """Writes a plane's values from this row on."""
-    P[first + layout.PLANE_SPEED] = plane.speed
-    P[first + layout.PLANE_TURN_X] = plane.turn_x
-    P[first + layout.PLANE_TURN_Y] = plane.turn_y
     for k in range(3):
+        P[first + layout.PLANE_SPEED + k] = plane.rates[k]
         P[first + AHEAD + k] = plane.ahead[k]
         P[first + UP + k] = plane.up[k]
         P[first + ORIGIN + k] = plane.origin[k]
@@ -185,10 +177,10 @@ def write_plane(P: Row, first: int, plane: Plane):
 @wp.func
 def momenta(P: Row, plane: Plane):
     """A (u, ω1, ω2), from the sums."""
-    u = plane.speed
-    w1 = plane.turn_x
-    w2 = plane.turn_y
-    return (
+    u = plane.rates[0]
+    w1 = plane.rates[1]
+    w2 = plane.rates[2]
+    return wp.vec3d(
         P[layout.SUM_MASS] * u + P[SUM_MY] * w1 - P[SUM_MX] * w2,
         P[SUM_MY] * u + P[layout.SUM_YY] * w1 - P[layout.SUM_XY] * w2,
         P[SUM_XX] * w2 - P[SUM_MX] * u - P[layout.SUM_XY] * w1,
@@ -199,17 +191,17 @@ def momenta(P: Row, plane: Plane):
 def momentum_rates(P: Row, gravity: wp.float64, plane: Plane):
     """Rates of the plane's momenta, from the sums."""
     weight = gravity * plane.up[2]
-    return (
-        plane.turn_y * P[SUM_MU] - plane.turn_x * P[SUM_MV] - weight * P[layout.SUM_MASS],
-        plane.speed * P[SUM_MV] - plane.turn_y * P[layout.SUM_MOMENT] - weight * P[SUM_MY],
-        plane.turn_x * P[layout.SUM_MOMENT] - plane.speed * P[SUM_MU] + weight * P[SUM_MX],
+    return wp.vec3d(
+        plane.rates[2] * P[SUM_MU] - plane.rates[1] * P[SUM_MV] - weight * P[layout.SUM_MASS],
+        plane.rates[0] * P[SUM_MV] - plane.rates[2] * P[layout.SUM_MOMENT] - weight * P[SUM_MY],
+        plane.rates[1] * P[layout.SUM_MOMENT] - plane.rates[0] * P[SUM_MU] + weight * P[SUM_MX],
     )
 
 
 @wp.func
-def axis_rate(axis: wp.vec3d, w1: wp.float64, w2: wp.float64):
-    """Rates of the components of a room axis along e1, e2, e3."""
-    return wp.vec3d(-w2 * axis[2], w1 * axis[2], w2 * axis[0] - w1 * axis[1])
+def axis_rate(axis: wp.vec3d, rates: wp.vec3d):
+    """Rates of the components of a room axis along e1, e2, e3, on a plane with the rates (u, ω1, ω2)."""
+    return wp.vec3d(-rates[2] * axis[2], rates[1] * axis[2], rates[2] * axis[0] - rates[1] * axis[1])
 
 
 @wp.func
@@ -217,27 +209,25 @@ def moved(start: Plane, slope: Plane, h: wp.float64) -> Plane:
     """The plane ``start`` with its place and attitude moved for h as ``slope`` moves."""
     drift = wp.vec3d(slope.ahead[2], slope.up[2], slope.ahead[0] * slope.up[1] - slope.ahead[1] * slope.up[0])
     end = start
-    end.ahead = start.ahead + h * axis_rate(slope.ahead, slope.turn_x, slope.turn_y)
-    end.up = start.up + h * axis_rate(slope.up, slope.turn_x, slope.turn_y)
-    end.origin = start.origin + (h * slope.speed) * drift
+    end.ahead = start.ahead + h * axis_rate(slope.ahead, slope.rates)
+    end.up = start.up + h * axis_rate(slope.up, slope.rates)
+    end.origin = start.origin + (h * slope.rates[0]) * drift
     return end
 
 
 @wp.func
 def pushed(P: Row, gravity: wp.float64, start: Plane, slope: Plane, h: wp.float64) -> Plane:
     """The plane ``start`` and h times the rates that it has at ``slope``, with A ν̇ = ṗ − Ȧ ν."""
-    u = slope.speed
-    w1 = slope.turn_x
-    w2 = slope.turn_y
-    q0, q1, q2 = momentum_rates(P, gravity, slope)
-    q0 -= P[SUM_MV] * w1 - P[SUM_MU] * w2
-    q1 -= P[SUM_MV] * u + P[RATE_XX + 2] * w1 - P[RATE_XX + 1] * w2
-    q2 -= P[RATE_XX] * w2 - P[SUM_MU] * u - P[RATE_XX + 1] * w1
-    du, d1, d2 = plane_times_inverse(P, q0, q1, q2)
+    u = slope.rates[0]
+    w1 = slope.rates[1]
+    w2 = slope.rates[2]
+    change = wp.vec3d(
+        P[SUM_MV] * w1 - P[SUM_MU] * w2,
+        P[SUM_MV] * u + P[RATE_XX + 2] * w1 - P[RATE_XX + 1] * w2,
+        P[RATE_XX] * w2 - P[SUM_MU] * u - P[RATE_XX + 1] * w1,
+    )
     end = moved(start, slope, h)
-    end.speed = start.speed + h * du
-    end.turn_x = start.turn_x + h * d1
-    end.turn_y = start.turn_y + h * d2
+    end.rates = start.rates + h * plane_times_inverse(P, momentum_rates(P, gravity, slope) - change)
     return end
 
 
@@ -262,12 +252,9 @@ def begin_step(P: Row, gravity: wp.float64, h: wp.float64):
     plane = read_plane(P, 0)
     mean = pushed(P, gravity, plane, pushed(P, gravity, plane, plane, THIRD * h), half)
     write_plane(P, layout.PLANE_MID, mean)
-    p0, p1, p2 = momenta(P, plane)
-    f0, f1, f2 = momentum_rates(P, gravity, mean)
-    P[MOMENTUM] = p0 + half * f0
-    P[MOMENTUM + 1] = p1 + half * f1
-    P[MOMENTUM + 2] = p2 + half * f2
+    momentum = momenta(P, plane) + half * momentum_rates(P, gravity, mean)
     for k in range(3):
+        P[MOMENTUM + k] = momentum[k]
         P[layout.START_XX + k] = P[SUM_XX + k]
 
 
@@ -282,14 +269,8 @@ def end_step(P: Row, gravity: wp.float64, h: wp.float64):
         P[RATE_XX + k] = rate + FIVE_SIXTHS * (rate - P[layout.MEAN_RATE_XX + k])
         P[layout.MEAN_RATE_XX + k] = rate
     mean = read_plane(P, layout.PLANE_MID)
-    f0, f1, f2 = momentum_rates(P, gravity, mean)
-    u, w1, w2 = plane_times_inverse(
-        P, P[MOMENTUM] + half * f0, P[MOMENTUM + 1] + half * f1, P[MOMENTUM + 2] + half * f2
-    )
     end = straightened(moved(read_plane(P, 0), mean, h))
-    end.speed = u
-    end.turn_x = w1
-    end.turn_y = w2
+    end.rates = plane_times_inverse(P, next_three(P, MOMENTUM) + half * momentum_rates(P, gravity, mean))
     write_plane(P, 0, end)
 
 
@@ -297,5 +278,4 @@ def end_step(P: Row, gravity: wp.float64, h: wp.float64):
 def plane_energy(P: Row):
     """Energy [J] of the motion across the plane, from the sums."""
     plane = read_plane(P, 0)
-    p0, p1, p2 = momenta(P, plane)
-    return HALF * (plane.speed * p0 + plane.turn_x * p1 + plane.turn_y * p2)
+    return HALF * wp.dot(plane.rates, momenta(P, plane))

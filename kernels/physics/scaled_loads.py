@@ -19,8 +19,7 @@ I or I − m ℓ²/12 leads to another curve.
 damps every change of shape and vanishes in the stationary state. A link is a chord of its path: its direction and that
 of the path at its middle differ by (θ_{i+1} − 2θ_i + θ_{i−1})/12. Without drag a loop of 180 links at 10 Hz swings for
 15 periods, for any λ, and the remaining amplitude is multiplied by √λ when λ falls at once. With drag the swing is over
-after one period, and the remaining bias is divided by λ. γ is proportional to λ − 1, so drag ends with the scaled
-loads.
+after one period, and the remaining bias is divided by λ. γ is proportional to λ − 1: drag ends with scaled loads.
 """
 
 import warp as wp
@@ -44,12 +43,6 @@ NEVER = wp.constant(wp.float64(1e9))
 
 
 @wp.func
-def scaled_inertia(inertia: wp.float64, mass: wp.float64, length: wp.float64, factor: wp.float64):
-    """Rotary inertia [kg m²] of a link under scaled loads."""
-    return inertia + (factor - ONE) * (inertia - mass * length * length / SIX)
-
-
-@wp.func
 def under_load(own: Chain, factor: wp.float64) -> Chain:
     """The chain in a field of gravity that is multiplied by a factor; for a factor of 1 the same bits."""
     chain = own
@@ -62,7 +55,8 @@ def write_link(K: Rows, model: Model, world: int, i: int, factor: wp.float64):
     """Writes the constants of link i and of joint i, with loads multiplied by a factor, into their rows."""
     mass = model.links[world, OWN_MASS, i]
     length = TWO * model.chains[world].half_length
-    inertia = scaled_inertia(model.links[world, layout.OWN_INERTIA, i], mass, length, factor)
+    own = model.links[world, layout.OWN_INERTIA, i]
+    inertia = own + (factor - ONE) * (own - mass * length * length / SIX)
     K[MASS, i] = mass
     K[layout.INVERSE_MASS, i] = ONE / mass
     K[INERTIA, i] = inertia
@@ -81,17 +75,11 @@ def write_links(K: Rows, model: Model, world: int, factor: wp.float64):
 
 @wp.func
 def crossing_time(speed: wp.float64, gravity: wp.float64, radius: wp.float64, height: wp.float64):
-    """Time [s] in which slow waves cross both sides of a loop.
+    """Time [s] in which slow waves cross both sides of a loop of this speed v [m/s] and height [m].
 
-    At a height y above the lowest point T_e is about ρ g (y + y₀). y₀ is the radius of curvature at that point, about
-    half the sprocket's radius. Slow waves move at c(y) = √(v² + g (y + y₀)) − v; the integral of dy/c has a closed
-    form. Without gravity it is ``NEVER``.
-
-    Args:
-        speed: Of the loop, v [m/s].
-        gravity: Multiplied by the load factor, g [m/s²].
-        radius: Of the sprocket [m].
-        height: Of the loop [m].
+    At a height y above the lowest point T_e is about ρ g (y + y₀), with g [m/s²] multiplied by the load factor. y₀ is
+    the radius of curvature at that point, about half the sprocket's radius [m]. Slow waves move at c(y) = √(v² + g (y +
+    y₀)) − v; the integral of dy/c has a closed form. Without gravity it is ``NEVER``.
     """
     least = HALF * radius * gravity
     square = speed * speed

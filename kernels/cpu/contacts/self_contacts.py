@@ -17,29 +17,27 @@ import functools
 import warp as wp
 
 from warpchain.kernels.contacts import link_pair
-from warpchain.kernels.contacts.link_pair import B_T, DEPTH, Contact, are_neighbours, collide, natural
+from warpchain.kernels.contacts.link_pair import B_T, DEPTH, Contact, are_neighbours, circles_of_links, collide, natural
 from warpchain.kernels.contacts.list_layout import GEOMETRY_COLUMNS, GEOMETRY_ROWS, list_layout
 from warpchain.kernels.contacts.pair_list import square_distance
-from warpchain.kernels.layout import LEFT_X, LEFT_Y, RADIUS, RIGHT_X, RIGHT_Y, X, Y
+from warpchain.kernels.layout import LEFT_X, RADIUS, RIGHT_X, X
 from warpchain.kernels.physics.elementary import TWO, ZERO, order_bits
-from warpchain.kernels.physics.geometry import two
+from warpchain.kernels.physics.geometry import put, two
 from warpchain.kernels.types import Chain, Integers, Rows
 
 # Rows of the CPU's scratch of contacts, one column per pair of joints. First four circles, the left-hand and the
 # right-hand one of joint p, likewise of joint q: its own centre [m], the centre of mass of its link [m] and its radius.
 P_LEFT_HAND, P_RIGHT_HAND, Q_LEFT_HAND, Q_RIGHT_HAND = 0, 5, 10, 15
-END_X, END_Y, CENTER_X, CENTER_Y, END_RADIUS = range(5)
+END_X, CENTER_X, END_RADIUS = 0, 2, 4
 # Then the two contacts of a half, each as a Contact.
 FIRST_CONTACT, SECOND_CONTACT = 20, 27
 
 
 @wp.func
-def copy_circle(K: Rows, G: Rows, row: int, k: int, end_x: wp.float64, end_y: wp.float64, link: int):
+def copy_circle(K: Rows, G: Rows, row: int, k: int, end: wp.vec2d, link: int):
     """Copies a circle, its link's centre of mass and its radius into column k of the scratch."""
-    G[row + END_X, k] = end_x
-    G[row + END_Y, k] = end_y
-    G[row + CENTER_X, k] = K[X, link]
-    G[row + CENTER_Y, k] = K[Y, link]
+    put(G, row + END_X, k, end)
+    put(G, row + CENTER_X, k, two(K, X, link))
     G[row + END_RADIUS, k] = K[RADIUS, link]
 
 
@@ -73,10 +71,10 @@ def self_contacts(columns: int):
             p = natural(L[wp.static(lists.found_first) + first + k])
             q = natural(L[wp.static(lists.found_second) + first + k])
             after = wp.where(q + 1 == n, 0, q + 1)
-            copy_circle(K, G, P_LEFT_HAND, k, K[RIGHT_X, p], K[RIGHT_Y, p], p)
-            copy_circle(K, G, P_RIGHT_HAND, k, K[LEFT_X, p + 1], K[LEFT_Y, p + 1], p + 1)
-            copy_circle(K, G, Q_LEFT_HAND, k, K[RIGHT_X, q], K[RIGHT_Y, q], q)
-            copy_circle(K, G, Q_RIGHT_HAND, k, K[LEFT_X, q + 1], K[LEFT_Y, q + 1], after)
+            copy_circle(K, G, P_LEFT_HAND, k, two(K, RIGHT_X, p), p)
+            copy_circle(K, G, P_RIGHT_HAND, k, two(K, LEFT_X, p + 1), p + 1)
+            copy_circle(K, G, Q_LEFT_HAND, k, two(K, RIGHT_X, q), q)
+            copy_circle(K, G, Q_RIGHT_HAND, k, two(K, LEFT_X, q + 1), after)
             k += 1
 
     @wp.func
@@ -90,14 +88,11 @@ def self_contacts(columns: int):
             p = L[wp.static(lists.found_first) + first + k]
             q = L[wp.static(lists.found_second) + first + k]
             link_a, link_b = link_pair.links_of(p, q, half, second, chain.link_count)
-            contact = link_pair.circles_of_links(
-                G[a + END_RADIUS, k],
-                G[b + END_RADIUS, k],
-                two(G, a + END_X, k),
-                two(G, b + END_X, k),
-                two(G, a + CENTER_X, k),
-                two(G, b + CENTER_X, k),
-            )
+            end_a = two(G, a + END_X, k)
+            end_b = two(G, b + END_X, k)
+            center_a = two(G, a + CENTER_X, k)
+            center_b = two(G, b + CENTER_X, k)
+            contact = circles_of_links(G[a + END_RADIUS, k], G[b + END_RADIUS, k], end_a, end_b, center_a, center_b)
             G[row + DEPTH, k] = wp.where(are_neighbours(link_a, link_b, chain.link_count), ZERO, contact[DEPTH])
             for number in range(1, wp.static(B_T + 1)):
                 G[row + number, k] = contact[number]
@@ -105,16 +100,9 @@ def self_contacts(columns: int):
 
     @wp.func
     def resolve_self_contacts(K: Rows, L: Integers, chain: Chain, opening: wp.float64):
-        """Resolves all contacts of a chain whose list is made; ``opening``: greatest |C| [m].
-
-        Returns:
-            Number of impulses, number of those between strands, energy lost [J], greatest depth [m].
-        """
-        G = wp.array(
-            ptr=L.ptr + wp.uint64(wp.static(4 * lists.geometry)),
-            shape=(GEOMETRY_ROWS, GEOMETRY_COLUMNS),
-            dtype=wp.float64,
-        )
+        """Resolves all contacts → impulses, those of strands, energy lost [J], greatest depth [m]; opening: |C| [m]."""
+        start = L.ptr + wp.uint64(wp.static(4 * lists.geometry))
+        G = wp.array(ptr=start, shape=(GEOMETRY_ROWS, GEOMETRY_COLUMNS), dtype=wp.float64)
         touching = list_touching(K, L, chain, opening)
         impulses = wp.int64(0)
         strands = wp.int64(0)
@@ -145,8 +133,8 @@ def self_contacts(columns: int):
                             contact = Contact()
                             for number in range(wp.static(B_T + 1)):
                                 contact[number] = G[row + number, k]
-                            inverse_nn, inverse_determinant = link_pair.divisors(K, link_a, link_b, contact)
-                            energy, hits = collide(K, chain, link_a, link_b, contact, inverse_nn, inverse_determinant)
+                            inverse_nn, inverse_det = link_pair.divisors(K, link_a, link_b, contact)
+                            energy, hits = collide(K, chain, link_a, link_b, contact, inverse_nn, inverse_det)
                             lost += energy
                             impulses += hits
                             if link_pair.are_strands(link_a, link_b, chain.link_count):

@@ -43,9 +43,8 @@ slowly; the projection takes their remaining energy, which is booked.
 def joint_switch(columns: int, first_row: int):
     """Warp functions (close joints, open joints) for flights in the rows from ``first_row`` on.
 
-    Returns:
-        ``close_joints(K, chain)`` → whether they are closed now, and the energy lost [J]; if not, nothing has changed.
-        ``open_joints(K, chain)``, right after a step of the flight and its impulses → the energy lost [J], negative.
+    ``close_joints(K, chain)`` → whether they are closed now, and the energy lost [J]; if not, nothing has changed.
+    ``open_joints(K, chain)``, right after a step of the flight and its impulses → the energy lost [J], negative.
     """
     rows = segment_rows(columns, first_row)
     close = rigid.closing(columns, first_row)

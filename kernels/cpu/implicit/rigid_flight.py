@@ -8,8 +8,7 @@ y = z_θ − r_θ and joint i between the links l and r,
     (1/m_l + 1/m_r) λ_i − λ_i−1/m_l − λ_i+1/m_r + a (t_l y_l + t_r y_r) = 0,
     I_i y_i + g (D y)_i − a t_i·(λ_i + λ_i−1) = −g (D r_θ)_i:
 
-a cyclic block-tridiagonal system with 3 × 3 submatrices for (λ_i, y_i). Its symmetric part is positive definite, so no
-pivoting is needed.
+a cyclic block-tridiagonal system (3 × 3) for (λ_i, y_i). Its symmetric part is positive definite: it needs no pivoting.
 
 The spin w of some joint passes through zero a thousand times a second in a loop. Coulomb friction then changes its sign
 within a millionth of a step; to resolve that, steps of a few µs would be needed. So friction is smoothed over a part of
@@ -154,9 +153,8 @@ def keep_stage(S: Rows, stage: int, h: wp.float64, chain: Chain):
 def flight_method(columns: int, first_row: int):
     """Warp functions of rigid flight with memory from ``first_row`` on.
 
-    Returns:
-        ``attempt(K, chain, h, tolerance)`` → bits of the greatest error ratio (see :func:`order_bits`), and
-        ``commit(K, chain, h)``, which projects the new state → whether joints may stay rigid.
+    ``attempt(K, chain, h, tolerance)`` → bits of the greatest error ratio (see :func:`order_bits`);
+    ``commit(K, chain, h)``, which projects the new state → whether joints may stay rigid.
     """
     rows = at.segment_rows(columns, first_row)
     close = closing(columns, first_row)

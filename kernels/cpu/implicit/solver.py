@@ -4,8 +4,7 @@ Row i of the system is L_i x_{i−1} + D_i x_i + U_i x_{i+1} = r_i, indices modu
 the loop is one long sequence of dependent operations. So the loop is cut into eight segments that are eliminated side
 by side, one in each lane of a vector (H. H. Wang, ACM TOMS 7 (1981) 170). The last row of each segment is a
 *separator*. Once the other rows are eliminated, the eight separators form a small cyclic system. Three rounds of
-parallel cyclic reduction (R. W. Hockney, J. ACM 12 (1965) 95), again in all lanes at once, leave one unknown in each
-equation.
+parallel cyclic reduction (R. W. Hockney, J. ACM 12 (1965) 95), again in all lanes, leave one unknown in each equation.
 
 Submatrices are inverted by cofactors, without pivoting: the matrices are close to symmetric positive definite ones, for
 which this elimination is stable. On matrices of chains errors are as large as LAPACK's up to a condition number of 1e3
@@ -192,11 +191,8 @@ def cyclic_solver(layout: SegmentLayout):
     """Warp functions (factor, solve) for systems that lie as this layout says.
 
     They are native code on vectors of all segments, which keeps the results of the previous place in registers. Warp
-    loops over lanes passed them through memory, and the processor waited for its stores.
-
-    Returns:
-        ``factor(S, places, full)`` and ``solve(S, places, full)``. Whatever S holds at a repeated separator, its matrix
-        is taken to be L = −1, D = 1, U = 0, its right-hand side 0.
+    loops over lanes passed them through memory, and the processor waited for its stores. Whatever S holds at a repeated
+    separator, its matrix is taken to be L = −1, D = 1, U = 0, its right-hand side 0.
     """
     size = layout.size
     square = size * size

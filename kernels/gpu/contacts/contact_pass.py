@@ -24,11 +24,9 @@ from warpchain.kernels.types import Control, Drive, State
 def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, plane: BlockPlane):
     """Warp functions (begin, meet) of the contacts, for all threads of a block.
 
-    Returns:
-        ``begin(run, state, control, proximity)`` → number of listed pairs, longest step [s] that cannot miss a contact
-        (see :func:`gpu.contacts.proximity.block_proximity`), status. The board is written, and a barrier passed.
-        ``meet(run, drive, state, control, time, proximity, pairs)`` → whether anything was hit, and the same three
-        after the step.
+    ``begin(run, state, control, proximity)`` → number of listed pairs, longest step [s] that cannot miss a contact (see
+    ``time_to_contact`` of :mod:`gpu.contacts.proximity`), status. The board is written, and a barrier passed.
+    ``meet(run, drive, state, control, time, proximity, pairs)`` → whether anything was hit, then these three anew.
     """
     lists = list_layout(features.columns)
     has_fixed = features.fixed_body != "none"
@@ -72,19 +70,13 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
 
     @wp.func
     def meet(
-        run: Run,
-        drive: Drive,
-        state: State,
-        control: Control,
-        time: wp.float64,
-        proximity: Proximity,
-        pairs_before: int,
+        run: Run, drive: Drive, state: State, control: Control, time: wp.float64, proximity: Proximity, listed: int
     ):
         T = run.T
         lane = run.lane
         gap = proximity.gap
         opening = proximity.opening
-        pairs = pairs_before
+        pairs = listed
         slack = list_slack(run, opening, proximity.displacement)
         status = int(RUNNING)
         is_hit = bool(False)

@@ -114,12 +114,10 @@ def block_proximity(features: Features, block_dim: int):
     def read_proximity(run: Run) -> Proximity:
         """Maxima over all links, after a barrier."""
         values = read_maxima(run.maxima)
-        proximity = Proximity()
-        proximity.opening = quick_root(wp.cast(values[0], wp.float32))
-        proximity.gap = -from_order_key_single(values[1])
-        proximity.displacement = quick_root(wp.cast(values[2], wp.float32))
-        proximity.speed = quick_root(wp.cast(values[3], wp.float32))
-        return proximity
+        opening = quick_root(wp.cast(values[0], wp.float32))
+        displacement = quick_root(wp.cast(values[2], wp.float32))
+        speed = quick_root(wp.cast(values[3], wp.float32))
+        return Proximity(opening, -from_order_key_single(values[1]), displacement, speed)
 
     @wp.func
     def time_to_contact(control: Control, pairs: int, gap: wp.float32, slack: wp.float32, speed: wp.float32):

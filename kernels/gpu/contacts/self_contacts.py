@@ -121,9 +121,8 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         T = run.T
         lane = run.lane
         if lane < run.links:
-            T[wp.static(touch.owners) + lane] = FREE
-            T[wp.static(touch.owners + touch.width) + lane] = FREE
-            T[wp.static(touch.owners + 2 * touch.width) + lane] = FREE
+            for k in range(3):
+                T[wp.static(touch.owners + k * touch.width) + lane] = FREE
         if lane == 0:
             T[wp.static(touch.touching)] = 0
 
@@ -184,11 +183,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
 
     @wp.func
     def prepare(run: Run, chain: Chain, key: int):
-        """Stores the geometry of a thread's first contact.
-
-        Returns:
-            Its key, or DONE if the circles do not overlap, and its depth [m].
-        """
+        """Stores the geometry of a thread's first contact; its key, or DONE without an overlap, and its depth [m]."""
         lane = run.lane
         contact, inverse_nn, inverse_determinant = circles_at(run.K, chain, key)
         depth = contact[DEPTH]
@@ -220,19 +215,6 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         lane = run.lane
         contact = Contact(depth, E[0, lane], E[1, lane], E[2, lane], E[3, lane], E[4, lane], F[0, lane])
         return hit(run, chain, link_a, link_b, contact, F[1, lane], F[2, lane])
-
-    @wp.func
-    def overlaps(run: Run, chain: Chain, key: int):
-        """1 if the circles of a further contact overlap, else 0; raises the greatest depth."""
-        contact, _inverse_nn, _inverse_determinant = circles_at(run.K, chain, key)
-        raise_depth(run.T, contact[DEPTH])
-        return wp.where(contact[DEPTH] > ZERO, 1, 0)
-
-    @wp.func
-    def resolve_further(run: Run, chain: Chain, key: int, link_a: int, link_b: int):
-        """Resolves a further contact; returns the number of impulses."""
-        contact, inverse_nn, inverse_determinant = circles_at(run.K, chain, key)
-        return hit(run, chain, link_a, link_b, contact, inverse_nn, inverse_determinant)
 
     @wp.func
     def resolve(run: Run, chain: Chain, touching: int):
@@ -268,7 +250,9 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
             k = lane + wp.static(block_dim)
             while k < contacts:
                 key = contact_key(pair_at(L, T, k >> 1), turn, k & 1)
-                touches = overlaps(run, chain, key)
+                contact, _inverse_nn, _inverse_det = circles_at(run.K, chain, key)
+                raise_depth(T, contact[DEPTH])
+                touches = wp.where(contact[DEPTH] > ZERO, 1, 0)
                 L[wp.static(lists.pending) + k] = touches
                 left += touches
                 if touches != 0:
@@ -289,7 +273,8 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
                         key = contact_key(pair_at(L, T, k >> 1), turn, k & 1)
                         link_a, link_b = links_at(key, chain.link_count)
                         if owns_links(T, owners, link_a, link_b, key):
-                            impulses += resolve_further(run, chain, key, link_a, link_b)
+                            contact, inverse_nn, inverse_det = circles_at(run.K, chain, key)
+                            impulses += hit(run, chain, link_a, link_b, contact, inverse_nn, inverse_det)
                             left -= 1
                             L[wp.static(lists.pending) + k] = 0
                         else:
