@@ -114,7 +114,7 @@ def damp(S: Rows, h: wp.float64, weight: wp.float64, chain: Chain):
     """Solves for (λ, y) of a stage from its accelerations; adds its part of the power lost to friction."""
     c = int(8)
     while c < end_column(chain):
-        coupled = S[COUPLED + 2, c]
+        coupled = S[COUPLED + 2, c]  # not in the sum: clang would fuse the other product
         S[TARGET, c] = h * S[RATE + 2, c] + wp.static(wp.float64(1.0 / GAMMA)) * coupled
         c += 1
     at.pad_behind(S, TARGET, 1, chain)
