@@ -51,7 +51,7 @@ def spline_of(variable: Prediction, unit: Prediction) -> Fit:
     """Fits the spline of Δx in a unit over a variable; no further numbers."""
 
     def fit(points: Points) -> tuple[Array, Prediction]:
-        curve = laws.master_curve(variable(points), points.distance / unit(points))
+        curve, _ = laws.master_curve(variable(points), points.distance / unit(points))
         return np.array([]), lambda others: curve(variable(others)) + np.log(unit(others))
 
     return fit

@@ -97,7 +97,7 @@ def draw_laws(points: laws.Points) -> Figure:
     }
     for axes, (name, x) in zip(grid, variables.items(), strict=False):
         image = axes.scatter(x, y, c=points.links, s=12, cmap="viridis")
-        fine, curve = np.geomspace(x.min(), x.max(), 200), laws.master_curve(x, y)
+        fine, curve = np.geomspace(x.min(), x.max(), 200), laws.master_curve(x, y)[0]
         axes.plot(fine, np.exp(curve(fine)), color=INK, linewidth=1)
         title = f"residual {laws.rms_residual(x, y):.1f} %"
         tidy(axes, title, grid="both", xscale="log", yscale="log", xlabel=name, ylabel="Δx/(nℓ)")

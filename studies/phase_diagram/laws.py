@@ -51,8 +51,8 @@ def points_of(cells: Columns) -> Points:
     return np.rec.fromarrays(columns, names="links,frequency,distance,duration,speed,length,turns,lengths,height")
 
 
-def master_curve(x: Array, y: Array) -> Callable[[Array], Array]:
-    """ln y as a cubic spline of ln x, by least squares; knots at equal shares of the points."""
+def master_curve(x: Array, y: Array) -> tuple[Callable[[Array], Array], Array]:
+    """ln y as a cubic spline of ln x, by least squares, and what it leaves; knots at equal shares of the points."""
     abscissa = np.log(x)
     inner, low, high = np.quantile(abscissa, np.linspace(0, 1, PIECES + 1)[1:-1]), abscissa.min(), abscissa.max()
     knots = np.r_[[low] * 4, np.unique(inner[(inner > low) & (inner < high)]), [high] * 4]
@@ -61,13 +61,14 @@ def master_curve(x: Array, y: Array) -> Callable[[Array], Array]:
         clipped = np.clip(np.log(values), low, high)
         return BSpline.design_matrix(clipped, knots, 3).toarray()
 
-    weights = np.linalg.lstsq(design(x), np.log(y), rcond=None)[0]
-    return lambda values: design(values) @ weights
+    at_points = design(x)
+    weights = np.linalg.lstsq(at_points, np.log(y), rcond=None)[0]
+    return lambda values: design(values) @ weights, np.log(y) - at_points @ weights
 
 
 def rms_residual(x: Array, y: Array) -> float:
     """What the master curve leaves of ln y, root mean square in per cent."""
-    return root_mean_square(np.log(y) - master_curve(x, y)(x), NUMBERS)
+    return root_mean_square(master_curve(x, y)[1], NUMBERS)
 
 
 def residual_of(points: Points, c: float, d: float) -> float:
@@ -102,7 +103,7 @@ def root_mean_square(left: Array, numbers: int = 0) -> float:
 
 def slopes(points: Points) -> str:
     """Steepness of the curve of Δx/(nℓ) over v/(nℓ) at some places, in words."""
-    x, curve, width = points.turns, master_curve(points.turns, points.lengths), 1.05
+    x, curve, width = points.turns, master_curve(points.turns, points.lengths)[0], 1.05
     places = np.array([place for place in PLACES if x.min() * width < place < x.max() / width])
     rise = (curve(places * width) - curve(places / width)) / (2 * np.log(width))
     texts = [

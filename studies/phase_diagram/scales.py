@@ -91,7 +91,7 @@ def best_exponents(cells: Cells, curve: Curve, chosen: Array) -> Array:
 
 def table(cells: Cells, points: laws.Points) -> str:
     """Markdown: residuals of the cells with each time, and the best exponents."""
-    count, rows, curve = len(cells.names), [], laws.master_curve(points.turns, points.lengths)
+    count, rows, curve = len(cells.names), [], laws.master_curve(points.turns, points.lengths)[0]
     groups = {name: cells.varied(word) for word, name in BLOCKS.items()} | {"all": np.arange(count)}
     for name, exponents in TIMES.items():
         left = left_of(cells, curve, exponents)
@@ -129,7 +129,7 @@ def draw(cells: Cells, points: laws.Points) -> Figure:
         ("v/(nℓ), turns of the loop / s⁻¹", TIMES["a constant"], 1.0),
         ("v √(R/g)/(nℓ), turns of the loop in the time √(R/g)", TIMES["(R/g)^½"], NORMAL_TIME),
     )
-    curve = laws.master_curve(points.turns, points.lengths)
+    curve = laws.master_curve(points.turns, points.lengths)[0]
     fine = np.geomspace(points.turns.min(), points.turns.max(), 200)
     for axes, (label, exponents, unit) in zip(figure.subplots(1, 2, sharey=True), panels, strict=True):
         axes.scatter(points.turns * unit, points.lengths, s=8, color=FAINT, label="phase diagram")
