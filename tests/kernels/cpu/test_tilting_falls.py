@@ -188,8 +188,7 @@ def test_hard_case_ends_soundly(name):
     """It ends with a status that is no error, finite, and with all of its energy accounted for."""
     tap, values, status = HARD[name]
     parameters = SOFT.with_values(values)
-    # springs that ring for seconds at the limit of stability: at 1e-4 a thousandth of the energy is booked as damped or
-    # gained
+    # springs ring for seconds at the limit of stability: at 1e-4 the ledger is wrong by a thousandth of the energy
     tolerance = 1e-6 if name == "no gravity" else 1e-4
     fallen = fall(released(20, parameters, **tap), parameters, tolerance)
     assert fallen.batch.status(0) in ((Status.AT_REST, Status.TIME_LIMIT) if status is None else (status,))
