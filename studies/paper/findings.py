@@ -5,13 +5,11 @@ and, by name, what the words of the claim in claims.yaml need.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from studies.common import minus, read_columns
-from studies.paper.figure5 import RESULTS as FIGURE5
+from studies.common import minus
 from studies.paper.statistics import Effect, percent, plain
 from studies.paper.verdicts import BOUNDS, Verdict, direction, share, together
 from studies.waves import directions, doses
@@ -207,9 +205,7 @@ def lost_on_floor(numbers: Numbers) -> Found:
 
 def sliding(numbers: Numbers) -> Found:
     """Less friction of the floor lets a chain slide for longer after its collapse."""
-    found = numbers["paper_more"]["more"]["sliding"].items()
-    times = [replace(each["time"], notes={"value": float(value)}) for value, each in found]
-    return monotonic(numbers, "floor_friction", times, -1)
+    return monotonic(numbers, "floor_friction", numbers["paper_more"]["sliding"], -1)
 
 
 def monotonic(numbers: Numbers, name: str, values: Sequence[Effect], slope: int) -> Found:
@@ -288,20 +284,10 @@ def nonlinear(numbers: Numbers) -> Found:
     return together(*fails), {"shares": "; ".join(texts)}
 
 
-def figure5_shape(numbers: Numbers) -> Found:
-    """Curves of other cells bounce, change v_x in impacts only, and do not turn back."""
-    found = read_columns(FIGURE5)
-    alike = int(np.sum((found["rises"] > 0) & (found["changes_in_impacts"] > 0.9) & (found["backwards"] < 0.1)))
-    cells = zip(found["links"], found["frequency"], found["rises"], strict=True)
-    without = (f"{links:g} × {frequency:g} Hz" for links, frequency, rises in cells if rises == 0)
-    words = {"alike": alike, "cells": len(found["rises"]), "without": ", ".join(without)}
-    return share(alike, len(found["rises"])), words
-
-
 def same_distributions(numbers: Numbers) -> Found:
     """Δx is distributed alike at both tolerances."""
     found = numbers["paper_distributions"]["distributions"]
     alike, least = sum(each["p"] > 0.05 for each in found), min(each["p"] for each in found)
     cells = ", ".join(f"{each['links']} × {each['frequency']:g} Hz" for each in found)
-    words = {"alike": alike, "count": len(found), "cells": cells, "walks": found[0]["walks"][0], "least": least}
+    words = {"alike": alike, "count": len(found), "cells": cells, "walks": found[0]["walks"], "least": least}
     return share(alike, len(found)), words

@@ -1,11 +1,11 @@
-"""Numbers of further sweeps: strands, what the paper leaves open, rest against long holds, its last sentences."""
+"""Numbers of further sweeps: strands, what the paper leaves open, its last sentences."""
 
 from itertools import combinations_with_replacement, product
 from typing import Any
 
 import numpy as np
 import xarray
-from scipy.stats import chi2, ks_2samp
+from scipy.stats import ks_2samp
 
 from studies.common import DRAWN, Array, Block, at_rest, mean
 from studies.paper.statistics import paired, spread, unpaired
@@ -13,11 +13,7 @@ from studies.paper.statistics import paired, spread, unpaired
 Cells = xarray.DataArray  # Values of walks at rest, axes links and frequency in front, samples last
 Numbers = dict[str, Any]
 
-EVENTS = {
-    "crease": "bounces_before_self_contact",
-    "strands": "bounces_before_strands_met",
-    "collapse": "bounces_before_collapse",
-}
+EVENTS = {"crease": "bounces_before_self_contact", "strands": "bounces_before_strands_met"}
 """What happens to a loop: name → column with the number of bounces begun before it, −1 if it never does."""
 CELLS = ("links", "frequency")
 
@@ -45,7 +41,7 @@ def histogram(bounces: Array) -> Array:
 
 
 def strands(block: Block) -> Numbers:
-    """When loops crease, their strands meet and they collapse, by start and links; how gradually they lose their area.
+    """When loops crease and their strands meet, by start and links; how gradually they lose their area.
 
     Early is a walk whose strands met before its third bounce; walks are taken relative to the means of their cells.
     """
@@ -104,39 +100,6 @@ def explained(values: Array, terms: list[Array]) -> float:
     return float(1 - left / values.var(ddof=1))
 
 
-HEIGHT, ENERGY = "sprocket_height", "energy_kinetic_at_release"
-
-
-def every(block: Block, values: Array) -> Cells:
-    """Values of all walks of a block with named axes."""
-    return xarray.DataArray(values, block.axes, block.dims)
-
-
-def loops(block: Block) -> Numbers:
-    """Height of the sprocket over the floor [µm] and kinetic energy [µJ] at the release, means over the phases."""
-    held = [name for name in ("start", "further_hold") if name in block.dims]
-    found: Numbers = {name: block.axes[name] for name in held}
-    for name, column in (("height", HEIGHT), ("energy", ENERGY)):
-        values = every(block, block.columns[column]).transpose(*CELLS, *held, ...).values
-        found[name] = np.rint(1e6 * values.mean(axis=tuple(range(2 + len(held), values.ndim)))).astype(int)
-    return found
-
-
-def same_loops(block: Block) -> Numbers:
-    """Loops at their release, from rest less spinning, pairs of samples: height and place [µm], energy, relative."""
-    places = np.empty(block.columns["status"].shape)
-    for at in np.ndindex(places.shape):
-        places[at] = block.walk_motion(at).center[0, 0]
-    found: Numbers = {}
-    for name, values in (("height", block.columns[HEIGHT]), ("place", places), ("energy", block.columns[ENERGY])):
-        table = every(block, values).transpose(*CELLS, "start", "sample")
-        spinning = table.sel(start="spinning").values
-        change = table.sel(start="rest").values - spinning
-        change = change / spinning if name == "energy" else 1e6 * change
-        found[name] = [change.mean(), np.abs(change).max()]
-    return found | {"pairs": change.size}
-
-
 REFERENCES = {
     "start": "rest",
     "sprocket_radius_is": "contact",
@@ -167,65 +130,24 @@ def left_open(*blocks: Block) -> Numbers:
     return found
 
 
-def rest_and_hold(block: Block) -> Numbers:
-    """Differences of Δx between starts, and between holds, over the cells, with χ² of no difference at all."""
-    table, holds = at_rest(block), block.axes["further_hold"]
-    least, most = holds.min(), holds.max()
-    pairs = {
-        f"rest, at once, over spinning, {most:g} s later": (("rest", least), ("spinning", most)),
-        "rest over spinning, released at once": (("rest", least), ("spinning", least)),
-        f"rest over spinning, both {most:g} s later": (("rest", most), ("spinning", most)),
-        f"{most:g} s later over at once, rest": (("rest", most), ("rest", least)),
-        f"{most:g} s later over at once, spinning": (("spinning", most), ("spinning", least)),
-    }
-    found = {}
-    for name, pair in pairs.items():
-        effect = paired(*(table.sel(start=start, further_hold=hold) for start, hold in pair))
-        over = effect.cells
-        summary = {"mean": over.mean, "error": over.error, "chi2": over.chi2, "cells": len(over)}
-        found[name] = {**effect.plain, **summary, "p": chi2.sf(over.chi2, len(over))}
-    return found
-
-
-FRICTION, DAMPING = 0.27, 1000.0  # Of the floor and of joints, in Table 1
-OWN_LENGTH = "links_of_12_7_mm"
-LENGTHS = {"11": "links_of_11_mm", "15": "links_of_15_mm", "18": "links_of_18_mm"}
-"""Links of other lengths [mm], with the masses and inertias of their length, and their blocks."""
-
-
-def more(*blocks: Block) -> Numbers:
-    """Longer links of their mass, sliding with less friction, undamped joints."""
-    known = {block.name: block for block in blocks}
-    lengths = {
-        length: {
-            quantity: unpaired(of(known[name]), of(known[OWN_LENGTH])).plain
-            for quantity, of in (("dx", at_rest), ("until_collapse", until_collapse))
-        }
-        for length, name in LENGTHS.items()
-    }
-    block, sliding = known["sliding"], {}
-    slid = at_rest(block, "walk_time") - at_rest(block, "collapsed_at")
-    for name, table in (("time", slid), ("dx", at_rest(block))):
-        for each in values_of(table, "floor_friction", FRICTION):
-            sliding.setdefault(f"{each.pop('value'):g}", {})[name] = each
-    undamped = values_of(at_rest(known["undamped_joints"]), "joint_damping", DAMPING)
-    return {"lengths": lengths, "sliding": sliding, "undamped": {f"{each.pop('value'):g}": each for each in undamped}}
+def sliding(*blocks: Block) -> list[Numbers]:
+    """What the friction of the floor does to the time from the collapse to rest; other blocks are left aside."""
+    (block,) = (block for block in blocks if block.name == "sliding")
+    return values_of(at_rest(block, "walk_time") - at_rest(block, "collapsed_at"), "floor_friction", 0.27)
 
 
 def until_collapse(block: Block) -> Cells:
     """Number of bounces before the loop collapses, or all bounces of a loop that never does."""
-    collapse = at_rest(block, EVENTS["collapse"])
+    collapse = at_rest(block, "bounces_before_collapse")
     return xarray.where(collapse < 0, at_rest(block, "bounces"), collapse)
 
 
 def distributions(block: Block) -> list[Numbers]:
-    """Of each cell: Δx at both tolerances, and whether it is of one distribution (Kolmogorov and Smirnov)."""
+    """Of each cell: number of walks, and p of one distribution of Δx at both tolerances (Kolmogorov and Smirnov)."""
     table, found = at_rest(block), []
     for links, frequency in product(*(block.axes[name].tolist() for name in CELLS)):
         cell = table.sel(links=links, frequency=frequency)
         both = [cell.sel(each).dropna("sample").values for each in extremes(block)]
-        test = ks_2samp(*both)
-        content = {"links": links, "frequency": frequency, "distance": test.statistic, "p": test.pvalue}
-        content |= {"means": [each.mean() for each in both], "sds": [each.std(ddof=1) for each in both]}
-        found.append(content | {"walks": [len(each) for each in both]})
+        known = {"links": links, "frequency": frequency, "walks": len(both[0])}
+        found.append(known | {"p": ks_2samp(*both).pvalue})
     return found

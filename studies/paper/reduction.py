@@ -177,12 +177,8 @@ WHOLE: dict[str, tuple[str, Callable[..., Any]]] = {
     "paper_through": ("through", further.through),
     "paper_through_ellipse": ("through", further.through),
     "paper_open": ("left_open", further.left_open),
-    "paper_rest": ("rest_and_hold", further.rest_and_hold),
-    "paper_loops": ("loops", further.loops),
-    "paper_held": ("loops", further.loops),
-    "paper_starts": ("same", further.same_loops),
     "paper_footnote": ("nonlinear", further.nonlinear),
-    "paper_more": ("more", further.more),
+    "paper_more": ("sliding", further.sliding),
     "paper_distributions": ("distributions", further.distributions),
 }
 """Sweeps that one function reduces, of its blocks: name → key of its numbers, and the function."""

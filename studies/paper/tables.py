@@ -14,10 +14,9 @@ from typing import Any
 import numpy as np
 import yaml
 
-from studies.common import minus, table
-from studies.paper import figure5, findings, separations
+from studies.common import table
+from studies.paper import findings
 from studies.paper.findings import Numbers
-from studies.paper.further import EVENTS
 from studies.paper.statistics import percent, plain
 from studies.paper.verdicts import BOUNDS, Verdict
 from warpchain import Parameters
@@ -38,8 +37,6 @@ WORDS = {"pitch": "where joints ride", "contact": "where circles touch"}
 def page(numbers: Numbers) -> str:
     """The page."""
     template = Path(__file__).with_name("page.txt").read_text(encoding="utf-8")
-    template = template.replace("{{figure5}}", figure5.figure5_table())
-    template = template.replace("{{separations}}", separations.separations_tables())
     return re.sub(r"\{\{(\w+)\}\}", lambda match: globals()[match[1]](numbers), template)
 
 
@@ -182,25 +179,10 @@ def friction(numbers: Numbers) -> str:
 
 def walks(numbers: Numbers) -> str:
     """How many walks there are, and how they ended."""
-    total: Counter[str] = Counter()
-    for content in numbers.values():
-        total.update({name: count for name, count in content["walks"].items() if name != "missing"})
-    parts = [f"{total.total():,} walks: {total['at_rest']:,} at rest"]
-    parts += [f"{count} {name}" for name, count in total.items() if name != "at_rest" and count]
+    total = sum((Counter(content["walks"]) for content in numbers.values()), Counter())
+    parts = (f"{count:,} {name.replace('_', ' ')}" for name, count in total.items())
     inaccurate = sum(content["inaccurate"] for content in numbers.values())
     return f"{', '.join(parts)}; {inaccurate} with an energy error above 5 %"
-
-
-def contacts(numbers: Numbers) -> str:
-    """When loops crease, their strands meet and they collapse, by start and links."""
-    content, rows = numbers["paper_strands"], []
-    for start in ("rest", "ellipse"):
-        for links, each in zip(content["cells"]["links"], content["strands"]["starts"][start], strict=True):
-            early = each.get("early_over_late", "—")
-            for event, text in zip(EVENTS, ("first crease", "strands meet", "collapse"), strict=True):
-                shares = (f"{100 * count / max(1, sum(each[event])):.0f} %" for count in each[event])
-                rows.append((start, links, text, *shares, early if event == "strands" else ""))
-    return table("start | links |  | before | after 1 | after 2 | after 3 | later | never | early over late", rows)
 
 
 def through(numbers: Numbers) -> str:
@@ -227,33 +209,6 @@ def left_open(numbers: Numbers) -> str:
     return table("left open | value | Δx, mean of cells | typical | least and greatest cell | spread of a walk", rows)
 
 
-def rest(numbers: Numbers) -> str:
-    """Released from rest and spinning, at once and later."""
-    content, rows = numbers["paper_rest"], []
-    links = np.array(content["cells"]["links"])
-    for name, effect in content["rest_and_hold"].items():
-        found, short, long = effect.notes, effect[links < 150].cells, effect[links >= 150].cells
-        means = ((found["mean"], found["error"]), (short.mean, short.error), (long.mean, long.error))
-        texts = (minus(f"{100 * mean:+.2f} ± {100 * error:.2f} %") for mean, error in means)
-        pairs = f"{effect.pairs[effect.known].sum()} in {found['cells']}"
-        rows.append([name, *texts, pairs, f"{found['chi2']:.1f}, {found['p']:.2g}"])
-    head = "Δx | all cells | 60 and 120 links | 150 and 180 links | pairs, cells | χ² of no difference, p"
-    return table(head, rows)
-
-
-def lengths(numbers: Numbers) -> str:
-    """Links of other lengths with the masses and inertias of their length, and with those of Table 1."""
-    known, rows = numbers["paper_claims"], []
-    alone = [
-        {f"{1000 * effect.notes['value']:g}": effect for effect in content["values"]}
-        for content in (known["effects"]["link_length"], known["collapse"])
-    ]
-    for length, found in numbers["paper_more"]["more"]["lengths"].items():
-        own = [each.get(length, "—") for each in alone]
-        rows.append([f"{length} mm", found["dx"], own[0], found["until_collapse"], own[1]])
-    return table(["ℓ", "Δx, bars of that length", "ℓ alone", "bounces until the collapse, bars", "ℓ alone"], rows)
-
-
 def nonlinear(numbers: Numbers) -> str:
     """What explains the variance of Δx in a cell, by start."""
     content, rows = numbers["paper_footnote"], []
@@ -262,65 +217,3 @@ def nonlinear(numbers: Numbers) -> str:
             shares = (max(0.0, found[name][i, j]) for name in ("linear", "squares", "products", "repeated"))
             rows.append([start, f"{links} × {frequency:g} Hz", *(f"{100 * share:.0f} %" for share in shares)])
     return table("start | cell | linear terms | and squares, turning phase | and products | all but chaos", rows)
-
-
-def loops(numbers: Numbers) -> str:
-    """How loops at their release differ from those that spun from the start and were held longest."""
-    content, held = numbers["paper_loops"], numbers["paper_held"]
-    found, links = content["loops"], np.array(content["cells"]["links"])
-    height, energy = found["height"], found["energy"]
-    least = [each[:, :, found["start"].index("spinning"), -1] for each in (height, energy)]
-    there = np.isin(links, held["cells"]["links"])
-    known = {
-        f"{start}, held on for {seconds:g} s": (height[:, :, which, hold], energy[:, :, which, hold], links >= 0)
-        for which, start in enumerate(found["start"])
-        for hold, seconds in enumerate(found["further_hold"])
-    }
-    known["spinning, held for 30 s under its own loads"] = held["loops"]["height"], held["loops"]["energy"], there
-    rows = []
-    for name, (high, kinetic, chosen) in known.items():
-        mm, share, row = 1e-3 * (high - least[0][chosen]), kinetic / least[1][chosen] - 1, [name]
-        for part in (links[chosen] >= 150, links[chosen] < 150):
-            if not part.any():
-                row += ["", ""]
-                continue
-            ends = f"{mm[part].mean():+.2f} ({mm[part].min():+.2f} to {mm[part].max():+.2f})"
-            row += [minus(ends), f"{100 * np.abs(share[part]).max():.2f} %"]
-        rows.append(row)
-    return table("start | height / mm, 150 and 180 links | energy, at most | 60 and 120 links | energy, at most", rows)
-
-
-def same(numbers: Numbers) -> str:
-    """How loops of the same samples differ that came to spin in two ways, in words."""
-    found = numbers["paper_starts"]["same"]
-    texts = []
-    for name, words, scale, digits, unit in (
-        ("height", "in height", 1e-3, 2, "mm"),
-        ("place", "in the place of the centre of mass", 1e-3, 3, "mm"),
-        ("energy", "in energy", 100, 3, "%"),
-    ):
-        mean, greatest = (scale * each for each in found[name])
-        texts.append(f"{words} by {mean:+.{digits}f} {unit} (greatest {greatest:.{digits}f})")
-    return minus(f"{found['pairs']} pairs of loops differ on average {', '.join(texts)}")
-
-
-def sliding(numbers: Numbers) -> str:
-    """Time from the collapse to rest, and Δx, with other frictions of the floor."""
-    rows = []
-    for value, found in numbers["paper_more"]["more"]["sliding"].items():
-        rows.append([value, found["time"], f"{found['time'].rises}, {found['time'].falls}", found["dx"]])
-    return table("μ_fc | time from collapse to rest | cells that rise, fall | Δx", rows)
-
-
-def distributions(numbers: Numbers) -> str:
-    """Distributions of Δx at both tolerances."""
-    rows = []
-    for each in numbers["paper_distributions"]["distributions"]:
-        both = (f"{mean:.4f} ± {sd:.4f}" for mean, sd in zip(each["means"], each["sds"], strict=True))
-        rows.append([f"{each['links']} × {each['frequency']:g} Hz", *both, each["distance"], each["p"]])
-    return table("cell | Δx at 1e-6 / m | at 1e-9 / m | greatest distance | p", rows, "s s s .2f .2f")
-
-
-def undamped(numbers: Numbers) -> str:
-    """What little or no damping of the joints does to Δx, in words."""
-    return ", ".join(f"b = {value}: {each}" for value, each in numbers["paper_more"]["more"]["undamped"].items())
