@@ -126,7 +126,7 @@ def ranges(cells: Columns) -> dict[str, Points]:
     }
 
 
-def table(cells: Columns, varied: scales.Cells) -> str:
+def table(cells: Columns) -> str:
     """Markdown: what each law leaves, and what it leaves of blocks that it has not seen; then numbers with errors."""
     known = ranges(cells)
     rows = []
@@ -137,8 +137,8 @@ def table(cells: Columns, varied: scales.Cells) -> str:
             row.append(" / ".join(f"{laws.root_mean_square(each):.1f}" for each in left))
         rows.append(row)
     heads = (f"{name} ({len(points.links)} cells)" for name, points in known.items())
-    curves = "\n".join(f"- {name}: {laws.slopes(points)} {laws.drift(points)}" for name, points in known.items())
-    lines = [markdown(("law of Δx", "numbers", *heads), rows), curves, errors(known), beyond(known["all"], varied)]
+    curves = "\n".join(f"- {name}: {laws.slopes(points)}" for name, points in known.items())
+    lines = [markdown(("law of Δx", "numbers", *heads), rows), curves, errors(known)]
     return "\n\n".join(lines)
 
 
@@ -155,31 +155,3 @@ def errors(known: Mapping[str, Points]) -> str:
             ]
             rows.append((candidate.name, name, ", ".join(texts)))
     return markdown("law of Δx | cells | a, b, p or c, d or p, q ± over links ± over frequencies", rows)
-
-
-def beyond(points: Points, varied: scales.Cells) -> str:
-    """What two laws of the phase diagram leave of the cells of the sweep `scaling`, to which nothing is fitted."""
-    gravity, radius, link = varied.scales * np.array(scales.NORMAL)[:, None]
-    length = varied.links * link
-    reach = 2 * np.pi * radius * varied.frequency * np.sqrt(radius / gravity)
-    parts = []
-    for candidate in CANDIDATES[:2]:
-        a, b, p = candidate.fit(points)[0]
-        left = np.log(varied.lengths) - np.log(a * reach / length + b * (reach / length) ** p)
-        groups = ", ".join(
-            f"{laws.root_mean_square(left[varied.varied(word)]):.0f} % ({name})" for word, name in scales.BLOCKS.items()
-        )
-        parts.append(f"{candidate.name} leaves {laws.root_mean_square(left):.0f} %: {groups}")
-    return f"Of the {len(length)} cells with other g, R and ℓ, to which nothing is fitted, {'; '.join(parts)}."
-
-
-def walking_time(cells: Columns) -> str:
-    """Markdown: walking time and mean speed as powers of v and L = nℓ, with what they leave."""
-    every, rows = laws.points_of(cells), []
-    papers = laws.in_papers_range(every.links, every.frequency)
-    for name, points in (("all", every), ("the paper's range", every[papers])):
-        mean_speed = points.distance / points.duration / points.speed
-        for quantity, values in (("walking time", points.duration), ("mean speed over v", mean_speed)):
-            (v, length, _), left = laws.power_law(values, points.speed, points.length)
-            rows.append((quantity, name, f"v^{v:.2f} L^{length:.2f}", f"{laws.root_mean_square(left):.1f} %"))
-    return markdown(("quantity", "cells", "∝", "leaves"), rows)

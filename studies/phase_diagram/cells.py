@@ -82,11 +82,4 @@ def reduced(links: int, frequency: float, walks: Columns) -> dict[str, float]:
         "bounces_sd": float(deviation(known["bounces"][rest])),
         "attempts_mean": float(mean(attempts)),
         **{way.label: int((codes == way).sum()) for way in WAYS},
-        **{f"dx_{way.label}": float(mean(dx[codes == way])) for way in WAYS},
     }
-
-
-def places_in(cells: Columns, others: Columns) -> Array:
-    """Where the rows of others have these cells."""
-    places = {key: i for i, key in enumerate(zip(others["links"], others["frequency"], strict=True))}
-    return np.array([places[key] for key in zip(cells["links"], cells["frequency"], strict=True)])

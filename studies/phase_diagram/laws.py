@@ -36,19 +36,17 @@ def in_papers_range(links: Array, frequency: Array) -> Array:
 def points_of(cells: Columns) -> Points:
     """The cells that have a mean, and few enough failures, as the laws take them, shape (cells,).
 
-    Fields are links, frequency [Hz], the mean distance Δx [m] and duration [s] of walks; speed [m/s] of the loop,
+    Fields are links, frequency [Hz], the mean distance Δx [m] of walks; speed [m/s] of the loop,
     length nℓ [m] of the chain, turns of the loop per second v/(nℓ), Δx/(nℓ) as lengths, and the height H [m] of the
     loop that hangs on the sprocket, straight sides and two half circles.
     """
     failed = cells["walks"] - cells["at_rest"]
     used = (cells["at_rest"] > 0) & (failed <= MOST_FAILED * cells["walks"]) & (cells["dx_mean"] > 0)
-    links, frequency, distance, duration = (
-        cells[name][used] for name in ("links", "frequency", "dx_mean", "walk_time_mean")
-    )
+    links, frequency, distance = (cells[name][used] for name in ("links", "frequency", "dx_mean"))
     speed, length = 2 * np.pi * RADIUS * frequency, links * LINK_LENGTH
     height = 2 * RADIUS + np.maximum(length / 2 - np.pi * RADIUS, 0.0)
-    columns = links, frequency, distance, duration, speed, length, speed / length, distance / length, height
-    return np.rec.fromarrays(columns, names="links,frequency,distance,duration,speed,length,turns,lengths,height")
+    columns = links, frequency, distance, speed, length, speed / length, distance / length, height
+    return np.rec.fromarrays(columns, names="links,frequency,distance,speed,length,turns,lengths,height")
 
 
 def master_curve(x: Array, y: Array) -> tuple[Callable[[Array], Array], Array]:
@@ -111,12 +109,3 @@ def slopes(points: Points) -> str:
         for place, value, slope in zip(places, curve(places), rise, strict=True)
     ]
     return f"Δx/(nℓ) over v/(nℓ) is {', '.join(texts)}."
-
-
-def drift(points: Points) -> str:
-    """Exponent c of Δx/(nℓ) over ν n^c for the slower and the faster half of the frequencies, in words."""
-    frequencies = np.unique(points.frequency)
-    half = len(frequencies) // 2
-    until, since = frequencies[half - 1], frequencies[-half]
-    low, high = (best_variable(points[part]) for part in (points.frequency <= until, points.frequency >= since))
-    return f"With d = 1 given, c is {low:.2f} up to {until:g} Hz and {high:.2f} from {since:g} Hz on."

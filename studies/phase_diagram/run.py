@@ -17,7 +17,6 @@ from studies.phase_diagram.cells import FAILURES, WAYS
 from studies.phase_diagram.endings import Ending
 
 FOLDER = Path(__file__).parent
-FEW = 100  # Walks that each of two groups has in a cell in which they are compared, at least
 
 
 def table_of_cells(cells: Columns) -> str:
@@ -38,40 +37,17 @@ def table_of_cells(cells: Columns) -> str:
     return table(("links", *(f"{frequency:g} Hz" for frequency in shown_frequencies)), rows)
 
 
-def over_others(cells: Columns, way: Ending) -> Array:
-    """Mean Δx of walks that ended in a way over that of the others of their cell; NaN where either are few."""
-    numbers = np.array([cells[each.label] for each in WAYS])
-    distances = numbers * np.nan_to_num([cells[f"dx_{each.label}"] for each in WAYS])
-    at = WAYS.index(way)
-    others, far = numbers.sum(axis=0) - numbers[at], np.delete(distances, at, axis=0).sum(axis=0)
-    compared = (numbers[at] >= FEW) & (others >= FEW)
-    ratio = np.full(len(compared), np.nan)
-    np.divide(distances[at] * others, far * numbers[at], out=ratio, where=compared)
-    return ratio
-
-
-def text_of_ratios(ratios: Array) -> str:
-    """Their mean over cells, and the least and the greatest."""
-    known = ratios[np.isfinite(ratios)]
-    if len(known) < 2:
-        return f"{known[0]:.3f} (one cell)" if len(known) else ""
-    return f"{known.mean():.3f} ({known.min():.2f} to {known.max():.2f}, {len(known)} cells)"
-
-
 def table_of_endings(cells: Columns) -> str:
-    """Markdown: share of each ending among all walks at rest, where it is the most frequent one, how far they went."""
+    """Markdown: share of each ending among all walks at rest, and where it is the most frequent one."""
     counts = np.stack([cells[way.label] for way in WAYS], axis=1)
     most = np.where(counts.sum(axis=1) > 0, counts.argmax(axis=1), -1)
-    inside, flights, rows = laws.in_papers_range(cells["links"], cells["frequency"]), cells["flight_told"].sum(), []
+    flights, rows = cells["flight_told"].sum(), []
     for number, way in enumerate(WAYS):
         # without the time since the last impulse a collapse in flight counts as one of its bounce
         share = counts[:, number].sum() / (flights if way is Ending.IN_FLIGHT else counts.sum())
-        ratios = over_others(cells, way)
-        texts = (text_of_ratios(ratios[where]) for where in (inside, ~inside))
-        rows.append([way.meaning, f"{100 * share:.2g} %", f"{np.sum(most == number)}", *texts])
+        rows.append([way.meaning, f"{100 * share:.2g} %", f"{np.sum(most == number)}"])
     text = f"{counts.sum():,.0f} walks of which this is known; a collapse in flight is known of {flights:,.0f} of them."
-    head = "way of ending | share | cells where it is the most frequent | Δx, paper's range | elsewhere"
-    return f"{table(head, rows)}\n\n{text}"
+    return f"{table('way of ending | share | cells where it is the most frequent', rows)}\n\n{text}"
 
 
 def table_of_failures(cells: Columns) -> str:
@@ -112,12 +88,10 @@ def make(
         "failures": table_of_failures(found),
         "endings": table_of_endings(found),
         "scales": scales.table(varied, points),
-        "candidates": candidates.table(found, varied),
-        "walking time": candidates.walking_time(found),
+        "candidates": candidates.table(found),
         "strands": strands.shares(met),
         "by bounces": strands.by_bounces(met),
         "ways with strands": strands.ways(met),
-        "against the million": strands.against_million(met, found),
     }
     figures = {"maps": drawing.draw_maps(found), "laws": drawing.draw_laws(points)}
     publish(FOLDER, tables, figures | {"scales": scales.draw(varied, points)})

@@ -12,7 +12,7 @@ import numpy as np
 from studies.common import DRAWN, Array, Columns, OverCells, drawn_terms, mean, minus, standard_error
 from studies.common import table as markdown
 from studies.phase_diagram import laws
-from studies.phase_diagram.cells import places_in, walks_by_cell
+from studies.phase_diagram.cells import walks_by_cell
 from studies.phase_diagram.endings import Ending, endings
 from warpchain import Status, SweepResult
 
@@ -128,25 +128,3 @@ def ways(cells: Columns) -> str:
             rows.append((way.meaning, BEFORE[k], *parts, f"{np.sum((most == number) & (total > 0))}"))
     head = "way of ending | strands met | share, paper's range | elsewhere | cells where it is the most frequent"
     return f"{markdown(head, rows)}\n\n{total.sum():,.0f} walks at rest of {cells['walks'].sum():,.0f}."
-
-
-def against_million(cells: Columns, million: Columns) -> str:
-    """Whether these walks, of today's engine, go as far as those of the million, in words."""
-    at = places_in(cells, million)
-    failed = 1 - million["at_rest"][at] / million["walks"][at]
-    used = (cells["at_rest"] > 10) & (failed <= laws.MOST_FAILED)
-    ratio = cells["dx"] / million["dx_mean"][at] - 1
-    walk = million["dx_sd"][at] / np.sqrt(np.maximum(cells["at_rest"], 1))  # better known from the million
-    error = np.hypot(walk, million["dx_se"][at]) / million["dx_mean"][at]
-    slow = (cells["links"] >= 100) & (cells["frequency"] >= 5) & (cells["frequency"] <= 9)
-    choices = {
-        "all": used,
-        "the paper's range": used & laws.in_papers_range(cells["links"], cells["frequency"]),
-        "100 links and more at 5 to 9 Hz": used & slow,
-        "all others": used & ~slow,
-    }
-    texts = []
-    for name, chosen in choices.items():
-        mean, chi2, _, ends = _over_cells(ratio[chosen], error[chosen], 2)
-        texts.append(f"in {name} {mean} (χ² {chi2} cells; rise, fall: {ends})")
-    return minus(f"Mean Δx of these walks over that of the million, less 1, mean over cells: {'; '.join(texts)}.")
