@@ -15,8 +15,7 @@ import warpchain
 from studies import common
 from studies.common import Array, Columns, OverCells
 from studies.waves import wave_drag
-from studies.waves.drag import END, NEAR, released
-from studies.waves.fields import normal_velocities
+from studies.waves.drag import END, released
 from studies.waves.wave_drag import RIGID, RUNNING, inertia_of, loop_motions, lowest, wave_motion
 
 FOLDER = Path(__file__).parent
@@ -25,8 +24,6 @@ CELLS = tuple((links, frequency) for links in (60, 90, 120, 180) for frequency i
 SAMPLES = 40
 SEED = 3000
 LENGTH = 12  # Links in a wave, about: a whole number of waves fits around the loop
-RIDING = 0.0598  # Radius at which joints ride on the sprocket [m]
-APART = 0.01  # Touches of the floor less apart [s] are one impact
 ALIKE = "none, as slow and high as fast"
 """A loop without a wave that runs as slowly along itself, and whose lowest joint is as high, as with a fast wave."""
 VARIANTS = (("none", 0.0), *((way, size) for size in (0.05, 0.15) for way in ("slow", "fast", ALIKE)))
@@ -147,56 +144,11 @@ def summary() -> str:
     return common.minus(common.table(head, lines))
 
 
-def about_impact(links: int, frequency: float) -> tuple[float, float]:
-    """Amplitude [rad] of fast waves of `LENGTH` links before the first impact, and between it and the next one."""
-    scene = {"links": links, "frequency": frequency, "start": "spinning", "walk_limit": 0.4}
-    walk = warpchain.walk(preset="soft", **scene, frame_interval=2.5e-4)
-    parameters, time, number = walk.setup.parameters, walk.frame_time, round(links / LENGTH)
-    masses = inertia_of(links, parameters)[:, 0]
-    modes = np.abs(np.fft.rfft(normal_velocities(time, walk.frame_joints, masses), axis=1))[:, number - 1 : number + 2]
-    angles = np.sqrt(np.sum((2 * modes / links) ** 2, axis=1)) / (4 * np.pi * frequency * RIDING)
-    touches = np.flatnonzero(np.interp(time, walk.time, walk.lowest) < NEAR)
-    gap = np.flatnonzero(np.diff(time[touches]) > APART)[0]
-    parts = angles[: touches[0]], angles[touches[gap] + 1 : touches[gap + 1]]
-    return tuple(float(np.sqrt(np.mean(part**2))) for part in parts)
-
-
-def given(links: int, frequency: float) -> Array:
-    """Energy, angular momentum, run [%] and lowest joint [mm] that waves change of a loop, (variants, phases, 4)."""
-    position, velocity, parameters = released(links, frequency, SEED)
-    inertia = inertia_of(links, parameters)
-
-    def numbers_of(at: Array, speeds: Array) -> Array:
-        arms = at[:, :2] - np.average(at[:, :2], axis=0, weights=inertia[:, 0])
-        spin = arms[:, 0] * speeds[:, 1] - arms[:, 1] * speeds[:, 0]
-        turning = np.sum(inertia[:, 0] * spin + inertia[:, 2] * speeds[:, 2])
-        low = 1000 * lowest(at, parameters.link_length)
-        return np.array([np.sum(inertia * speeds**2), turning, running(at, speeds, parameters), low])
-
-    def changed(way: str, size: float, phase: float) -> Array:
-        after = numbers_of(*with_wave(position, velocity, parameters, way, size, phase))
-        return np.append(100 * (after[:3] / before[:3] - 1), after[3] - before[3])
-
-    before, phases = numbers_of(position, velocity), np.linspace(0, 2 * np.pi, 24, endpoint=False)
-    return np.array([[changed(way, size, phase) for phase in phases] for way, size in VARIANTS[1:]])
-
-
 def main(command: Annotated[str, typer.Argument()] = "") -> None:
-    """Run the study if told so; write the table of the page."""
-    if command == "impacts":
-        for links, frequency in CELLS:
-            before, after = about_impact(links, frequency)
-            print(f"{links} links, {frequency:g} Hz: {before:.4f} rad before the first impact, {after:.4f} after it")
-    elif command == "given":
-        every = np.concatenate([given(links, frequency) for links, frequency in CELLS], axis=1)
-        names = ("energy / %", "angular momentum / %", "run / %", "lowest joint / mm")
-        for (way, size), numbers in zip(VARIANTS[1:], every, strict=True):
-            for name, values in zip(names, numbers.T, strict=True):
-                print(f"{way} {size:g}: {name} {values.mean():+.2f} ({values.min():+.1f} to {values.max():+.1f})")
-    else:
-        if command == "run":
-            run()
-        common.publish(FOLDER, {"directions": summary()})
+    """Run the study if told so, by the word run; write the table of the page."""
+    if command == "run":
+        run()
+    common.publish(FOLDER, {"directions": summary()})
 
 
 if __name__ == "__main__":

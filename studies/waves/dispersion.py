@@ -2,10 +2,10 @@
 
 Joints are closed and friction is viscous. Small changes of the links' angles ϑ_j ∝ exp(iκj + λt) have the phase κ per
 link and the rate λ = −γ − iω: ω > 0 runs towards greater j. README.md derives what is solved here: A(λ) B(λ) = h² λ⁴
-with h = δ − ¼ μℓ², and A, B of the straight chain and of the ring, two bands in 0 < κ ≤ π/2; and the continuous ring.
+with h = δ − ¼ μℓ², and A, B of the straight chain and of the ring, two bands in 0 < κ ≤ π/2.
 
-Coulomb friction is left out: it is not linear. `equivalent_friction` replaces it in joints that only swing. Joints that
-keep their sense of rotation, because the loop bends there, do not feel it in small waves.
+Coulomb friction is left out: it is not linear. Joints that keep their sense of rotation, because the loop bends there,
+do not feel it in small waves.
 """
 
 from collections.abc import Callable
@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from itertools import permutations
 
 import numpy as np
+from numpy.polynomial.polynomial import polyroots
 from numpy.typing import ArrayLike
-from scipy.integrate import quad
 
 from studies.common import Array
 from warpchain import Parameters
@@ -83,27 +83,6 @@ def ring_waves(parameters: Parameters, links: int, speed: float, number: ArrayLi
     return _waves(parameters, 2 * alpha * np.asarray(number), factors)
 
 
-def continuous_ring(parameters: Parameters, links: int, speed: float, number: ArrayLike) -> Array:
-    """Rates λ [1/s] of the continuous ring of length Nℓ, slow and fast, (k, 2): `ring_waves` for long waves."""
-    n, length, (mass, inertia, *_) = np.asarray(number, float), parameters.link_length, _links(parameters)
-    density, radius = mass / length, links * length / (2 * np.pi)
-    spin, bend = speed / radius, (n**2 - 1) ** 2
-    rotary = (inertia / length - density * length**2 / 6) / (density * radius**2)
-    friction = parameters.viscous_friction * length / (density * radius**4)
-    leading = 1 + n**2 + bend * rotary
-    half = (bend * n**2 * friction - 4j * n * spin) / (2 * leading)
-    root = np.sqrt(half**2 - n**2 * (n**2 - 3) * spin**2 / leading)
-    return _by_frequency(np.stack([-half + root, -half - root], axis=-1))
-
-
-def band_gap(parameters: Parameters, tension: float) -> tuple[float, float]:
-    """Edges of the band gap of a straight chain at κ = π/2, without friction [rad/s]; equal if there is none."""
-    length = parameters.link_length
-    one = parameters.outer_mass + 4 * parameters.inner_inertia / length**2
-    other = parameters.inner_mass + 4 * parameters.outer_inertia / length**2
-    return tuple(float(np.sqrt(4 * tension / (length * mass))) for mass in sorted((one, other), reverse=True))
-
-
 def long_wave_speed(parameters: Parameters, tension: float) -> float:
     """c = √(Tℓ/m̄), the speed of long waves along the chain under the tension T [N], in m/s."""
     return float(np.sqrt(tension * parameters.link_length / _links(parameters)[0]))
@@ -112,18 +91,6 @@ def long_wave_speed(parameters: Parameters, tension: float) -> float:
 def ring_spin(parameters: Parameters, links: int, speed: float) -> float:
     """Ω = 2 v sin(π/N)/ℓ, at which a ring turns whose joints move at `speed` [m/s], in rad/s."""
     return float(2 * speed * np.sin(np.pi / links) / parameters.link_length)
-
-
-def equivalent_friction(parameters: Parameters, amplitude: float) -> float:
-    """Viscous friction [N m s] that takes as much energy as joint friction where joints swing at `amplitude` W [rad/s].
-
-    Harmonic balance: (2/W) times the mean of f(W cos φ) cos φ over a period, with f(w) = β w + τ_c tanh(w/ω_c). It is
-    β + 4τ_c/πW for W far above ω_c and β + τ_c/ω_c far below.
-    """
-    ratio = amplitude / parameters.friction_smoothing
-    # tanh(ratio · cos φ) cos φ turns over in about 1/ratio from a quarter of the period on
-    mean = 2 / np.pi * quad(lambda x: np.tanh(ratio * np.sin(x)) * np.sin(x), 0, np.pi / 2, points=[3 / ratio])[0]
-    return parameters.viscous_friction + 2 * parameters.coulomb_friction * mean / amplitude
 
 
 def _links(p: Parameters) -> tuple[float, float, float, float]:
@@ -171,10 +138,5 @@ def _by_frequency(rates: Array) -> Array:
 
 
 def _roots(coefficients: Array) -> Array:
-    """Roots of polynomials, (k, p) for coefficients (k, p + 1) from the constant on: eigenvalues of companions."""
-    degree = coefficients.shape[1] - 1
-    scale = np.abs(coefficients[:, :1] / coefficients[:, -1:]) ** (1 / degree)  # of the roots, for conditioning
-    scaled = coefficients * scale ** np.arange(degree + 1)
-    companion = np.tile(np.eye(degree, k=-1, dtype=np.complex128), (len(scaled), 1, 1))
-    companion[:, :, -1] = -scaled[:, :-1] / scaled[:, -1:]
-    return scale * np.linalg.eigvals(companion)
+    """Roots of polynomials, (k, p) for coefficients (k, p + 1) from the constant on."""
+    return np.array([polyroots(row) for row in coefficients])

@@ -1,31 +1,28 @@
-"""Waves in theory and in tapped rings: their tables, printed, and their figure.
+"""Waves in theory and in tapped rings: their tables and their figure.
 
 A ring of links that turns like a rigid body is tapped; `warpchain.simulate` moves it on. Its motion is taken apart into
 modes, the decaying oscillations that they are made of, and packets.
 """
-
-from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 from scipy.signal import hilbert
 
 import warpchain
-from studies.common import BLUE, FAINT, GREEN, GROUND, INK, RED, Array, publish, table, tidy
+from studies.common import BLUE, GREEN, INK, RED, Array, minus, table, tidy
 from studies.waves import dispersion
-from studies.waves.dispersion import LOWER_BACKWARD, LOWER_FORWARD, UPPER_BACKWARD, UPPER_FORWARD, Waves
+from studies.waves.dispersion import LOWER_BACKWARD, LOWER_FORWARD, Waves
 from warpchain import Parameters, preset
 
 CHAIN = preset("soft").with_values({"coulomb_friction": 0.0})  # Joints softened, Coulomb friction left out
-SMOOTH = CHAIN.with_values({"viscous_friction": CHAIN.viscous_friction / 100})  # With a hundredth of β
 LENGTH = CHAIN.link_length
 DENSITY = (CHAIN.inner_mass + CHAIN.outer_mass) / 2 / LENGTH
 LINKS = 60
 FREQUENCIES = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0)
-SPINS = (0.01, 0.1, 1.0, 10.0, 60.0)  # Amplitudes of a joint's angular velocity [rad/s]; 60 where a loop bends
-WAVELENGTHS = np.array([6.0, 12.0, 24.0])
-BOTH, FORWARD = [LOWER_BACKWARD, LOWER_FORWARD], [LOWER_FORWARD, UPPER_FORWARD]
-FOLDER = Path(__file__).parent
+WAVELENGTHS = np.array([6.0, 12.0, 24.0])  # In links
+NUMBERS = np.arange(2, 13)  # Of waves around the ring of `LINKS`
+PACKETS = ((160, 20, 12.0), (180, 15, 10.0), (360, 15, 20.0))  # Links of a ring, waves around it, width of a packet
+BOTH = [LOWER_BACKWARD, LOWER_FORWARD]  # Slow and fast family
 INTERVAL = 2e-4  # Time between two instants of a tapped ring [s]
 
 
@@ -67,14 +64,14 @@ def tapped_ring(links: int, parameters: Parameters, speed: float, spins: Array) 
     return position, np.column_stack([across, spin + kept])
 
 
-def tapped(links: int, speed: float, spins: Array, times: Array, chain: Parameters = CHAIN) -> Array:
+def tapped(links: int, speed: float, spins: Array, times: Array) -> Array:
     """Angles (t, n) [rad] of the links of a tapped ring, less those of the ring that turns on."""
-    position, velocity = tapped_ring(links, chain, speed, spins)
+    position, velocity = tapped_ring(links, CHAIN, speed, spins)
     scene = {"floor": False, "gravity": False, "self_contact": False, "tolerance": 1e-8, "times": times}
-    motion = warpchain.simulate(chain, position, velocity, float(times[-1]), **scene)
+    motion = warpchain.simulate(CHAIN, position, velocity, float(times[-1]), **scene)
     if motion.status != warpchain.Status.FINISHED:
         raise RuntimeError(f"the tapped ring ended as {motion.status.label}")
-    return motion.position[:, :, 2] - position[:, 2] - dispersion.ring_spin(chain, links, speed) * times[:, None]
+    return motion.position[:, :, 2] - position[:, 2] - dispersion.ring_spin(CHAIN, links, speed) * times[:, None]
 
 
 def from_tap(links: int) -> Array:
@@ -116,183 +113,103 @@ def find_packet(angles: Array, link: float, width: float) -> tuple[float, float,
     return link + float(energy @ offset) / energy.sum(), energy.sum() ** 0.5, shares / shares.sum()
 
 
-def measured(angles: Array, waves: Waves, numbers: Array, columns: list[int]) -> Array:
-    """Rates of modes of a tapped ring, fitted to its motion; of the four that are found those nearest to theory."""
+def measured(angles: Array, waves: Waves) -> Array:
+    """Rates of both families of a tapped ring, fitted to its motion: of four that are found those nearest to theory."""
     found = []
-    for number, rates in zip(numbers, waves.rate[:, columns], strict=True):
+    for number, rates in zip(NUMBERS, waves.rate[:, BOTH], strict=True):
         alive = min(len(angles), int(6 / np.abs(rates.real).max() / INTERVAL))
         fitted = fit_rates(mode_amplitudes(angles, number)[:alive], INTERVAL, 4)
         found.append(fitted[np.argmin(np.abs(rates[:, None] - fitted), axis=1)])
     return np.array(found)
 
 
-def show_bands() -> None:
-    """The band gap, and the waves that friction keeps from swinging."""
-    rows, phases = [], np.linspace(0.01, np.pi / 2, 500)
-    for frequency in FREQUENCIES:
-        speed = speed_at(frequency)
-        tension = DENSITY * speed**2
-        low, high = dispersion.band_gap(CHAIN, tension)
-        waves = dispersion.straight_waves(CHAIN, tension, phases)
-        edge = waves.damping[-1, FORWARD]
-        every, swings = extended(waves, np.abs(waves.frequency) > 1e-6, *FORWARD)
-        gap = f"{low / 2 / np.pi:.1f} to {high / 2 / np.pi:.1f} ({100 * (high / low - 1):.1f} %)"
-        damping = f"{edge[0]:.0f} and {edge[1]:.0f} ({edge.mean() / low:.2f} of ω)"
-        rows.append((frequency, speed, tension, gap, damping, 2 * np.pi / every[swings == 1].max()))
-    print("Bands of the straight chain under T = ρv²")
-    head = "Hz | v, m/s | T, N | gap, Hz | damping there, 1/s | links of a wave below which it creeps"
-    print(table(head, rows, "g .3f .2f s s .2f"))
-
-
-def show_reach() -> None:
-    """How far waves run, and how fast in the room."""
+def reach_table() -> str:
+    """How far waves of the straight chain under T = ρv² run [links], how fast they are in the room [m/s]; damping."""
     rows = []
     for frequency in FREQUENCIES:
         speed = speed_at(frequency)
         waves = dispersion.straight_waves(CHAIN, DENSITY * speed**2, 2 * np.pi / WAVELENGTHS)
-        for k, wavelength in enumerate(WAVELENGTHS):
-            rate, damping, reach = (each[k, LOWER_FORWARD] for each in (waves.frequency, waves.damping, waves.reach))
-            room = speed + LENGTH * waves.group_speed[k, BOTH]
-            rows.append((frequency, f"{wavelength:g}", rate, damping, reach, reach / 60, reach / 120, *room))
+        room = speed + LENGTH * waves.group_speed[1:, BOTH]
         c = dispersion.long_wave_speed(CHAIN, DENSITY * speed**2 + 1)
-        rows.append((frequency, "long, T = ρv² + 1 N", *[""] * 5, speed - c, speed + c))
-    print("Waves of the straight chain under T = ρv²; speeds of packets in the room in m/s")
-    head = "Hz | links | ω, 1/s | γ, 1/s | reach, links | of 60 | of 120 | slow | fast"
-    print(table(head, rows, "g s .1f .3f .1f .2f .2f .2f .2f"))
+        rows.append((frequency, speed, *waves.reach[:, LOWER_FORWARD], *room.T.ravel(), speed - c, speed + c))
+    head = "Hz | v | reach of 6 links | of 12 | of 24 | slow, 12 links | slow, 24 | fast, 12 | fast, 24"
+    damping = ", ".join(f"{each:.3g}" for each in waves.damping[:, LOWER_FORWARD])
+    text = table(f"{head} | slow, long, T_e = 1 N | fast, long", rows, "g .2f .1f .0f .0f" + 6 * " .2f")
+    return minus(f"{text}\n\nγ of waves of 6, 12 and 24 links: {damping} 1/s ({FREQUENCIES[-1]:g} Hz).")
 
 
-def show_coulomb() -> None:
-    """Coulomb friction as viscous friction of joints that swing about rest."""
-    rows = []
-    for name in ("soft", "paper"):
-        chain = preset(name)
-        rows.append([name, *(dispersion.equivalent_friction(chain, w) / chain.viscous_friction for w in SPINS)])
-    print("Joint friction in units of β where joints swing about rest")
-    print(table(["", *(f"{spin:g} rad/s" for spin in SPINS)], rows, "s" + len(SPINS) * " .2f"))
+def ring_table(speed: float, waves: Waves, found: Array) -> str:
+    """Modes of the ring: exact, in simulation, and of the straight chain."""
+    spin, exact = dispersion.ring_spin(CHAIN, LINKS, speed), waves.rate[:, BOTH]
+    straight = dispersion.straight_waves(CHAIN, DENSITY * speed**2, waves.phase).rate[:, LOWER_FORWARD]
+    both = np.stack([exact, found], axis=2).reshape(len(exact), 4)  # slow and fast, exact and simulated
+    columns = *(-both.imag).T, -straight.imag, *(-both.real).T, -straight.real
+    head = "n | links a wave | slow ω: exact | simulated | fast ω: exact | simulated | both, straight chain"
+    head += " | slow γ: exact | simulated | fast γ: exact | simulated | straight chain"
+    rows = zip(NUMBERS, LINKS / NUMBERS, *columns, strict=True)
+    off = [100 * np.abs(part(found) / part(exact) - 1).max() for part in (np.imag, np.real)]
+    crests = 1 + waves.frequency[:, BOTH] / NUMBERS[:, None] / spin
+    slow, fast = (f"{each.min():.2g} to {each.max():.2g} v" for each in crests.T)
+    text = (
+        f"Simulated and exact ω differ by {off[0]:.3f} % at most, γ by {off[1]:.2f} %. In the room slow crests move at "
+    )
+    return f"{minus(table(head, rows, 'd .1f' + 5 * ' .2f' + 5 * ' .3f'))}\n\n{text}{slow}, fast ones at {fast}."
 
 
-def show_ring(speed: float, angles: Array, numbers: Array) -> None:
-    """Modes of the ring: exact, simulation, straight chain, continuous ring."""
-    waves = dispersion.ring_waves(CHAIN, LINKS, speed, numbers)
-    spin = dispersion.ring_spin(CHAIN, LINKS, speed)
-    exact, found = waves.rate[:, BOTH], measured(angles, waves, numbers, BOTH)
-    known = {
-        "exact": exact,
-        "simulated": found,
-        "straight": dispersion.straight_waves(CHAIN, DENSITY * speed**2, waves.phase).rate[:, BOTH],
-        "continuous": dispersion.continuous_ring(CHAIN, LINKS, speed, numbers),
-    }
-    rows = []
-    for k, number in enumerate(numbers):
-        crests = (number * spin + waves.frequency[k, BOTH]) / number / spin
-        for name, rates in known.items():
-            numbers_of = (part for rate in rates[k] for part in (-rate.imag, -rate.real))
-            rows.append((number, LINKS / number, name, *numbers_of, *(crests if name == "exact" else ("", ""))))
-    print(f"Ring of {LINKS} links, v = {speed:.3f} m/s, T = {DENSITY * speed**2:.2f} N; 1/s, in the room in v")
-    head = "n | links a wave |  | slow ω | γ | fast ω | γ | slow crests | fast"
-    print(table(head, rows, "d .1f s .2f .3f .2f .3f .3f .3f"))
-    off = [100 * np.abs(one / other - 1).max() for one, other in ((found.imag, exact.imag), (found.real, exact.real))]
-    print(f"simulated against exact: ω within {off[0]:.3f} %, γ within {off[1]:.2f} %")
-
-
-def packets(links: int, number: int, width: float, speed: float) -> list[tuple[float, float]]:
-    """Prints speeds and damping of two packets; returns their mean phases and speeds in the room in units of v."""
+def packets(links: int, number: int, width: float, speed: float) -> list[tuple[object, ...]]:
+    """Rows of the table of packets, slow and fast, of one ring; behind them mean phase and speed in the room in v."""
     waves = dispersion.ring_waves(CHAIN, links, speed, np.arange(2, links // 4 + 1))
     place, quickest = from_tap(links), waves.group_speed[number - 2, LOWER_FORWARD]
     times = np.linspace(0.17, 0.3, 41) * links / quickest
     envelope = np.exp(-(place**2) / (2 * width**2))
     angles = tapped(links, speed, 0.1 * np.cos(2 * np.pi * number * place / links) * envelope, times)
-    in_room, rows = [], []
+    rows: list[tuple[object, ...]] = []
     for name, column in (("slow", LOWER_BACKWARD), ("fast", LOWER_FORWARD)):
         speeds, damping = waves.group_speed[:, column], waves.damping[:, column]
         guess = speeds[number - 2] * times
         reach = np.minimum(np.abs(guess), links / 2 - np.abs(guess))
         places, amplitudes, shares = map(np.array, zip(*map(find_packet, angles, guess, reach), strict=True))
-        along, expected = (np.polyfit(times, way, 1)[0] for way in (places, shares @ speeds * times))
+        along, expected = (LENGTH * np.polyfit(times, way, 1)[0] for way in (places, shares @ speeds * times))
         falls, decay = -np.polyfit(times, np.log(amplitudes), 1)[0], np.mean(shares @ damping)
-        room = 1 + along * LENGTH / speed
-        in_room.append((np.mean(shares @ waves.phase), room))
-        rows.append((links, links / number, name, LENGTH * along, LENGTH * expected, speed * room, falls, decay))
-    head = "links | a wave |  | along the chain, m/s | theory | in the room, m/s | damping, 1/s | theory"
-    print(table(head, rows, "d .0f s .3f .3f .2f .3f .3f"))
-    return in_room
+        row = links, links / number, name, along, expected, speed + along, falls, decay
+        rows.append((*row, np.mean(shares @ waves.phase), 1 + along / speed))
+    return rows
 
 
-def extended(waves: Waves, values: Array, column: int, upper: int) -> tuple[Array, Array]:
-    """A function of the phase from 0 to π: the lower band up to π/2, from there the upper one."""
-    phases = np.concatenate([waves.phase, [np.nan], np.pi - waves.phase[::-1]])
-    return phases, np.concatenate([values[:, column], [np.nan], values[::-1, upper]])
-
-
-def draw(speed: float, angles: Array, numbers: Array, room: list[tuple[float, float]]) -> Figure:
+def draw(speed: float, waves: Waves, found: Array, room: Array) -> Figure:
     """Frequency, damping and speed in the room against the phase per link."""
-    tension = DENSITY * speed**2
-    phases = np.linspace(0.02, np.pi / 2, 300)
-    rubbing, smooth = (dispersion.straight_waves(chain, tension, phases) for chain in (CHAIN, SMOOTH))
-    gap = [edge / 2 / np.pi for edge in dispersion.band_gap(CHAIN, tension)]
+    straight = dispersion.straight_waves(CHAIN, DENSITY * speed**2, np.linspace(0.02, np.pi / 2, 300))
+    ring = dispersion.ring_waves(CHAIN, 180, speed, np.arange(2, 46))
     figure = Figure(figsize=(11.0, 4.0), layout="constrained")
     left, middle, right = figure.subplots(1, 3)
-    left.axhspan(*gap, color=GROUND, linewidth=0.0)
-    left.text(2.4, gap[1] + 3, "band gap", fontsize="small", color=INK, va="bottom")
-    for straight, dashes in ((rubbing, "-"), (smooth, ":")):
-        line = extended(straight, np.abs(straight.frequency) / (2 * np.pi), *FORWARD)
-        left.plot(*line, color=INK, linewidth=1.2, linestyle=dashes)
-    for pick in (np.minimum, np.maximum):  # of both directions, which creep at different rates
-        values = pick(rubbing.damping, rubbing.damping[:, ::-1])
-        middle.semilogy(*extended(rubbing, values, *FORWARD), color=INK, linewidth=1.2)
-    alone = 0.1 * np.eye(LINKS)[0]
-    rung = tapped(LINKS, speed, alone, INTERVAL * np.arange(400), SMOOTH)
-    for chain, motion, shown, columns, more, face in (
-        (CHAIN, angles, numbers, BOTH, "", None),
-        (SMOOTH, rung, np.arange(2, LINKS // 4 + 1), list(range(4)), ", β/100", "none"),
+    left.plot(straight.phase, straight.frequency[:, LOWER_FORWARD] / (2 * np.pi), color=INK, linewidth=1.2)
+    middle.semilogy(straight.phase, straight.damping[:, LOWER_FORWARD], color=INK, linewidth=1.2)
+    for rates, column, colour, name in zip(found.T, BOTH, (BLUE, RED), ("slow", "fast"), strict=True):
+        style = {"color": colour, "markersize": 4.0, "label": f"{name}, tapped ring"}
+        left.plot(waves.phase, np.abs(rates.imag) / (2 * np.pi), "o", **style)
+        middle.plot(waves.phase, -rates.real, "o", **style)
+        for many, dashes in ((ring, "-"), (straight, ":")):
+            value = 1 + many.group_speed[:, column] * LENGTH / speed
+            right.plot(many.phase, value, color=colour, linestyle=dashes, linewidth=1.2)
+    right.plot(*room.T, "o", color=GREEN, markersize=5.0, label="packets, simulated", zorder=4)
+    for axes, label, limits in (
+        (left, "frequency $|ω|/2π$ / Hz", (0, None)),
+        (middle, "damping $γ$ / s$^{-1}$", (0.01, 1000)),
+        (right, "speed in the room / $v$", (-0.2, 2.6)),
     ):
-        waves = dispersion.ring_waves(chain, LINKS, speed, shown)
-        for rates, column in zip(measured(motion, waves, shown, columns).T, columns, strict=True):
-            slow, lower = column in (LOWER_BACKWARD, UPPER_BACKWARD), column in BOTH
-            place = waves.phase if lower else np.pi - waves.phase
-            label = ("slow" if slow else "fast") + more if lower else None
-            style = {"color": BLUE if slow else RED, "markerfacecolor": face, "label": label}
-            style |= {"marker": "o", "linestyle": "none", "markersize": 4.0, "zorder": 4}
-            left.plot(place, np.abs(rates.imag) / (2 * np.pi), **style)
-            if face is None:
-                middle.plot(place, -rates.real, **style)
-    title = {"title": "modes of a tapped ring", "title_fontsize": "small"}
-    left.legend(frameon=False, fontsize="small", loc="upper left", **title)
-    for wavelength in WAVELENGTHS:
-        phase = 2 * np.pi / wavelength
-        one = dispersion.straight_waves(CHAIN, tension, [phase])
-        text = f"{wavelength:.0f} links:\nreach {one.reach[0, LOWER_FORWARD]:.0f}"
-        way = {"xytext": (26, -6), "textcoords": "offset points", "arrowprops": {"arrowstyle": "-", "color": FAINT}}
-        middle.annotate(text, (phase, one.damping[0, LOWER_FORWARD]), fontsize="small", **way)
-    ring = dispersion.ring_waves(CHAIN, 180, speed, np.arange(2, 46))
-    for waves, dashes, label in ((ring, "-", "ring of 180 links"), (rubbing, ":", "straight chain")):
-        for column, colour in zip(BOTH, (BLUE, RED), strict=True):
-            value = 1 + waves.group_speed[:, column] * LENGTH / speed
-            right.plot(waves.phase, value, color=colour, linestyle=dashes, linewidth=1.2, label=label)
-            label = None
-    right.plot(*np.array(room).T, "o", color=GREEN, markersize=5.0, label="packets, simulated", zorder=4)
-    right.legend(frameon=False, fontsize="small", loc="center left")
-    ticks = ["0", "π/4", "π/2", "3π/4", "π"]
-    for axes, quarters, label, limits in (
-        (left, 4, "frequency $|ω|/2π$ / Hz", (0, None)),
-        (middle, 4, "damping $γ$ / s$^{-1}$", (0.01, 3000)),
-        (right, 2, "speed in the room / $v$", (-0.2, 2.6)),
-    ):
-        axes.set_xticks(np.arange(quarters + 1) * np.pi / 4, ticks[: quarters + 1])
-        end = quarters * np.pi / 4
-        tidy(axes, grid="y", xlabel="phase per link $κ$ / rad", xlim=(0, end), ylabel=label, ylim=limits)
+        axes.legend(frameon=False, fontsize="small")
+        axes.set_xticks(np.arange(3) * np.pi / 4, ["0", "π/4", "π/2"])
+        tidy(axes, grid="y", xlabel="phase per link $κ$ / rad", xlim=(0, np.pi / 2), ylabel=label, ylim=limits)
     return figure
 
 
-def main() -> None:
-    """Print all tables and draw the figure."""
-    show_bands()
-    show_reach()
-    show_coulomb()
-    speed, offset, numbers, places = speed_at(20.0), from_tap(LINKS), np.arange(2, 13), []
+def tables_and_figure() -> tuple[dict[str, str], Figure]:
+    """All tables by their markers, and the figure."""
+    speed, offset = speed_at(20.0), from_tap(LINKS)
     angles = tapped(LINKS, speed, 0.1 * offset * np.exp(-(offset**2) / 4.5), INTERVAL * np.arange(400))
-    show_ring(speed, angles, numbers)
-    print("Packets on larger rings")
-    for links, number, width in ((160, 20, 12.0), (180, 15, 10.0), (360, 15, 20.0)):
-        places += packets(links, number, width, speed)
-    publish(FOLDER, {}, {"dispersion": draw(speed, angles, numbers, places)})
+    waves = dispersion.ring_waves(CHAIN, LINKS, speed, NUMBERS)
+    found, rows = measured(angles, waves), [row for packet in PACKETS for row in packets(*packet, speed)]
+    head = "links | links a wave |  | along the chain, m/s | theory | in the room, m/s | γ, 1/s | theory"
+    texts = minus(table(head, (row[:-2] for row in rows), "d .0f s .3f .3f .2f .3g .3g"))
+    tables = {"reach": reach_table(), "ring": ring_table(speed, waves, found), "packets": texts}
+    return tables, draw(speed, waves, found, np.array([row[-2:] for row in rows]))

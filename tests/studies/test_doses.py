@@ -5,7 +5,7 @@ import pytest
 
 import warpchain
 from studies.common import with_tables
-from studies.waves import directions, doses, drag, sprocket_tap
+from studies.waves import directions, doses, drag
 from studies.waves.wave_drag import inertia_of
 
 
@@ -55,13 +55,3 @@ def test_a_wave_runs_its_way(way: str, slope: float) -> None:
     mode = np.fft.fft(angles[1] - angles[0], axis=1)[:, 5]
     assert abs(mode[0]) == pytest.approx(0.05 * 30, rel=0.05)
     assert np.polyfit(times, np.unwrap(np.angle(mode)), 1)[0] == pytest.approx(slope, rel=0.05)
-
-
-@pytest.mark.slow
-def test_a_tap_on_the_sprocket_starts_two_waves() -> None:
-    """The bend stays near the bottom, the front of the velocity runs at nearly twice the speed of the links."""
-    _, run, touch, slow, fast, behind = sprocket_tap.found(20.0)
-    near, far = map(float, slow.split(" to "))
-    assert float(run) == pytest.approx(7.5, rel=0.02) and 3 < near < far < near + 2.5
-    least, greatest = (float(fast.split()[k]) for k in (4, 6))  # over windows of the time after it, in speeds of links
-    assert 1.2 < least < greatest < 2.1 and greatest > 1.6 and float(behind.split()[0]) < 20 and 4 <= float(touch) <= 10

@@ -5,17 +5,17 @@ import pytest
 from numpy.testing import assert_allclose
 
 import warpchain
+from studies.waves import rings, run
 from studies.waves.dispersion import (
     LOWER_BACKWARD,
     LOWER_FORWARD,
-    equivalent_friction,
     long_wave_speed,
     ring_spin,
     ring_waves,
     straight_waves,
 )
 from studies.waves.rings import fit_rates, from_tap, mode_amplitudes, tapped_ring
-from tests.oracle_model.motion_equations import acceleration, friction_torque
+from tests.oracle_model.motion_equations import acceleration
 from warpchain import Status, preset
 
 PAPER = preset("paper").with_values({"coulomb_friction": 0.0})
@@ -149,10 +149,6 @@ def test_modes_of_a_tapped_ring():
     assert_allclose(measured.real, wanted.real, rtol=1e-2)
 
 
-@pytest.mark.parametrize("amplitude", [1e-3, 0.1, 1.0, 60.0])
-def test_equivalent_friction_takes_as_much_energy(amplitude):
-    """β_eq W²/2 is the mean power of the NumPy model's friction in a joint that swings with amplitude W."""
-    chain = preset("soft")
-    spin = amplitude * np.cos(2 * np.pi * (np.arange(200_000) + 0.5) / 200_000)
-    power = np.mean(friction_torque(spin, chain) * spin)
-    assert equivalent_friction(chain, amplitude) * amplitude**2 / 2 == pytest.approx(power, rel=1e-4)
+def test_the_page_has_the_reach_of_waves():
+    """The table is what the theory gives."""
+    assert rings.reach_table() in run.FOLDER.joinpath("README.md").read_text(encoding="utf-8")
