@@ -1,7 +1,7 @@
 """MkDocs hooks: studies, notebooks, and files of the repository that pages link to, become part of the site.
 
 Pages link as GitHub needs it, such as `../sweeps/figure6.yaml`. In the site files of docs/ lie at the top, studies in
-`studies/`, all others in `repository/`. Formulas become MathML, which needs no script. A dead link ends the build.
+`studies/`, all others in `repository/`. Formulas become MathML, which needs no script.
 """
 
 import json
@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from latex2mathml.converter import convert
-from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files
 
 ROOT = Path(__file__).parents[1]
@@ -112,25 +111,3 @@ def on_page_content(html: str, **_: Any) -> str:
     parts = WHOLE.split(ROLE.sub("", html))  # texts, and between them what has no subscripts
     parts[::2] = [SUBSCRIPT.sub(r"\1<sub>\2\3</sub>", text) for text in parts[::2]]
     return "".join(parts)
-
-
-def on_post_build(config: Any) -> None:
-    """End the build if a link of a page leads nowhere, or to an anchor that its page lacks.
-
-    Raises:
-        PluginError: there are such links.
-    """
-    site = [path for path in Path(config.site_dir).rglob("*.html") if path.name != "404.html"]
-    pages = {path: path.read_text(encoding="utf-8") for path in site}
-    anchors = {path: set(re.findall(r'\bid="([^"]+)"', text)) for path, text in pages.items()}
-    dead = []
-    for page, text in pages.items():
-        for target in set(re.findall(r'<(?:a|img)\b[^>]*?\b(?:href|src)="([^"]*)"', text)):
-            path, _, anchor = target.partition("#")
-            file = Path(os.path.normpath(page.parent / path)) if path else page
-            if re.match(r"\w+:", target) or (file.is_dir() and not anchor):
-                continue
-            if not file.is_file() or (anchor and file in anchors and anchor not in anchors[file]):
-                dead.append(f"{page.relative_to(config.site_dir)}: {target}")
-    if dead:
-        raise PluginError("dead links:\n" + "\n".join(sorted(dead)))

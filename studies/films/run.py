@@ -1,4 +1,4 @@
-"""Fills in the tables of README.md and draws its figures, from the banks that `reduce` wrote; in three minutes."""
+"""Fills in the tables of README.md and draws its figures, from the folder that has those of its sweeps."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+import warpchain
 from studies.common import publish, run_study, table
 from studies.films.calibration import CAMERA, Calibration, Wanted, calibrate, set_of_films
 from studies.films.drawing import SYMBOLS, corner, coverage_figure, line_figure
-from studies.films.reduce import load
 from warpchain import films
 
 FOLDER = Path(__file__).parent
@@ -98,12 +98,16 @@ def lines_table(banks: Mapping[str, films.Bank]) -> str:
     return table(("chains", "links/Hz", "σ of μ", "bias / σ", "within σ / %", "within 1.96 σ / %"), rows)
 
 
-def main(banks: Path) -> None:
+def main(folder: Path) -> None:
     """Calibrate, compare, draw."""
-    bank, long = (load(banks / f"{name}_main.npz") for name in ("film_bank", "film_bank_90"))
-    same = load(banks / "film_truths_same.npz")
-    blocks = {"e_t = 0.3": "tangential", "links 5 % heavier": "heavier", "paper's joints": "paper_main"}
-    others = {kind: load(banks / f"film_truths_{block}.npz") for kind, block in blocks.items()}
+
+    def bank_of(sweep: str, block: str = "main") -> films.Bank:
+        return films.Bank.of(warpchain.load(folder / sweep).blocks[block])
+
+    bank, long, same = bank_of("film_bank"), bank_of("film_bank_90"), bank_of("film_truths", "same")
+    blocks = {"e_t = 0.3": "tangential", "links 5 % heavier": "heavier"}
+    others = {kind: bank_of("film_truths", block) for kind, block in blocks.items()}
+    others["paper's joints"] = bank_of("film_truths_paper")
 
     def cells_of(found: Calibration) -> tuple[str, ...]:
         return *calibration_rows(found), percent(found.refused)
