@@ -1,6 +1,6 @@
-"""Prints the tables of README.md and draws its figures, in a few minutes; that of the kinks from a folder."""
+"""Makes the tables of README.md but those of starts, and its figures, in minutes; that of kinks from a folder."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,7 +9,7 @@ import typer
 from matplotlib.figure import Figure
 
 import warpchain
-from studies.common import DASHES, FREQUENCY, GREEN, LINE_COLORS, RED, publish, run_study, tidy
+from studies.common import DASHES, FREQUENCY, GREEN, LINE_COLORS, RED, minus, publish, run_study, table, tidy
 from studies.stationary_loop import theory
 
 FOLDER = Path(__file__).parent
@@ -23,8 +23,6 @@ OTHERS = {
     "hardly any Coulomb friction": {"coulomb_friction": 1e-6},
 }
 """Changes of the chain whose loop is shown."""
-LESS = {"theory": (), "without Coulomb": ("coulomb_friction",), "without friction": ("viscous_friction",)}
-"""Frictions that theories leave out, one after the other."""
 UNDAMPED = {"load_factor": 1.0, "steady_time": 0.0, "steady_tolerance": 1.0, "further_hold": 40.0}
 
 
@@ -34,62 +32,38 @@ def held(links: int, frequency: float, values: Mapping[str, float]) -> warpchain
     return warpchain.walk(links=links, frequency=frequency, preset="soft", start="spinning", **settings)
 
 
-def compare(name: str, ours: Any, theirs: Any) -> None:
-    """Prints how far two mean loops are apart."""
-    middle = np.abs(ours.s) < 0.45 * (ours.free[1] - ours.free[0])
-    s = ours.s[middle]
-    apart = np.hypot(*(ours.position[middle] - theory.places(theirs, s)).T)
-    tension = ours.effective_tension[middle] - np.interp(s, theirs.s, theirs.effective_tension)
-    curvature = ours.curvature[middle] - np.interp(s, theirs.s, theirs.curvature)
-    width, height = np.ptp(ours.position, axis=0) / np.ptp(theirs.position, axis=0) - 1
-    print(
-        f"{name}: held under multiplied loads against 40 s under its own: height {100 * height:+.2f} %, "
-        f"width {100 * width:+.2f} %, places {1e3 * theory.rms(apart):.2f} mm rms, curvature "
-        f"{theory.rms(curvature):.2f} of {theirs.curvature.max():.1f} 1/m, tension "
-        f"{theory.rms(tension):.4f} of {theirs.effective_tension.max():.2f} N"
-    )
+def shape_rows(title: str, loop: Any) -> Iterator[tuple[str, ...]]:
+    """Curvature of a loop [1/m] in simulation, theory and as a catenary; how far apart shapes [mm] and tensions are."""
 
+    def at(value: float, place: float) -> str:
+        return f"{value:.1f} at {100 * place:.1f}"
 
-def row(name: str, bottom: float, kink: Sequence[float], rest: str) -> None:
-    """Prints curvatures of a loop: at the lowest point, the greatest and the least with their places."""
-    peak, peak_at, dip, dip_at = kink
-    print(
-        f"  {name:22} bottom {bottom:6.2f} 1/m, greatest {peak:6.2f} at {100 * peak_at:5.1f} cm, "
-        f"least {dip:6.2f} at {100 * dip_at:5.1f} cm; {rest}"
-    )
-
-
-def show_theory(name: str, loop: Any, found: theory.TheoreticalLoop) -> None:
-    """Prints bottom curvature, peak and dip of a predicted curve, and how far it is from the simulated one."""
-    near = np.abs(found.s) < 0.35 * (loop.free[1] - loop.free[0])
-    peak = int(np.argmax(np.where(near, found.curvature, -np.inf)))
-    dip = int(np.argmin(np.where(near, found.curvature, np.inf)))
+    kink = loop.kink()
+    bends = at(kink.peak, kink.peak_at), at(kink.dip, kink.dip_at)
+    yield title, "simulation", f"{loop.bottom_curvature:.1f}", *bends, "", ""
     curve = theory.places(loop, np.linspace(loop.s[0], loop.s[-1], 20_000))
-    apart = np.array([np.hypot(*(curve - point).T).min() for point in found.position])
-    tension = found.effective_tension - np.interp(found.s, loop.s, loop.effective_tension)
-    kink = found.curvature[peak], found.s[peak], found.curvature[dip], found.s[dip]
-    distances = f"shape {1e3 * theory.rms(apart):.2f} mm rms, {1e3 * apart.max():.2f} at most"
-    row(name, np.interp(0, found.s, found.curvature), kink, f"{distances}; tension {theory.rms(tension):.4f} N rms")
+    for name, found in (("theory", theory.predict(loop)), ("catenary", theory.catenary_of(loop))):
+        near = np.abs(found.s) < 0.35 * (loop.free[1] - loop.free[0])
+        s, curvature = found.s[near], found.curvature[near]
+        bends = tuple(at(curvature[place], s[place]) for place in (np.argmax(curvature), np.argmin(curvature)))
+        apart = 1e3 * np.array([np.hypot(*(curve - point).T).min() for point in found.position])
+        tension = found.effective_tension - np.interp(found.s, loop.s, loop.effective_tension)
+        distances = f"{theory.rms(apart):.2f} ({apart.max():.2f})", f"{theory.rms(tension):.3f}"
+        yield "", name, f"{np.interp(0, found.s, found.curvature):.1f}", *bends, *distances
 
 
-def show(name: str, walk: warpchain.WalkResult) -> None:
-    """Prints what is known of one loop."""
-    if walk.before_release is None:
-        print(f"{name}: {walk.status.label}")
-        return
-    loop, chain = walk.mean_loop(), {}
-    print(f"{name}: v = {loop.speed:.3f} m/s, held for {walk.hold_time:.2f} s, drift {100 * walk.drift:.2f} %")
-    row("simulation", loop.bottom_curvature, loop.kink(), f"joints within {1e3 * loop.spread.max():.3f} mm")
-    for which, less in LESS.items():
-        chain |= {name: 0.0 for name in less}
-        try:
-            show_theory(which, loop, theory.predict(loop, chain))
-        except ArithmeticError as error:
-            print(f"  {which:22} {error}")
-    show_theory("catenary", loop, theory.catenary_of(loop))
-    balances = theory.imbalances(loop).items()
-    texts = (f"{key} {100 * mean:.1f} % ({100 * greatest:.1f} %)" for key, (mean, greatest) in balances)
-    print("  balances, rms (greatest):", ", ".join(texts))
+def same_row(title: str, ours: Any, theirs: Any) -> tuple[str, ...]:
+    """How far two mean loops are apart: height and width, places, curvature, tension."""
+    s = ours.s[np.abs(ours.s) < 0.45 * (ours.free[1] - ours.free[0])]
+    apart = 1e3 * np.hypot(*(theory.places(ours, s) - theory.places(theirs, s)).T)
+    width, height = 100 * (np.ptp(ours.position, axis=0) / np.ptp(theirs.position, axis=0) - 1)
+    tension, curvature = (
+        np.interp(s, ours.s, getattr(ours, name)) - np.interp(s, theirs.s, getattr(theirs, name))
+        for name in ("effective_tension", "curvature")
+    )
+    bend = f"{theory.rms(curvature):.2f} 1/m ({theirs.curvature.max():.1f})"
+    pull = f"{theory.rms(tension):.3f} N ({theirs.effective_tension.max():.1f})"
+    return title, f"{height:.2f} %", f"{width:.2f} %", f"{theory.rms(apart):.2f} mm", bend, pull
 
 
 def draw(walk: warpchain.WalkResult) -> Figure:
@@ -135,17 +109,27 @@ def draw_kinks(result: warpchain.SweepResult) -> Figure:
 
 
 def main(kinks: Annotated[str | None, typer.Argument()] = None) -> None:
-    """Print all tables and draw the figures."""
+    """Write all tables and draw the figures."""
     if kinks is not None:
         publish(FOLDER, {}, {"kink": draw_kinks(warpchain.load(kinks))}, dpi=100)
-    for links, frequency in CELLS:
-        title, walk = f"{links} links, {frequency:g} Hz", held(links, frequency, {})
-        show(title, walk)
-        compare(title, walk.mean_loop(), held(links, frequency, UNDAMPED).mean_loop())
-        if (links, frequency) == SHOWN:
-            publish(FOLDER, {}, {"loop": draw(walk)}, dpi=100)
-    for text, values in OTHERS.items():
-        show(f"{SHOWN[0]} links, {SHOWN[1]:g} Hz, {text}", held(*SHOWN, values))
+    chains = {f"{links}, {frequency:g}": ((links, frequency), {}) for links, frequency in CELLS}
+    shapes, balances, same = [], [], []
+    for title, (cell, values) in {**chains, **{text: (SHOWN, values) for text, values in OTHERS.items()}}.items():
+        walk = held(*cell, values)
+        loop = walk.mean_loop()
+        shapes += shape_rows(title, loop)
+        balances.append((title, *(f"{100 * error:.1f} %" for error, _ in theory.imbalances(loop).values())))
+        if not values:
+            same.append(same_row(title, loop, held(*cell, UNDAMPED).mean_loop()))
+            if cell == SHOWN:
+                figure = draw(walk)
+    shape_head = "links, Hz |  | at the lowest point | greatest | least | shape, mm rms (greatest) | tension, N rms"
+    tables = {
+        "shapes": table(shape_head, shapes),
+        "balances": table("links, Hz | force | normal force | moment | friction", balances),
+        "same loop": table("links, Hz | height | width | place | curvature | tension less ρv²", same),
+    }
+    publish(FOLDER, {name: minus(text) for name, text in tables.items()}, {"loop": figure}, dpi=100)
 
 
 if __name__ == "__main__":

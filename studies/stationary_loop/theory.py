@@ -8,8 +8,7 @@ With the signs of `walk.mean_loop()`, p = κ' and M = f(ℓ v p), where f(w) = �
 These are seven functions with seven conditions: x, y, φ, κ at the lift-off and x, y, φ at the touch-down, because the
 theory does not include the sprocket. κ is given at the lift-off because the motion carries standing waves along: they
 start there, and not at the touch-down. The length of the free part is given, too: it follows from the number of links.
-Without friction p = N / (j v²), and φ at the touch-down is not given either. Without friction and inertia
-T_e κ = ρ g cos φ: the catenary, for which only its ends and its length are given.
+Without friction and inertia T_e κ = ρ g cos φ: the catenary, for which only its ends and its length are given.
 
 With a small ω_c the moment is almost a step wherever a joint changes its sense of rotation. The solver therefore starts
 with large ω_c and ends at `LEAST_SMOOTHING`. Joints turn at 60 rad/s where the loop bends; from there to 0.1 rad/s
@@ -73,7 +72,10 @@ class TheoreticalLoop:
 
 
 def predict(loop: MeanLoop, values: Mapping[str, float] | None = None) -> TheoreticalLoop:
-    """The free part in theory, with the ends and the speed of a mean loop, the first guess, and other parameters."""
+    """The free part in theory, with the ends and the speed of a mean loop, the first guess, and other parameters.
+
+    Joints have viscous friction, and may have Coulomb friction.
+    """
     p = loop.parameters.with_values(values or {})
     inset = IN_LINKS * loop.parameters.link_length
     first, last = loop.free[0] + inset, loop.free[1] - inset
@@ -81,25 +83,18 @@ def predict(loop: MeanLoop, values: Mapping[str, float] | None = None) -> Theore
     columns = (loop.angle, loop.curvature, loop.bending, loop.effective_tension, loop.shear)
     values = np.stack([np.interp(s, loop.s, values) for values in (*loop.position.T, *columns)])
     ends, share = values[:4, [0, -1]].T, np.linspace(0.0, 1.0, len(s))
-    rubs = p.viscous_friction > 0 or p.coulomb_friction > 0
-    given = 3 if rubs else 2  # of x, y, φ at the touch-down
-    if not rubs:
-        values = np.delete(values, 4, axis=0)
     length, spin, weight = last - first, p.link_length * loop.speed, loop.density * p.gravity
     turning = bending_inertia(loop) * loop.speed**2
 
     def slope(smoothing: float, share: Array, values: Array) -> Array:
-        _, _, angle, curvature, *bending, tension, shear = values
-        cosine, sine, bend = np.cos(angle), np.sin(angle), bending[0] if rubs else shear / turning
-        rates = [-cosine, sine, curvature, bend]
-        if rubs:
-            tanh = np.tanh(spin * bend / smoothing)
-            friction = p.viscous_friction + p.coulomb_friction / smoothing * (1 - tanh**2)
-            rates.append((turning * bend - shear) / (spin * friction))
+        _, _, angle, curvature, bend, tension, shear = values
+        cosine, sine, tanh = np.cos(angle), np.sin(angle), np.tanh(spin * bend / smoothing)
+        friction = p.viscous_friction + p.coulomb_friction / smoothing * (1 - tanh**2)
+        rates = [-cosine, sine, curvature, bend, (turning * bend - shear) / (spin * friction)]
         return length * np.stack([*rates, shear * curvature + weight * sine, weight * cosine - tension * curvature])
 
     def conditions(start: Array, end: Array) -> Array:
-        return np.concatenate([start[:4] - ends[0], end[:given] - ends[1, :given]])
+        return np.concatenate([start[:4] - ends[0], end[:3] - ends[1, :3]])
 
     least = max(p.friction_smoothing, LEAST_SMOOTHING)
     for smoothing in (*(each for each in SMOOTHINGS if each > least and p.coulomb_friction > 0), least):
@@ -108,7 +103,7 @@ def predict(loop: MeanLoop, values: Mapping[str, float] | None = None) -> Theore
             reason = found.message.lower().rstrip(".")
             raise ArithmeticError(f"the boundary value problem was not solved ({reason})")
         share, values = found.x, found.y
-    x, y, angle, curvature, *bending, tension, shear = found.sol(np.linspace(0.0, 1.0, POINTS))
+    x, y, angle, curvature, bending, tension, shear = found.sol(np.linspace(0.0, 1.0, POINTS))
     s, lowest = length * np.linspace(0.0, 1.0, POINTS), int(np.argmin(y))
     around = slice(max(lowest - 2, 0), lowest + 3)
     return TheoreticalLoop(
@@ -118,7 +113,7 @@ def predict(loop: MeanLoop, values: Mapping[str, float] | None = None) -> Theore
         curvature=curvature,
         effective_tension=tension,
         shear=shear,
-        moment=moment(p, spin * (bending[0] if rubs else shear / turning), smoothing),
+        moment=moment(p, spin * bending, smoothing),
     )
 
 
