@@ -12,7 +12,7 @@ def table(rows: list[dict[str, str]]) -> str:
     """What a tilt at the release does, in Markdown: means over the cells, ± standard error; r.m.s. drift and yaw."""
     head = "tilt / rad | fell over | before the loop collapsed | Δx, tilting over fixed | least and greatest cell"
     shown = "{fell} %", "{early} %", "{ratio} ± {error}", "{least}, {greatest}", "{drift}", "{yaw}"
-    lines = ((row["tap"].split()[1], *(text.format(**row) for text in shown)) for row in rows if row["links"] == "all")
+    lines = ((row["tap"].split()[1], *(text.format(**row) for text in shown)) for row in rows)
     return common.table(f"{head} | drift / m | yaw / °", lines)
 
 

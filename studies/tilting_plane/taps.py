@@ -17,7 +17,7 @@ FEW = 3  # Walks of a cell that are enough for a mean
 
 
 def reduced(folder: str, needed: str) -> tuple[warpchain.SweepResult, list[dict[str, str]]]:
-    """A sweep, and rows: what each tap does, over the cells and, of those of one number of links, alone."""
+    """A sweep, and rows: what each tap does, over the cells."""
     result, found = warpchain.load(folder), []
     if not {"fixed", needed} <= result.blocks.keys():
         raise warpchain.InputError(f"{folder}: no blocks fixed and {needed}; give a folder of the page's sweep")
@@ -32,30 +32,27 @@ def reduced(folder: str, needed: str) -> tuple[warpchain.SweepResult, list[dict[
             columns = {key: values[(slice(None), slice(None), *place)] for key, values in block.columns.items()}
             tap = {**{key: settings[name][key] for key in UNITS if settings[name].get(key)}, **at}
             text = ", ".join(f"{key} {value:g} {UNITS[key]}" for key, value in tap.items())
-            for links in ("all", *block.axes["links"].tolist()):
-                rows = slice(None) if links == "all" else block.axes["links"] == links
-                found.append({"tap": text.replace("_", " "), "links": str(links), **_of_cells(columns, fixed, rows)})
+            found.append({"tap": text.replace("_", " "), **_of_cells(columns, fixed)})
     return result, found
 
 
-def _of_cells(columns: Columns, fixed: Any, rows: Any) -> dict[str, str]:
-    """Numbers of one tap over some cells, (links, frequency, samples)."""
-    rest = columns["status"][rows] == warpchain.Status.AT_REST
-    dx, drift = (np.where(rest, columns[name][rows].astype(float), np.nan) for name in ("dx", "lateral_drift"))
-    ratio = mean(dx) / fixed.mean[rows]
+def _of_cells(columns: Columns, fixed: Any) -> dict[str, str]:
+    """Numbers of one tap over the cells, columns (links, frequency, samples)."""
+    rest = columns["status"] == warpchain.Status.AT_REST
+    dx, drift = (np.where(rest, columns[name].astype(float), np.nan) for name in ("dx", "lateral_drift"))
+    ratio = mean(dx) / fixed.mean
     own = standard_error(dx) / mean(dx)
-    over = OverCells(ratio, ratio * np.hypot(own, fixed.standard_error[rows] / fixed.mean[rows]))
+    over = OverCells(ratio, ratio * np.hypot(own, fixed.standard_error / fixed.mean))
     found = {
         "walks": str(rest.sum()),
-        "fell": f"{100 * columns['fell_over'][rows].mean():.3g}",
-        "early": f"{100 * columns['fell_before_collapse'][rows].mean():.3g}",
+        "fell": f"{100 * columns['fell_over'].mean():.3g}",
+        "early": f"{100 * columns['fell_before_collapse'].mean():.3g}",
         "ratio": f"{over.mean:.3f}",
         "error": f"{over.error:.3f}",
         "least": f"{ratio.min():.2f}",
         "greatest": f"{ratio.max():.2f}",
         "drift": f"{np.sqrt(np.nanmean(drift**2)):.3f}",
-        "yaw": f"{np.degrees(np.sqrt(np.nanmean(columns['final_yaw'][rows].astype(float) ** 2))):.2g}",
-        "tilt_at_most": f"{np.degrees(np.nanmedian(columns['greatest_tilt'][rows].astype(float))):.0f}",
+        "yaw": f"{np.degrees(np.sqrt(np.nanmean(columns['final_yaw'].astype(float) ** 2))):.2g}",
     }
     for bound in STRAIGHT:
         straight = np.abs(drift) <= bound * np.abs(dx)
@@ -63,7 +60,6 @@ def _of_cells(columns: Columns, fixed: Any, rows: Any) -> dict[str, str]:
         kept = mean(np.where(straight, dx, np.nan)[enough]) / mean(dx)[enough]
         found[f"straight_{bound:g}"] = f"{100 * straight.sum() / rest.sum():.0f}"
         found[f"kept_{bound:g}"] = f"{mean(kept):.3f}"
-        found[f"kept_cells_{bound:g}"] = str(enough.sum())
     return found
 
 
@@ -73,21 +69,11 @@ def taps_table(rows: list[dict[str, str]]) -> str:
     shown = ["{fell} %", "{early} %", "{ratio} ± {error} ({least} to {greatest})", "{drift}"]
     lines = []
     for row in rows:
-        if row["links"] == "all":
-            straight = (f"{row[f'straight_{bound:g}']} %, {row[f'kept_{bound:g}']}" for bound in STRAIGHT)
-            texts = [text.format(**row) for text in shown] + [text.replace("nan", "—") for text in straight]
-            lines.append((minus(row["tap"]), *texts))
+        straight = (f"{row[f'straight_{bound:g}']} %, {row[f'kept_{bound:g}']}" for bound in STRAIGHT)
+        texts = [text.format(**row) for text in shown] + [text.replace("nan", "—") for text in straight]
+        lines.append((minus(row["tap"]), *texts))
     heads = (f"straight to {bound:g}: walks, Δx over all" for bound in STRAIGHT)
     return table(" | ".join([head, *heads]), lines)
-
-
-def by_links(rows: list[dict[str, str]]) -> str:
-    """Share of walks that fell over before their loop collapsed, by tap and number of links."""
-    early: dict[str, dict[str, str]] = {}
-    for row in rows:
-        if row["links"] != "all":
-            early.setdefault(minus(row["tap"]), {})[f"{row['links']} links"] = f"{row['early']} %"
-    return table(("tap", *next(iter(early.values()))), ((tap, *texts.values()) for tap, texts in early.items()))
 
 
 def main(folder: Annotated[str | None, typer.Argument()] = None) -> None:
@@ -96,7 +82,7 @@ def main(folder: Annotated[str | None, typer.Argument()] = None) -> None:
     if folder is not None:
         write_rows(path, reduced(folder, "lateral_speed")[1])
     rows = list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
-    publish(FOLDER, {"taps": taps_table(rows), "taps by links": by_links(rows)})
+    publish(FOLDER, {"taps": taps_table(rows)})
 
 
 if __name__ == "__main__":
