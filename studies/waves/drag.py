@@ -27,37 +27,14 @@ VARIANTS = (
     *((when, rate) for when in ("in flight", "in impacts") for rate in HALVES),
 )
 """Drags: when they act, and at which rate [1/s] fast waves die; the second changes the bits and nothing else."""
-NAMES = ("position", "velocity", "numbers")  # Arrays of a release
 
 
 def released(links: int, frequency: float, seed: int) -> tuple[Array, Array, warpchain.Parameters]:
-    """Position and velocity of the links at the release, (n, 3) each, and the chain's parameters.
-
-    Velocities are those of joints over the first three frames, some 1e-5 s apart, to second order: good to 1e-5 m/s.
-    """
-    scene = {"links": links, "frequency": frequency, "start": "spinning", "walk_limit": 4e-5}
-    walk = warpchain.walk(preset="soft", **scene, frame_interval=1e-5, seed=seed)
-    first, second, third = walk.frame_joints[:3]
-    one, two = walk.frame_time[1:3]
-    joints = np.stack([first, ((second - first) * two / one - (third - first) * one / two) / (two - one)])
-    before = np.roll(joints, 1, axis=1)
-    chord, change = joints - before
-    center, speed = 0.5 * (joints + before)
-    angle = np.arctan2(chord[:, 1], chord[:, 0])
-    turning = (chord[:, 0] * change[:, 1] - chord[:, 1] * change[:, 0]) / np.sum(chord**2, axis=1)
-    return np.column_stack([center, angle]), np.column_stack([speed, turning]), walk.setup.parameters
-
-
-def release(path: Path) -> None:
-    """Hold and release all loops, and write their states: arrays of each cell by its number."""
-    kept: dict[str, Array] = {}
-    for cell, (links, frequency) in enumerate(CELLS):
-        seeds = [first + sample for first in SEEDS for sample in range(SAMPLES)]
-        states = [released(links, frequency, seed) for seed in seeds]
-        arrays = ((position, velocity, list(chain.model_dump().values())) for position, velocity, chain in states)
-        kept |= {f"{name}{cell}": np.array(each) for name, each in zip(NAMES, zip(*arrays, strict=True), strict=True)}
-        print(f"{links} links at {frequency:g} Hz", flush=True)
-    np.savez_compressed(path, **kept)
+    """Position and velocity of the links at the release, (n, 3) each, and the chain's parameters."""
+    scene = {"links": links, "frequency": frequency, "start": "spinning", "walk_limit": 1e-4}
+    walk = warpchain.walk(preset="soft", **scene, seed=seed)
+    state = walk.state(0.0)
+    return state.position, state.velocity, walk.setup.parameters
 
 
 def walked(
@@ -94,17 +71,16 @@ def walked(
     return {name: values.reshape(copies, -1) for name, values in found.items()}
 
 
-def walk(releases: Path, out: Path, device: Annotated[str, typer.Argument()] = "cpu") -> None:
-    """Walk on from all releases with every variant; arrays (variants, releases) by cell."""
-    states, names, found = np.load(releases), warpchain.Parameters.model_fields, {}
+def main(out: Path, device: Annotated[str, typer.Argument()] = "cpu") -> None:
+    """Hold and release all loops, and walk on with every variant; arrays (variants, releases) by number of the cell."""
+    seeds, found = [first + sample for first in SEEDS for sample in range(SAMPLES)], {}
     for cell, (links, frequency) in enumerate(CELLS):
-        position, velocity, numbers = (states[f"{name}{cell}"] for name in NAMES)
-        chains = [warpchain.Parameters(**dict(zip(names, row, strict=True))) for row in numbers.tolist()]
-        result = walked(position, velocity, chains, device)
+        position, velocity, chains = zip(*(released(links, frequency, seed) for seed in seeds), strict=True)
+        result = walked(np.array(position), np.array(velocity), chains, device)
         found |= {f"{name}{cell}": values for name, values in result.items()}
         np.savez_compressed(out, **found)
         print(f"{links} links at {frequency:g} Hz", flush=True)
 
 
 if __name__ == "__main__":
-    run_study(release, walk)
+    run_study(main)
