@@ -47,19 +47,14 @@ def sum_of_powers(power: float | None) -> Fit:
     return fit
 
 
-def spline_of(variable: Prediction, unit: Prediction) -> Fit:
-    """Fits the spline of Δx in a unit over a variable; no further numbers."""
+def spline(c: float, d: float) -> Fit:
+    """Fits the spline of Δx/n^d over ν n^c; no further numbers."""
 
     def fit(points: Points) -> tuple[Array, Prediction]:
-        curve, _ = laws.master_curve(variable(points), points.distance / unit(points))
-        return np.array([]), lambda others: curve(variable(others)) + np.log(unit(others))
+        curve, _ = laws.master_curve(points.frequency * points.links**c, points.distance / points.links**d)
+        return np.array([]), lambda others: curve(others.frequency * others.links**c) + d * np.log(others.links)
 
     return fit
-
-
-def spline(c: float, d: float) -> Fit:
-    """Fits the spline of Δx/n^d over ν n^c."""
-    return spline_of(lambda points: points.frequency * points.links**c, lambda points: points.links**d)
 
 
 def fitted_spline(points: Points, *powers: float) -> tuple[Array, Prediction]:
@@ -69,8 +64,12 @@ def fitted_spline(points: Points, *powers: float) -> tuple[Array, Prediction]:
 
 def power_law(points: Points) -> tuple[Array, Prediction]:
     """Fits Δx ∝ ν^p n^q; its numbers are p and q."""
-    p, q, shift = laws.power_law(points.distance, points.frequency, points.links)[0]
-    return np.array([p, q]), lambda others: shift + p * np.log(others.frequency) + q * np.log(others.links)
+
+    def design(cells: Points) -> Array:
+        return np.log(np.stack([cells.frequency, cells.links, np.full(len(cells), np.e)], axis=1))
+
+    weights = np.linalg.lstsq(design(points), np.log(points.distance), rcond=None)[0]
+    return weights[:2], lambda others: design(others) @ weights
 
 
 def residual(points: Points, candidate: Candidate) -> Array:
@@ -88,7 +87,6 @@ CANDIDATES = (
     Candidate("Δx ∝ ν^p n^q", 3, power_law),
     Candidate("spline of Δx/(nℓ) over v²/(g nℓ)", NUMBERS, spline(-0.5, 1.0)),
     Candidate("spline of Δx/(nℓ) over ν²ℓ/g", NUMBERS, spline(0.0, 1.0)),
-    Candidate("spline of Δx/H over v²/(g H)", NUMBERS, spline_of(lambda c: c.speed**2 / c.height, lambda c: c.height)),
     Candidate("spline of Δx/ℓ over v²/(g nℓ)", NUMBERS, spline(-0.5, 0.0)),
     Candidate("spline of Δx/ℓ over ν²ℓ/g", NUMBERS, spline(0.0, 0.0)),
 )

@@ -37,16 +37,14 @@ def points_of(cells: Columns) -> Points:
     """The cells that have a mean, and few enough failures, as the laws take them, shape (cells,).
 
     Fields are links, frequency [Hz], the mean distance Δx [m] of walks; speed [m/s] of the loop,
-    length nℓ [m] of the chain, turns of the loop per second v/(nℓ), Δx/(nℓ) as lengths, and the height H [m] of the
-    loop that hangs on the sprocket, straight sides and two half circles.
+    length nℓ [m] of the chain, turns of the loop per second v/(nℓ), and Δx/(nℓ) as lengths.
     """
     failed = cells["walks"] - cells["at_rest"]
     used = (cells["at_rest"] > 0) & (failed <= MOST_FAILED * cells["walks"]) & (cells["dx_mean"] > 0)
     links, frequency, distance = (cells[name][used] for name in ("links", "frequency", "dx_mean"))
     speed, length = 2 * np.pi * RADIUS * frequency, links * LINK_LENGTH
-    height = 2 * RADIUS + np.maximum(length / 2 - np.pi * RADIUS, 0.0)
-    columns = links, frequency, distance, speed, length, speed / length, distance / length, height
-    return np.rec.fromarrays(columns, names="links,frequency,distance,speed,length,turns,lengths,height")
+    columns = links, frequency, distance, speed, length, speed / length, distance / length
+    return np.rec.fromarrays(columns, names="links,frequency,distance,speed,length,turns,lengths")
 
 
 def master_curve(x: Array, y: Array) -> tuple[Callable[[Array], Array], Array]:
@@ -85,13 +83,6 @@ def best_powers(points: Points) -> tuple[float, float]:
     """Exponents (c, d) of Δx/n^d over ν n^c with the least residual."""
     settings = {"method": "Nelder-Mead", "options": {"xatol": 1e-4, "fatol": 1e-5}}
     return tuple(minimize(lambda powers: residual_of(points, *powers), (-1.1, 1.1), **settings).x)
-
-
-def power_law(values: Array, *factors: Array) -> tuple[Array, Array]:
-    """Exponents of the factors in values ∝ a product of powers, last the logarithm of what it is ∝ to; ln residuals."""
-    design = np.log(np.stack([*factors, np.full(len(values), np.e)], axis=1))
-    weights = np.linalg.lstsq(design, np.log(values), rcond=None)[0]
-    return weights, np.log(values) - design @ weights
 
 
 def root_mean_square(left: Array, numbers: int = 0) -> float:
