@@ -1,6 +1,5 @@
 """What all studies share: their commands, statistics, how their figures look, and how tables get into their pages."""
 
-import csv
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -8,6 +7,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+import pandas
 import typer
 import xarray
 from matplotlib.axes import Axes
@@ -150,24 +150,14 @@ def error_line(axes: Axes, x: Any, cells: Any, place: tuple[Any, ...], **style: 
 
 def read_columns(path: Path) -> dict[str, Array]:
     """The columns of a file of comma-separated values: texts where not all are numbers."""
-    with path.open(encoding="utf-8", newline="") as file:
-        head, *rows = csv.reader(file)
-    columns = {}
-    for name, *texts in zip(head, *rows, strict=True):
-        try:
-            columns[name] = np.array(texts, float)
-        except ValueError:
-            columns[name] = np.array(texts)
-    return columns
+    columns = pandas.read_csv(path, float_precision="round_trip").items()
+    return {name: each.to_numpy(float if pandas.api.types.is_numeric_dtype(each) else str) for name, each in columns}
 
 
 def write_rows(path: Path, rows: Iterable[Mapping[str, object]]) -> None:
     """Write them with commas between values; numbers that are not whole have six digits."""
-    rows = list(rows)
-    lines = ([f"{value:.6g}" if isinstance(value, float) else value for value in row.values()] for row in rows)
     path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", encoding="utf-8", newline="") as file:
-        csv.writer(file, lineterminator="\n").writerows([list(rows[0]), *lines])
+    pandas.DataFrame(list(rows)).to_csv(path, index=False, float_format="%.6g", na_rep="nan")
 
 
 def with_tables(text: str, tables: Mapping[str, str]) -> str:

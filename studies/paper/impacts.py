@@ -25,7 +25,6 @@ class Impact:
     height: float
     width: float
     speed: float  # … and of the mean speed of the links along the loop
-    moved: float  # By how much the outline moved, root mean square, over the radius of a circle of the same area
 
 
 def first_impact(walk: Any) -> Impact | None:
@@ -44,9 +43,6 @@ def first_impact(walk: Any) -> Impact | None:
     before, after = (joints[place] - joints[place].mean(axis=0) for place in (first - 1, last + 1))
     sizes = [(area_of(each), *np.ptp(each, axis=0)) for each in (before, after)]
     area, width, height = (float(new / old - 1) for old, new in zip(*sizes, strict=True))
-    # How far the outline moved, at the best of all shifts by whole links.
-    shifts = (np.roll(after, shift, axis=0) for shift in range(len(after)))
-    moved = np.sqrt(min(np.sum((before - each) ** 2, axis=1).mean() for each in shifts))
     return Impact(
         before=before,
         after=after,
@@ -55,7 +51,6 @@ def first_impact(walk: Any) -> Impact | None:
         height=height,
         width=width,
         speed=_speed(joints, time, last + 1) / _speed(joints, time, first - 2) - 1,
-        moved=float(moved) / float(np.sqrt(sizes[0][0] / np.pi)),
     )
 
 

@@ -122,7 +122,7 @@ def first_impacts(block: Block) -> Numbers:
     """Changes of shape and speed in the first impact, means over the walks of each cell, and of all walks."""
     found, without = impacts(block)
     content: Numbers = {"walks": sum(map(len, found.values())), "without": without}
-    for name in ("area", "height", "width", "speed", "moved", "duration"):
+    for name in ("area", "height", "width", "speed", "duration"):
         table = np.full([len(block.axes[axis]) for axis in CELLS], np.nan)
         for cell, several in found.items():
             table[cell] = np.mean([getattr(impact, name) for impact in several])

@@ -142,12 +142,12 @@ def impacts(numbers: Numbers) -> str:
     content, rows = numbers["paper_shapes"], []
     for place, frequency in enumerate(content["cells"]["frequency"]):
         row = [f"{frequency:g} Hz"]
-        for name in ("area", "height", "width", "speed", "moved"):
-            values, show = content["impacts"][name][:, place], plain if name == "moved" else percent
-            values = values[np.isfinite(values)]
-            row.append(f"{show(values.mean())} ({show(values.min())} to {show(values.max())})" if len(values) else "—")
+        for name in ("area", "height", "width", "speed"):
+            values = content["impacts"][name][:, place]
+            ends = (percent(each(values[np.isfinite(values)])) for each in (np.mean, np.min, np.max))
+            row.append("{} ({} to {})".format(*ends) if np.isfinite(values).any() else "—")
         rows.append(row)
-    return table(["", "area", "height", "width", "speed along the loop", "outline moved"], rows)
+    return table(["", "area", "height", "width", "speed along the loop"], rows)
 
 
 def effects(numbers: Numbers) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 import typer
 
 import warpchain
-from studies.common import Array, Columns, publish, read_columns, run_study, table, write_rows
+from studies.common import Columns, publish, read_columns, run_study, table, write_rows
 from studies.phase_diagram import candidates, cells, drawing, laws, scales, strands
 from studies.phase_diagram.cells import FAILURES, WAYS
 from studies.phase_diagram.endings import Ending
@@ -56,16 +56,9 @@ def table_of_failures(cells: Columns) -> str:
     for name in ("at_rest", *(code.label for code in FAILURES), "missing"):
         there = cells[name] > 0
         if there.any() or name == "at_rest":
-            where = f"{span(cells['links'][there])} links, {span(cells['frequency'][there])} Hz"
-            rows.append((f"`{name}`", f"{cells[name].sum():,.0f}", there.sum(), "" if there.all() else where))
+            rows.append((f"`{name}`", f"{cells[name].sum():,.0f}", there.sum()))
     total = f"{cells['walks'].sum():,.0f} walks in {len(cells['links'])} cells."
-    return f"{table('status | walks | cells | where', rows)}\n\n{total}"
-
-
-def span(values: Array) -> str:
-    """The least and the greatest of some values."""
-    least, greatest = f"{values.min():g}", f"{values.max():g}"
-    return least if least == greatest else f"{least} to {greatest}"
+    return f"{table('status | walks | cells', rows)}\n\n{total}"
 
 
 def make(
