@@ -150,7 +150,7 @@ def error_line(axes: Axes, x: Any, cells: Any, place: tuple[Any, ...], **style: 
 
 def read_columns(path: Path) -> dict[str, Array]:
     """The columns of a file of comma-separated values: texts where not all are numbers."""
-    columns = pandas.read_csv(path, float_precision="round_trip").items()
+    columns = pandas.read_csv(path).items()
     return {name: each.to_numpy(float if pandas.api.types.is_numeric_dtype(each) else str) for name, each in columns}
 
 

@@ -19,10 +19,7 @@ FAILURES = tuple(code for code in Status if code not in (Status.RUNNING, Status.
 """What a walk can end with instead of rest."""
 WAYS = tuple(code for code in Ending if code != Ending.UNKNOWN)
 AVERAGED = ("bounces", "walk_time", "hold_time", "collapsed_at")  # Columns of which the file has means at rest
-COLUMNS = (
-    *("status", "dx", "steps_accepted", "steps_rejected", "energy_error", "flight_before_collapse"),
-    *("bounces_before_collapse", *AVERAGED),
-)
+COLUMNS = ("status", "dx", "energy_error", "flight_before_collapse", "bounces_before_collapse", *AVERAGED)
 """Columns of the sweep that are needed."""
 
 
@@ -62,7 +59,6 @@ def reduced(links: int, frequency: float, walks: Columns) -> dict[str, float]:
     known = {name: np.where(values == MISSING, np.nan, values) for name, values in walks.items()}
     rest = status == Status.AT_REST
     dx, codes = walks["dx"][rest].astype(float), endings(walks)[rest]
-    attempts = (known["steps_accepted"] + known["steps_rejected"])[status != MISSING]
     deciles = np.quantile(dx, [0.1, 0.5, 0.9]) if len(dx) else np.full(3, np.nan)
     return {
         "links": links,
@@ -71,7 +67,6 @@ def reduced(links: int, frequency: float, walks: Columns) -> dict[str, float]:
         "missing": int((status == MISSING).sum()),
         "at_rest": len(dx),
         **{code.label: int((status == code).sum()) for code in FAILURES},
-        "told": int((codes != Ending.UNKNOWN).sum()),
         "flight_told": int(np.isfinite(walks["flight_before_collapse"][rest]).sum()),
         "inaccurate": int((walks["energy_error"][rest] > MOST_ENERGY_ERROR).sum()),
         "dx_mean": float(mean(dx)),
@@ -80,6 +75,5 @@ def reduced(links: int, frequency: float, walks: Columns) -> dict[str, float]:
         **dict(zip(("dx_10", "dx_50", "dx_90"), map(float, deciles), strict=True)),
         **{f"{name}_mean": float(mean(known[name][rest])) for name in AVERAGED},
         "bounces_sd": float(deviation(known["bounces"][rest])),
-        "attempts_mean": float(mean(attempts)),
         **{way.label: int((codes == way).sum()) for way in WAYS},
     }
