@@ -24,10 +24,10 @@ class ListLayout:
     touching: int  # GPU scratch: pairs that touch now, beyond those in shared memory
     found_first: int  # CPU scratch: lower joints as found, ordered by (p, q); then those of the pairs that touch now
     found_second: int  # CPU scratch: higher joints, likewise
-    bucket: int  # scratch: last joint put into each bucket, −1 for none
-    next_joint: int  # scratch: the joint put into the same bucket before this one
-    cell_x: int  # scratch: cell of each joint
-    cell_y: int  # scratch: cell of each joint
+    bucket: int  # CPU scratch: last joint put into each bucket, −1 for none
+    next_joint: int  # CPU scratch: the joint put into the same bucket before this one
+    cell_x: int  # CPU scratch: cell of each joint
+    cell_y: int  # CPU scratch: cell of each joint
     owners: int  # GPU scratch of chains too long for shared memory, see :mod:`gpu.contacts.self_contacts`
     geometry: int  # CPU scratch for contacts: doubles, on whole cache lines
     size: int  # integers in all

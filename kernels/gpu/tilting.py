@@ -86,7 +86,7 @@ def copy_plane(target: Row, source: Row):
 
 @functools.cache
 def block_tilting(block_dim: int, votes: int) -> BlockPlane:
-    """A plane that may tilt above a flat floor, for blocks of this size; votes: slot of :func:`barrier_count`."""
+    """A plane that may tilt above a flat floor; votes: slot of :func:`gpu.threads.barrier_count`."""
 
     @wp.func
     def load(run: Run):

@@ -22,7 +22,7 @@ from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.contacts.terrain import Face
-from warpchain.kernels.cpu.contacts.neighbour_list import greatest_displacement, list_slack, neighbour_list
+from warpchain.kernels.cpu.contacts.neighbour_list import list_slack, neighbour_list
 from warpchain.kernels.cpu.contacts.proximity import fixed_contacts, greatest_opening
 from warpchain.kernels.cpu.contacts.self_contacts import self_contacts
 from warpchain.kernels.cpu.explicit import place_ends
@@ -71,7 +71,7 @@ LIST, FLOOR, SPROCKET, SELF, TERRAIN, FAR = 1, 2, 4, 8, 16, 32
 """Parts of a pass, to be added up: make the neighbour list; resolve contacts; nothing was listed before."""
 
 RESULTS = (
-    *("opening", "floor_gap", "sprocket_gap", "fits", "displacement", "slack"),
+    *("opening", "floor_gap", "sprocket_gap", "fits", "slack"),
     *("floor", "sprocket", "self", "self_loss", "self_depth", "strands", "terrain_gap", "terrain"),
 )
 
@@ -118,23 +118,22 @@ def _contact_pass(columns: int) -> wp.Kernel:
             pairs[wp.static(layout_of_list.count)] = wp.where((parts & 32) != 0, 0, 1)
             fits = build_list(block, pairs, chain, skin, opening)
             results[world, 3] = wp.where(fits, wp.float64(1.0), wp.float64(0.0))
-        results[world, 4] = greatest_displacement(block, chain)
-        results[world, 5] = list_slack(block, chain, pairs[wp.static(layout_of_list.nearest)], opening)
+        results[world, 4] = list_slack(block, chain, pairs[wp.static(layout_of_list.nearest)], opening)
         if (parts & 2) != 0:
             results[world, 1] = floor_gap(block, chain, ground, face)
-            results[world, 6] = wp.float64(resolve_floor(block, plane, chain, ground, face))
+            results[world, 5] = wp.float64(resolve_floor(block, plane, chain, ground, face))
         if (parts & 4) != 0:
             results[world, 2] = sprocket_gap(block, chain, ground, face)
-            results[world, 7] = wp.float64(resolve_sprocket(block, plane, chain, ground, face))
+            results[world, 6] = wp.float64(resolve_sprocket(block, plane, chain, ground, face))
         if (parts & 8) != 0:
             hits, strands, lost, depth = resolve_self_contacts(block, pairs, chain, opening)
-            results[world, 8] = wp.float64(hits)
-            results[world, 9] = lost
-            results[world, 10] = depth
-            results[world, 11] = wp.float64(strands)
+            results[world, 7] = wp.float64(hits)
+            results[world, 8] = lost
+            results[world, 9] = depth
+            results[world, 10] = wp.float64(strands)
         if (parts & 16) != 0:
-            results[world, 12] = terrain_gap(block, chain, ground, face)
-            results[world, 13] = wp.float64(resolve_terrain(block, plane, chain, ground, face))
+            results[world, 11] = terrain_gap(block, chain, ground, face)
+            results[world, 12] = wp.float64(resolve_terrain(block, plane, chain, ground, face))
 
     return contact_pass
 

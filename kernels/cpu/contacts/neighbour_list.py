@@ -18,12 +18,6 @@ from warpchain.kernels.physics.geometry import put, two
 from warpchain.kernels.types import Chain, Integers, Rows
 
 
-@wp.func
-def greatest_displacement(K: Rows, chain: Chain):
-    """Greatest displacement [m] of a joint since the list was built."""
-    return greatest_distance(K, chain, RIGHT_X, 0, LISTED_X)
-
-
 @functools.cache
 def neighbour_list(columns: int):
     """Warp function that builds the list, for scratch of this width; False: more pairs are near than fit."""
@@ -113,4 +107,5 @@ def neighbour_list(columns: int):
 @wp.func
 def list_slack(K: Rows, chain: Chain, nearest: wp.int32, opening: wp.float64):
     """How far joints may still move [m], see :func:`contacts.pair_list.slack_of`."""
-    return pair_list.slack_of(chain, nearest, opening, greatest_displacement(K, chain))
+    displacement = greatest_distance(K, chain, RIGHT_X, 0, LISTED_X)
+    return pair_list.slack_of(chain, nearest, opening, displacement)
