@@ -14,7 +14,7 @@ import warpchain.run.sweep_run as runner
 from tests.run.test_sweep_run import TINY
 from warpchain.engine.devices import gpu_turn, has_gpu_turn
 from warpchain.run.sweep_run import run_shards, sweep
-from warpchain.store.manifest import Manifest
+from warpchain.store.shards import Manifest
 from warpchain.sweeps.plan import load_sweep
 
 

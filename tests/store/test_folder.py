@@ -21,8 +21,7 @@ from tests.support.synthetic_sweep import LONG_SWEEP, SHARD_SIZE, SWEEP, content
 from warpchain.inputs.validation import InputError, InputWarning
 from warpchain.store import folder
 from warpchain.store.folder import SweepFolder
-from warpchain.store.manifest import Manifest
-from warpchain.store.shards import write_shard
+from warpchain.store.shards import Manifest, write_shard
 from warpchain.store.sweep_result import load
 from warpchain.sweeps.plan import Sweep
 from warpchain.version import NUMERICS_VERSION

@@ -15,8 +15,8 @@ from tests.support.synthetic_sweep import run
 from warpchain.inputs.validation import InputError
 from warpchain.store import sweep_result
 from warpchain.store.folder import SweepFolder
-from warpchain.store.manifest import Manifest, read_manifest
 from warpchain.store.merged_file import merge
+from warpchain.store.shards import Manifest, read_manifest
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.designs import EXTENSIBLE
 from warpchain.sweeps.plan import PlannedWalk, load_sweep

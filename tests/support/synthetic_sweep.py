@@ -20,8 +20,7 @@ import numpy as np
 
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
-from warpchain.store.manifest import Shard
-from warpchain.store.shards import write_shard
+from warpchain.store.shards import Shard, write_shard
 from warpchain.store.sweep_result import load
 from warpchain.sweeps.plan import Sweep, load_sweep
 from warpchain.walks.rows import STORED_COLUMNS, Rows, missing_rows, quantity_of

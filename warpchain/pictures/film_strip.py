@@ -15,8 +15,7 @@ from matplotlib.ticker import MaxNLocator
 
 from warpchain.inputs.arrays import Array
 from warpchain.pictures import chain
-from warpchain.pictures.inline import InlineFigure
-from warpchain.pictures.style import DOTS, GROUND, INK, tidy
+from warpchain.pictures.style import DOTS, GROUND, INK, InlineFigure, tidy
 from warpchain.pictures.walk_shape import center_in_room, checked_joints, setting
 from warpchain.status import Status
 

@@ -20,8 +20,7 @@ from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
 from warpchain.inputs.validation import InputError, shown
-from warpchain.pictures import labels
-from warpchain.pictures.inline import InlineFigure
+from warpchain.pictures import labels, style
 from warpchain.pictures.labels import math_symbol, short_texts, unit_text, with_unit
 from warpchain.pictures.style import BLUE, FAINT, GROUND, LINE_COLORS, RED, NothingToShow, panel_grid, tidy
 
@@ -87,7 +86,7 @@ def draw_grid(
     are_lines = all(panel.kind == "lines" for panel in panels)
     alike = len({(panel.kind, panel.across, panel.along) for panel in panels}) == 1
     columns = len(panels) if len(panels) <= 3 else min(4, math.ceil(len(panels) ** 0.5))
-    owner = InlineFigure(figsize=_size(panels, columns), layout="constrained") if figure is None else figure
+    owner = style.InlineFigure(figsize=_size(panels, columns), layout="constrained") if figure is None else figure
     areas, _ = panel_grid(owner, len(panels), columns, sharex=alike, sharey=alike or are_lines)
     palettes = _palettes(panels)
     image = None
@@ -220,8 +219,8 @@ def _draw_lines(axes: Axes, panel: Panel, palette: Mapping[Any, str]) -> None:
         if panel.along is None:
             axes.errorbar(places, mean, cells.sd[number], fmt="none", ecolor=(color, _LIGHT), elinewidth=8.0)
         error, line = cells.standard_error[number], "o-" if is_numeric else "o"
-        style: dict[str, Any] = {"markersize": 3.5, "linewidth": 1.2, "color": color, "ecolor": (color, _DEEP)}
-        axes.errorbar(places + shift, mean, error, fmt=line, elinewidth=3.5, **style)
+        look: dict[str, Any] = {"markersize": 3.5, "linewidth": 1.2, "color": color, "ecolor": (color, _DEEP)}
+        axes.errorbar(places + shift, mean, error, fmt=line, elinewidth=3.5, **look)
     failed = np.flatnonzero(cells.failed.any(axis=0))
     if failed.size:
         floor: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "clip_on": False, "in_layout": False}
@@ -271,7 +270,7 @@ def _draw_legends(
     owner: Figure | SubFigure, areas: Sequence[Axes], panels: Sequence[Panel], palettes: Mapping[str, Mapping[Any, str]]
 ) -> None:
     """One legend of all panels; if their lines are of several axes, each panel has one of its own, too."""
-    style: dict[str, Any] = {"frameon": False, "fontsize": "small"}
+    look: dict[str, Any] = {"frameon": False, "fontsize": "small"}
     dot: dict[str, Any] = {"marker": "o", "markersize": 3.5}
     handles: list[Line2D | Patch] = []
     title = None
@@ -284,7 +283,7 @@ def _draw_legends(
             handles, title = [*lines], with_unit(math_symbol(name), unit_text(name))
         for axes, panel in zip(areas, panels, strict=True):
             if len(palettes) > 1 and panel.kind == "lines" and panel.along and panel.along.name == name:
-                axes.legend(handles=lines, title=with_unit(math_symbol(name), unit_text(name)), **style)
+                axes.legend(handles=lines, title=with_unit(math_symbol(name), unit_text(name)), **look)
     if any(panel.kind == "lines" for panel in panels):
         handles.append(Patch(color=(FAINT, _DEEP), linewidth=0, label="± standard error"))
     if any(panel.along is None for panel in panels):
@@ -295,4 +294,4 @@ def _draw_legends(
     beside = any(panel.along for panel in panels if panel.kind == "lines")
     place: Any = {"loc": "outside right upper", "ncols": 1} if beside else {"loc": "outside upper right", "ncols": 2}
     if handles:
-        owner.legend(handles=handles, title=title, **style, **place)
+        owner.legend(handles=handles, title=title, **look, **place)

@@ -16,8 +16,7 @@ from warpchain.inputs.arrays import Array
 from warpchain.loop.stationary_loop import StationaryLoop
 from warpchain.pictures.chain import stretches
 from warpchain.pictures.film_strip import film_strip
-from warpchain.pictures.inline import InlineFigure
-from warpchain.pictures.style import BLUE, DASHES, DOTS, FAINT, GREEN, GROUND, INK, RED, tidy
+from warpchain.pictures.style import BLUE, DASHES, DOTS, FAINT, GREEN, GROUND, INK, RED, InlineFigure, tidy
 from warpchain.pictures.walk_shape import Kind, setting
 
 if TYPE_CHECKING:

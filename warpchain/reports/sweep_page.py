@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 
 from warpchain.files import Kind, checked_output, write_whole
 from warpchain.inputs.validation import short
-from warpchain.pictures.inline import image, png
 from warpchain.pictures.labels import cell_table, cell_text, cell_values, unit_text
+from warpchain.pictures.style import image, png
 from warpchain.reports.sweep_figures import figures
 from warpchain.status import Status
 from warpchain.store.block_result import BlockResult
-from warpchain.store.manifest import Folder
+from warpchain.store.shards import Folder
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.version import VERSION
 from warpchain.walks.faults import FAULTS

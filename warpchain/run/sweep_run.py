@@ -28,8 +28,7 @@ from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text, p
 from warpchain.run.workers import Pulse, losses_named, pulsing_threads
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
-from warpchain.store.manifest import Shard
-from warpchain.store.shards import read_shard, write_shard
+from warpchain.store.shards import Shard, read_shard, write_shard
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.axes import is_axis
 from warpchain.sweeps.plan import PlannedWalk, Sweep, load_sweep

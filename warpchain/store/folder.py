@@ -32,8 +32,8 @@ from numpy.typing import NDArray
 
 from warpchain.files import given_path, make_folder, naming, remove_output, write_whole
 from warpchain.inputs.validation import DamagedFileError, InputError, InputWarning
-from warpchain.store.manifest import EARLIER, OWN, Folder, Manifest, Shard, read_manifest
-from warpchain.store.shards import FOREIGN, opened_shard, rows_of, shard_files, stamp
+from warpchain.store import shards
+from warpchain.store.shards import Folder, Manifest, Shard, read_manifest, stamp
 from warpchain.sweeps.designs import EXTENSIBLE
 from warpchain.sweeps.plan import Sweep
 from warpchain.version import NUMERICS_VERSION
@@ -108,7 +108,7 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
 
     def missing(self) -> list[Shard]:
         """The shards that are not there yet, in order; errors as of `shard_files`."""
-        written = set(shard_files(self.directory))
+        written = set(shards.shard_files(self.directory))
         return [shard for shard in self.manifest.left(self.found) if shard.name not in written]
 
     def close(self) -> None:
@@ -154,16 +154,16 @@ def read_rows(
         keys = manifest.keys[manifest.keys["block"] == number]
         tables.append(missing_rows(manifest.row_type, keys).reshape(-1, block.samples))
         motions.append(np.full(tables[-1].shape, None))
-    for name in shard_files(directory):
+    for name in shards.shard_files(directory):
         try:
-            with opened_shard(directory, name, manifest.digest) as file:
-                rows, kept = rows_of(file, manifest.row_type), [int(row) for row in file.get("motion", ())]
+            with shards.opened_shard(directory, name, manifest.digest) as file:
+                rows, kept = shards.rows_of(file, manifest.row_type), [int(row) for row in file.get("motion", ())]
         except DamagedFileError as error:
             if damaged is None:
                 raise
             damaged[name] = str(error).partition("; ")[0]
             continue
-        opened = partial(opened_shard, Path(directory).absolute(), name, manifest.digest)
+        opened = partial(shards.opened_shard, Path(directory).absolute(), name, manifest.digest)
         numbers, cells, samples = (rows[key] for key in KEYS.names or ())
         try:
             for number, table in enumerate(tables):
@@ -172,7 +172,7 @@ def read_rows(
             for row in kept:
                 motions[numbers[row]][cells[row], samples[row]] = opened, f"motion/{row}"
         except IndexError:
-            raise InputError(f"{Path(directory) / 'shards' / name}: {FOREIGN}") from None
+            raise InputError(f"{Path(directory) / 'shards' / name}: {shards.FOREIGN}") from None
     return tables, motions
 
 
@@ -184,13 +184,13 @@ def _prepared(folder: Path, sweep: Sweep, manifest: Manifest, fresh: bool) -> Ma
     _clear_leftovers(folder)
     named = folder / "sweep.h5"
     if not named.exists():
-        for name in (*OWN, EARLIER):
+        for name in (*shards.OWN, shards.EARLIER):
             if (folder / name).exists():
                 raise InputError(f"{folder / name}: in the way of a sweep; give another folder")
         write_whole(named, manifest.image())
     elif fresh:  # the shards go first; nothing goes if there is a foreign file among them
         read_manifest(folder)
-        shard_files(folder)
+        shards.shard_files(folder)
         with naming(folder):
             if (folder / "shards").exists():
                 shutil.rmtree(folder / "shards")
@@ -245,7 +245,7 @@ def _clear_leftovers(folder: Path) -> None:
 
 def _refuse_strangers(folder: Path) -> None:
     """Refuse a folder in which a name of the sweep's own is a link, pipe or device; an `InputError`."""
-    for path in (folder / name for name in (*OWN, "lock")):
+    for path in (folder / name for name in (*shards.OWN, "lock")):
         if path.is_symlink() or (path.exists() and not (path.is_file() or path.is_dir())):
             kind = "a symbolic link" if path.is_symlink() else "a pipe or a device"
             raise InputError(f"{path}: {kind}, where a sweep writes and deletes; remove it, or give another folder")

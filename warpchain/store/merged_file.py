@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from warpchain.files import Kind, checked_output, given_path, write_whole
 from warpchain.hdf5_files import hdf5_image, kind_of_hdf5
 from warpchain.inputs.validation import InputError, InputWarning
-from warpchain.store.manifest import Folder
+from warpchain.store.shards import Folder
 from warpchain.store.sweep_result import KIND, WANTED, SweepResult, load
 
 if TYPE_CHECKING:

@@ -19,8 +19,7 @@ from warpchain.inputs.validation import InputError, shown, suggestion
 from warpchain.store.block_result import BlockResult, counted, located, status_counts
 from warpchain.store.cell_statistics import CellStatistics
 from warpchain.store.folder import read_rows
-from warpchain.store.manifest import Folder, read_manifest, stored_sweep
-from warpchain.store.shards import stamp
+from warpchain.store.shards import Folder, read_manifest, stamp, stored_sweep
 from warpchain.sweeps.plan import Sweep
 from warpchain.walks.rows import COLUMNS, STORED_COLUMNS, derived_columns, drawn_column, quantity_of
 from warpchain.walks.walk_result import WalkResult
@@ -86,13 +85,13 @@ class SweepResult:
 
     def _repr_png_(self) -> bytes | None:
         """The main figure; None if there is nothing to draw yet."""
-        from warpchain.pictures.inline import first_png
+        from warpchain.pictures.style import first_png
 
         return first_png([self.plot])
 
     def _repr_html_(self) -> str:
         """Walks by status, axes of each block, and the main figure."""
-        from warpchain.pictures.inline import fragment
+        from warpchain.pictures.style import fragment
 
         return fragment(repr(self), self._repr_png_())
 

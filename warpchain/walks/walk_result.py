@@ -291,13 +291,13 @@ class WalkResult:
 
     def _repr_png_(self) -> bytes | None:
         """The film strip, or height and speed if there are no frames; None if there is nothing to draw."""
-        from warpchain.pictures.inline import first_png
+        from warpchain.pictures.style import first_png
 
         return first_png(partial(self.plot, kind) for kind in ("film_strip", "height_and_speed"))
 
     def _repr_html_(self) -> str:
         """The most important numbers, why the walk is inaccurate if it is, and the picture."""
-        from warpchain.pictures.inline import fragment
+        from warpchain.pictures.style import fragment
 
         return fragment("\n".join([repr(self), *self.warnings()]), self._repr_png_())
 
