@@ -17,6 +17,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Final, NamedTuple
 
+AnyPath = str | os.PathLike[str]
 DISK_FAILURES: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
 """Numbers (errno) of an `OSError` that no other path or permission would have avoided."""
 
@@ -39,7 +40,7 @@ def failure(number: int, text: str) -> OSError:
     return error
 
 
-def given_path(path: str | os.PathLike[str]) -> Path:
+def given_path(path: AnyPath) -> Path:
     """A path as a user gave it; an `OSError` if it is none, or empty, which `Path` takes for the current folder."""
     text = os.fspath(path)
     if not text:
@@ -49,7 +50,7 @@ def given_path(path: str | os.PathLike[str]) -> Path:
     return Path(path)
 
 
-def checked_output(path: str | os.PathLike[str], only: Kind | None = None) -> Path:
+def checked_output(path: AnyPath, only: Kind | None = None) -> Path:
     """The path, if a file may be written there; everything that writes files for a user asks here.
 
     Replaced may be any regular file, or `only` one of a kind; a `NotReplaceable` says that something else is there. An
@@ -71,7 +72,7 @@ def checked_output(path: str | os.PathLike[str], only: Kind | None = None) -> Pa
 
 
 @contextmanager
-def replacing(path: str | os.PathLike[str], only: Kind | None = None) -> Iterator[Path]:
+def replacing(path: AnyPath, only: Kind | None = None) -> Iterator[Path]:
     """Yield the path of an empty part beside `path`, which becomes `path` if the block ends without an error.
 
     The data reach the disk before the part is renamed. So `path` is at any moment, even after a power cut, either the
@@ -103,14 +104,14 @@ def replacing(path: str | os.PathLike[str], only: Kind | None = None) -> Iterato
         os.close(descriptor)
 
 
-def write_whole(path: str | os.PathLike[str], content: bytes | str, only: Kind | None = None) -> None:
+def write_whole(path: AnyPath, content: bytes | str, only: Kind | None = None) -> None:
     """Write a file, see `replacing`; text in UTF-8."""
     data = content.encode() if isinstance(content, str) else content
     with replacing(path, only) as part:
         part.write_bytes(data)
 
 
-def remove_output(path: str | os.PathLike[str]) -> None:
+def remove_output(path: AnyPath) -> None:
     """Delete a file that a new one would replace; nothing if there is none. Errors as of `checked_output`."""
     target = checked_output(path)
     with naming(target):
@@ -148,7 +149,7 @@ def reason(error: OSError) -> str:
     return os.strerror(error.errno) if error.errno else " ".join(str(error).split())
 
 
-def unreadable(path: str | os.PathLike[str], error: OSError) -> OSError:
+def unreadable(path: AnyPath, error: OSError) -> OSError:
     """One line for what the system refused to read, of the same class."""
     problem = type(error)(f"{path}: cannot be read ({reason(error)}); give the path of a readable file")
     problem.errno = error.errno

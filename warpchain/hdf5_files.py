@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Final, get_args
 
 import numpy as np
 
-from warpchain.files import unreadable
+from warpchain.files import AnyPath, unreadable
 from warpchain.inputs.validation import DamagedFileError, InputError
 from warpchain.version import FORMAT_VERSION, version_refusal
 
@@ -131,9 +131,7 @@ def hdf5_image(kind: str, fill: "Callable[[h5py.File], None]") -> bytes:
 
 
 @contextmanager
-def reading_hdf5(
-    path: str | os.PathLike[str], kind: str | None, remedy: str, wanted: str | None = None
-) -> "Iterator[h5py.File]":
+def reading_hdf5(path: AnyPath, kind: str | None, remedy: str, wanted: str | None = None) -> "Iterator[h5py.File]":
     """An HDF5 file that `hdf5_image` made, undamaged and of a kind, or of any if that is None.
 
     The remedy says what to do about a damaged or an older file; `wanted`, which file to give instead of one of another
@@ -148,22 +146,20 @@ def reading_hdf5(
 
     _compare(path, remedy, wanted)
     with h5py.File(path, "r", locking=False) as file:
-        if kind is not None and file.attrs["format"] != kind:
-            raise InputError(
-                f"{path}: a {file.attrs['format']}, not a {kind}; {wanted or 'move it out of this folder'}"
-            )
+        if kind is not None and (found := file.attrs["format"]) != kind:
+            raise InputError(f"{path}: a {found}, not a {kind}; {wanted or 'move it out of this folder'}")
         if refusal := version_refusal(int(file.attrs["format_version"]), remedy):
             raise InputError(f"{path}: {refusal}")
         yield file
 
 
-def kind_of_hdf5(path: str | os.PathLike[str], wanted: str) -> str:
+def kind_of_hdf5(path: AnyPath, wanted: str) -> str:
     """The kind of an HDF5 file that `hdf5_image` made; errors as of `reading_hdf5`."""
     with reading_hdf5(path, None, "fetch another copy of it", wanted) as file:
         return str(file.attrs["format"])
 
 
-def _compare(path: str | os.PathLike[str], remedy: str, wanted: str | None) -> None:
+def _compare(path: AnyPath, remedy: str, wanted: str | None) -> None:
     """Compare the checksum of a file; errors as of `reading_hdf5`."""
     with open_regular(path) as file:
         try:
@@ -185,7 +181,7 @@ def _compare(path: str | os.PathLike[str], remedy: str, wanted: str | None) -> N
     raise DamagedFileError(f"{path}: damaged, cut short or of an earlier warpchain; {remedy}")
 
 
-def open_regular(path: str | os.PathLike[str]) -> BinaryIO:
+def open_regular(path: AnyPath) -> BinaryIO:
     """A file, open for reading; an `OSError` of one line names one that cannot be read.
 
     Opening a pipe or a device does not wait: what is no regular file is refused by an `InputError`.

@@ -11,9 +11,9 @@ from tests.support.command_line import Command
 from tests.support.made_sweeps import make_sweep
 from tests.support.made_walks import make_walk
 from tests.support.sweep_content import content
-from warpchain.cli.terminal import print_sweep
+from warpchain.cli.output import print_sweep
 from warpchain.inputs.yaml_files import parse_yaml
-from warpchain.sweeps.shipped import shipped_sweeps
+from warpchain.sweeps.sweep_file import shipped_sweeps
 
 ESCAPE = "\x1b]0;owned\x07\x1b[2J"
 
@@ -50,7 +50,7 @@ REFUSED = {
     "sweep tiny.yaml -o new --gpus 2 --workers 3": "--workers: given together with --gpus; leave one out",
     "sweep tiny.yaml -o new --gpus 2 --device cpu": "--device: cpu is given together with --gpus; give cuda",
     "bench --links 61": "bench.links: 61 is odd",
-    "bench --device cuda:99 --links 2000": "bench.links: 2000 links are more than a GPU's block has threads",
+    "bench --device cuda:99 --links 2000": "bench.links: 2000 are too many for a GPU; give 1024 or less",
 }
 """Arguments → how the line of refusal begins."""
 HOSTILE = [

@@ -10,7 +10,7 @@ import pytest
 
 from tests.support.command_line import Command
 from tests.support.made_walks import make_unreleased, make_walk
-from warpchain.cli.terminal import print_walk
+from warpchain.cli.output import print_walk
 from warpchain.engine.tallies import CONTACTS
 from warpchain.inputs.scene import link_values
 from warpchain.run.progress_bar import SweepProgress

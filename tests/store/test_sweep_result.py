@@ -13,9 +13,8 @@ from tests.support.synthetic_sweep import SHARD_SIZE, SWEEP, run, synthetic_rows
 from warpchain.inputs.validation import InputError, InputWarning
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
-from warpchain.store.merged_file import merge
 from warpchain.store.shards import Manifest
-from warpchain.store.sweep_result import load
+from warpchain.store.sweep_result import load, merge
 from warpchain.walks.rows import COLUMNS, STORED_COLUMNS, drawn_column
 from warpchain.walks.walk_result import load_walk
 

@@ -45,7 +45,7 @@ def bench(
     loaded before.
     """
     from warpchain.bench.measurements import machine, step_costs, walk_rate
-    from warpchain.cli.terminal import print_table
+    from warpchain.cli.output import print_table
     from warpchain.inputs.options import Options
     from warpchain.inputs.scene import Scene, check_links_on_gpu
     from warpchain.inputs.validation import InputError, json_value, validated

@@ -14,7 +14,7 @@ def parameters(
     preset: Annotated[str, option("NAME", "Whose values: paper, Table 1 of the paper, or soft.")] = "paper",
 ) -> None:
     """List what can be set: parameters, scene and options, with symbols, units, values, bounds and meanings."""
-    from warpchain.cli.terminal import print_table
+    from warpchain.cli.output import print_table
     from warpchain.inputs.options import Options
     from warpchain.inputs.parameters import preset as parameter_preset
     from warpchain.inputs.scene import Scene

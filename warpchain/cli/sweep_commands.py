@@ -41,7 +41,7 @@ def sweep(
 ) -> None:
     """Run a sweep, or what is left of it: many walks over a grid."""
     from warpchain.inputs.validation import InputError, printable
-    from warpchain.sweeps.shipped import write_new_sweep
+    from warpchain.sweeps.sweep_file import write_new_sweep
 
     if new is not None:
         if any(value is not None and value is not False for name, value in context.params.items() if name != "new"):
@@ -57,7 +57,7 @@ def sweep(
         from warpchain.engine.devices import start_early
 
         start_early(device)
-    from warpchain.cli.terminal import print_sweep
+    from warpchain.cli.output import print_sweep
     from warpchain.run.gpu_workers import gpu_workers
     from warpchain.run.sweep_run import sweep as run
 
@@ -95,7 +95,7 @@ def info(
 
     Of a merged file the checksum is compared first.
     """
-    from warpchain.cli.terminal import print_sweep
+    from warpchain.cli.output import print_sweep
     from warpchain.store.sweep_result import load
 
     print_sweep(load(directory), as_json)
@@ -118,7 +118,7 @@ def plot(
     film_strip.png, height_and_speed.png, loop.png, energy.png and, if the plane tilts, tilt.png; a line says what is
     left out and why.
     """
-    from warpchain.cli.walk_files import draw_figures, saved
+    from warpchain.cli.output import draw_figures, saved
     from warpchain.files import make_folder
     from warpchain.inputs.validation import InputError, printable
     from warpchain.pictures.walk_shape import kinds_of
@@ -145,9 +145,7 @@ def plot(
         raise typer.Exit(FAILED)
     if not count:
         name = path if quantity is None else f"--quantity: {quantity}"
-        raise InputError(
-            f"{name}: no walk at rest has a value, or no axis has several values; give another --quantity, or see info"
-        )
+        raise InputError(f"{name}: no walk at rest has a value, or no axis has several; give another --quantity")
 
 
 def report(
@@ -181,7 +179,7 @@ def merge(
 ) -> None:
     """Put the results of a folder, or of all parts of a sweep, into one file, which xarray opens."""
     from warpchain.inputs.validation import printable
-    from warpchain.store.merged_file import merge as merge_shards
+    from warpchain.store.sweep_result import merge as merge_shards
 
     merge_shards(directories, path)
     print(printable(str(path)))

@@ -74,8 +74,7 @@ def walk(
     as_json: Annotated[bool, JSON] = False,
 ) -> None:
     """Spin up one chain, drop it, and follow it until it rests."""
-    from warpchain.cli.terminal import print_walk
-    from warpchain.cli.walk_files import try_walk_folder, write_walk
+    from warpchain.cli.output import print_walk, try_walk_folder, write_walk
     from warpchain.inputs.distributions import Seed
     from warpchain.inputs.options import replaced_by
     from warpchain.inputs.sections import SECTIONS
@@ -144,7 +143,7 @@ def animate(
     slow: Annotated[float, option("NUMBER", "Playing time per simulated time. Default: 4.")] = 4.0,
 ) -> None:
     """Write a film of a saved walk: GIF, MP4 or HTML with a player."""
-    from warpchain.cli.walk_files import RECORD
+    from warpchain.cli.output import RECORD
     from warpchain.inputs.validation import InputError, printable
     from warpchain.walks.walk_result import load_walk
 
@@ -181,7 +180,7 @@ def _given_values(named: Mapping[str, str | None], assignments: Sequence[str]) -
 
 def _saved(path: Path, index: str | None) -> tuple["Setup", int | None]:
     """Setup and seed of a saved walk, or of the walk with a number of a sweep."""
-    from warpchain.cli.walk_files import saved
+    from warpchain.cli.output import saved
     from warpchain.inputs.validation import InputError
     from warpchain.inputs.yaml_files import parse_yaml
     from warpchain.walks.walk_result import WalkResult

@@ -128,13 +128,10 @@ class Options(Section):
         if on_gpu(self.device) and not find_method(self.method).runs_on_gpus:
             raise InputError(f"method: {shown(self.method)} runs on a CPU only; give explicit, or device: cpu")
         if self.smallest_step >= self.contact_step:
-            raise InputError(
-                f"smallest_step: {self.smallest_step} is not smaller than contact_step {self.contact_step} s; "
-                "give a smaller step"
-            )
+            raise InputError(f"smallest_step: {self.smallest_step} s is not below contact_step; give less")
         if self.soften_drive and self.record_interval > LONGEST_DRIVE_INTERVAL:
+            problem = f"joints stiffen at each record_interval, and {self.record_interval} s is too long for that"
             raise InputError(
-                f"soften_drive: joints stiffen at each record_interval, and {self.record_interval} s is too long for "
-                f"that; give a record_interval of at most {LONGEST_DRIVE_INTERVAL} s, or soften_drive: false"
+                f"soften_drive: {problem}; give at most {LONGEST_DRIVE_INTERVAL} s, or soften_drive: false"
             )
         return self

@@ -71,27 +71,19 @@ def combined(preset: str, parameters: Parameters, scene: Scene, options: Options
 def _check_can_tilt(scene: Scene, options: Options) -> None:
     """Check that the method carries chains whose plane tilts, if that of the scene does; else an `InputError`."""
     if scene.plane == "tilting" and not find_method(options.method).can_tilt:
-        raise InputError(
-            f"options.method: {shown(options.method)} keeps the plane of a chain fixed; "
-            "give explicit or an explicit method, or scene.plane: fixed"
-        )
+        raise InputError(f"options.method: {shown(options.method)} keeps planes fixed; give explicit, or plane: fixed")
 
 
 def check_has_joint_forces(options: Options) -> None:
     """Check that the method has forces in the joints that can be recorded; else an `InputError`."""
     if not find_method(options.method).has_joint_forces:
-        raise InputError(
-            f"options.method: {shown(options.method)} makes joints rigid between impulses, without forces that "
-            "record_loads could keep; give explicit or an integrator other than hybrid"
-        )
+        raise InputError(f"options.method: {shown(options.method)} has rigid joints, without forces; give explicit")
 
 
 def continued(state: State, sections: Mapping[str, Mapping[str, object]]) -> Setup:
     """The setup of a walk from a state, with other values of what comes behind the release; else an `InputError`."""
     if early := [name for name in sections["scene"] if name not in OF_THE_WALK]:
-        raise InputError(
-            f"{', '.join(early)}: given together with a state, whose chain is formed and released; leave it out"
-        )
+        raise InputError(f"{', '.join(early)}: given together with a state, whose chain is released; leave it out")
     before, given = state.setup, sections["options"]
     options = validated(Options, {**before.options.model_dump(exclude=replaced_by(given)), **given}, "options")
     scene = validated(Scene, {**vars(before.scene), **sections["scene"]}, "scene")

@@ -306,9 +306,7 @@ def path_of(path: str, key: object) -> str:
 
 def printable(text: str) -> str:
     """A text fit for any terminal: every character that is not printable, such as ESC, is written as its escape."""
-    return "".join(
-        each if each.isprintable() else each.encode("unicode_escape", "surrogatepass").decode("ascii") for each in text
-    )
+    return "".join(c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in text)
 
 
 def one_line(text: str, kind: str = "") -> str:

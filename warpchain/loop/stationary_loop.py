@@ -147,9 +147,7 @@ def average_loop(setup: Setup, before: BeforeRelease | None, center: Array | Non
     """
     if before is None or center is None:
         if not setup.has_drive:
-            raise ValueError(
-                "walk: it began without a sprocket, so it has no loop on one; take a walk from its drive on"
-            )
+            raise ValueError("walk: it began without a sprocket, so it has no loop on one; take one from its drive on")
         if center is None:
             raise ValueError("walk: it ended before its release; see its status, which says what to try")
         raise ValueError("walk: nothing was kept of the time before its release; run it again with record_before")

@@ -125,9 +125,7 @@ def _write_mp4(walk: "WalkResult", path: Path, fps: float, slow: float) -> None:
     chosen += chosen[-1:] * round(_HOLD * fps)
     film = Film(walk)
     # What ffmpeg says would be lines on the terminal.
-    writer = FFMpegWriter(
-        fps=cast(Any, fps), codec="h264", extra_args=["-crf", "20", "-loglevel", "quiet", "-f", "mp4"]
-    )
+    writer = FFMpegWriter(fps=cast(Any, fps), codec="h264", extra_args="-crf 20 -loglevel quiet -f mp4".split())
     with replacing(path) as part, mpl.rc_context({"animation.ffmpeg_path": ffmpeg}):
         try:
             with writer.saving(film.figure, str(part), DPI):

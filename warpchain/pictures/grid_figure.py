@@ -6,8 +6,8 @@ the lines, or the rows of a map if both have many values; all other axes give pa
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from matplotlib import colormaps
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from warpchain.store.cell_statistics import CellStatistics
 
 Array = NDArray[Any]
-Kind = Literal["lines", "map"]
 
 MOST_LINES: Final = len(LINE_COLORS)
 """Greatest number of lines in a panel, unless lines are asked for."""
@@ -52,15 +51,14 @@ class Axis(NamedTuple):
     is_numeric: bool
 
 
-@dataclass(frozen=True)
-class Panel:
-    """One panel: its x axis, the axis of its lines or the y axis of a map, and its cells.
+class Panel(NamedTuple):
+    """One panel: whether it is a map, its x axis, the axis of its lines or the y axis of a map, and its cells.
 
     Arrays of the cells have shape (values of `along`, values of `across`), of one row if there is just one line; the
     title says what else they have in common.
     """
 
-    kind: Kind
+    is_map: bool
     across: Axis
     along: Axis | None
     title: str
@@ -83,31 +81,34 @@ def draw_grid(
     """
     panels, left_out = _all_panels(blocks, x)
     label = with_unit(labels.quantity_text(quantity), next(iter(blocks.values())).unit)
-    are_lines = all(panel.kind == "lines" for panel in panels)
-    alike = len({(panel.kind, panel.across, panel.along) for panel in panels}) == 1
+    are_lines = not any(panel.is_map for panel in panels)
+    alike = len({panel[:3] for panel in panels}) == 1
     columns = len(panels) if len(panels) <= 3 else min(4, math.ceil(len(panels) ** 0.5))
-    owner = style.InlineFigure(figsize=_size(panels, columns), layout="constrained") if figure is None else figure
+    width, height = _PANEL_SIZES[columns]
+    beside = 1.3 if any(panel.along for panel in panels) else 0.0
+    size = max(4.2, beside + width * columns), (0.3 if beside else 0.6) + height * -(-len(panels) // columns)
+    owner = style.InlineFigure(figsize=size, layout="constrained") if figure is None else figure
     areas, _ = panel_grid(owner, len(panels), columns, sharex=alike, sharey=alike or are_lines)
     palettes = _palettes(panels)
-    image = None
+    lines, maps = list[Axes](), list[Axes]()
     for axes, panel in zip(areas, panels, strict=True):
         axes.set_title(panel.title, fontsize="medium", loc="left")
-        if panel.kind == "lines":
-            _draw_lines(axes, panel, palettes[panel.along.name] if panel.along else {})
-        else:
-            means = np.concatenate([each.cells.mean.ravel() for each in panels if each.kind == "map"])
+        if panel.is_map:
+            means = np.concatenate([each.cells.mean.ravel() for each in panels if each.is_map])
             image = _draw_map(axes, panel, (np.nanmin(means), np.nanmax(means)))
+            maps.append(axes)
+        else:
+            _draw_lines(axes, panel, palettes[panel.along.name] if panel.along else {})
+            lines.append(axes)
         note = labels.lost_note([vars(panel.cells)])
         name = labels.quantity_label(panel.across.name) if not alike or axes in areas[-columns:] else ""
         axes.set_xlabel(f"{name}\n{note}".strip())
         if not (alike or are_lines) or axes in areas[::columns]:
-            axes.set_ylabel(labels.quantity_label(panel.along.name) if panel.kind == "map" and panel.along else label)
+            axes.set_ylabel(labels.quantity_label(panel.along.name) if panel.is_map and panel.along else label)
     if left_out:
         owner.suptitle(f"{len(panels)} of {len(panels) + left_out} panels", fontsize="medium", color=RED)
-    if image is not None:
-        maps = [axes for axes, panel in zip(areas, panels, strict=True) if panel.kind == "map"]
+    if maps:
         owner.colorbar(image, ax=maps, label=label).outline.set_visible(False)
-    lines = [axes for axes, panel in zip(areas, panels, strict=True) if panel.kind == "lines"]
     low = min((axes.dataLim.y0 for axes in lines), default=0.0)
     high = max((axes.dataLim.y1 for axes in lines), default=0.0)
     if 0 <= low < 0.5 * high:
@@ -147,7 +148,7 @@ def _panels(cells: "CellStatistics", x: str | None, block: str) -> Iterator[Pane
     given = zip(cells.axes.items(), rising, strict=True)
     axes = [Axis(name, tuple(values[order].tolist()), numeric[name]) for (name, values), order in given]
     several = [axis for axis in axes if len(axis.values) > 1]
-    kind, across, along, others = _roles(several, x)
+    is_map, across, along, others = _roles(several, x)
     order = [several.index(axis) for axis in (*others, along, across) if axis is not None]
 
     def arranged(table: Array) -> Array:
@@ -162,11 +163,11 @@ def _panels(cells: "CellStatistics", x: str | None, block: str) -> Iterator[Pane
     for place in np.ndindex(*(len(axis.values) for axis in others)):
         title = ", ".join([*[block] * bool(block), *(own[number] for own, number in zip(texts, place, strict=True))])
         here: dict[str, Any] = {name: table[place] for name, table in tables.items()}
-        yield Panel(kind, across, along, title, replace(cells, **here))
+        yield Panel(is_map, across, along, title, replace(cells, **here))
 
 
-def _roles(axes: Sequence[Axis], x: str | None) -> tuple[Kind, Axis, Axis | None, list[Axis]]:
-    """What the axes of a grid become: kind, x axis, lines or rows, panels."""
+def _roles(axes: Sequence[Axis], x: str | None) -> tuple[bool, Axis, Axis | None, list[Axis]]:
+    """What the axes of a grid become: whether it is a map, x axis, lines or rows, panels."""
 
     def fit(axis: Axis) -> tuple[bool, bool, bool, int]:
         is_frequency = axis.name == "frequency" and len(axis.values) > 2
@@ -176,28 +177,20 @@ def _roles(axes: Sequence[Axis], x: str | None) -> tuple[Kind, Axis, Axis | None
     others = [axis for axis in axes if axis is not across]
     others.sort(key=lambda axis: len(axis.values))
     along = others.pop() if others else None
-    kind: Kind = "lines"
-    if along is not None and len(along.values) > MOST_LINES:
-        if len(across.values) > MOST_LINES:
-            kind = "map"
-        elif x is None:  # a long axis beside a short one
-            across, along = along, across
-    return kind, across, along, [axis for axis in axes if axis in others]
-
-
-def _size(panels: Sequence[Panel], columns: int) -> tuple[float, float]:
-    """Width and height of a figure [inches]."""
-    width, height = _PANEL_SIZES[columns]
-    beside = 1.3 if any(panel.along for panel in panels) else 0.0
-    return max(4.2, beside + width * columns), (0.3 if beside else 0.6) + height * -(-len(panels) // columns)
+    is_map = along is not None and min(len(along.values), len(across.values)) > MOST_LINES
+    if along is not None and len(along.values) > MOST_LINES and not is_map and x is None:  # beside a short axis
+        across, along = along, across
+    return is_map, across, along, [axis for axis in axes if axis in others]
 
 
 def _palettes(panels: Sequence[Panel]) -> dict[str, dict[Any, str]]:
     """Each axis that gives lines → its values in all panels → their colours, from dark to light if they are many."""
-    found = dict.fromkeys(panel.along for panel in panels if panel.along and panel.kind == "lines")
+    found: dict[str, list[Axis]] = {}
+    for panel in panels:
+        if panel.along and not panel.is_map:
+            found.setdefault(panel.along.name, []).append(panel.along)
     palettes = {}
-    for name in dict.fromkeys(axis.name for axis in found):
-        axes = [axis for axis in found if axis.name == name]
+    for name, axes in found.items():
         values = list(dict.fromkeys(value for axis in axes for value in axis.values))
         values = sorted(values) if all(axis.is_numeric for axis in axes) else values
         colors = list(LINE_COLORS)
@@ -275,23 +268,21 @@ def _draw_legends(
     handles: list[Line2D | Patch] = []
     title = None
     for name, palette in palettes.items():
-        texts = short_texts(list(palette))
-        lines = [
-            Line2D([], [], color=color, label=text, **dot) for color, text in zip(palette.values(), texts, strict=True)
-        ]
+        texts = zip(palette.values(), short_texts(list(palette)), strict=True)
+        lines = [Line2D([], [], color=color, label=text, **dot) for color, text in texts]
         if len(palettes) == 1:
             handles, title = [*lines], with_unit(math_symbol(name), unit_text(name))
         for axes, panel in zip(areas, panels, strict=True):
-            if len(palettes) > 1 and panel.kind == "lines" and panel.along and panel.along.name == name:
+            if len(palettes) > 1 and not panel.is_map and panel.along and panel.along.name == name:
                 axes.legend(handles=lines, title=with_unit(math_symbol(name), unit_text(name)), **look)
-    if any(panel.kind == "lines" for panel in panels):
+    if not all(panel.is_map for panel in panels):
         handles.append(Patch(color=(FAINT, _DEEP), linewidth=0, label="± standard error"))
     if any(panel.along is None for panel in panels):
         handles.append(Patch(color=(FAINT, _LIGHT), linewidth=0, label="± standard deviation"))
     if any(panel.cells.failed.any() for panel in panels):
-        marker = "x" if panels[0].kind == "lines" else "o"
+        marker = "o" if panels[0].is_map else "x"
         handles.append(Line2D([], [], color=RED, marker=marker, linestyle="", label="walks failed"))
-    beside = any(panel.along for panel in panels if panel.kind == "lines")
+    beside = any(panel.along for panel in panels if not panel.is_map)
     place: Any = {"loc": "outside right upper", "ncols": 1} if beside else {"loc": "outside upper right", "ncols": 2}
     if handles:
         owner.legend(handles=handles, title=title, **look, **place)

@@ -128,9 +128,5 @@ def lost_note(cells: Sequence[Mapping[str, Any]]) -> str:
     """Number of walks that are not in the means of some cells, each with numbers of `COUNTS`; empty if all are."""
     counts = {name: sum(int(np.sum(cell[name])) for cell in cells) for name in COUNTS}
     walks = sum(counts.values())
-    texts = {
-        "failed": f"of {walks} walks failed",
-        "absent": f"of {walks} have none",
-        "missing": f"of {walks} not run yet",
-    }
-    return ", ".join(f"{counts[name]} {text}" for name, text in texts.items() if counts[name])
+    texts = {"failed": "walks failed", "absent": "have none", "missing": "not run yet"}
+    return ", ".join(f"{counts[name]} of {walks} {text}" for name, text in texts.items() if counts[name])

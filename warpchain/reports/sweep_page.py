@@ -5,7 +5,6 @@ the software; on demand also one walk in motion. The same folder always gives th
 """
 
 import math
-import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
@@ -17,14 +16,13 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from warpchain.files import Kind, checked_output, write_whole
+from warpchain.files import AnyPath, Kind, checked_output, write_whole
 from warpchain.inputs.validation import short
 from warpchain.pictures.labels import cell_table, cell_text, cell_values, unit_text
 from warpchain.pictures.style import image, png
 from warpchain.reports.sweep_figures import figures
 from warpchain.status import Status
 from warpchain.store.block_result import BlockResult
-from warpchain.store.shards import Folder
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.version import VERSION
 from warpchain.walks.faults import FAULTS
@@ -59,7 +57,7 @@ REPORTS: Final = Kind("page that warpchain report has written", _is_report)
 
 
 def write_report(
-    directory: Folder, path: str | os.PathLike[str], *, animation_of: int | None = None, device: str | None = None
+    directory: AnyPath, path: AnyPath, *, animation_of: int | None = None, device: str | None = None
 ) -> None:
     """Write the report of a sweep, which may still be running, as one HTML page, whole or not at all.
 
@@ -208,15 +206,13 @@ def _provenance(result: SweepResult) -> str:
 
 def _page(title: str, tiles: Mapping[str, tuple[int, str]], sections: Mapping[str, str]) -> str:
     """A whole page: title, numbers by label, "bad" if they need attention or else "", content in HTML by heading."""
-    numbers = (
-        f'<div class="{kind}"><dt>{label}</dt><dd>{count:,}</dd></div>' for label, (count, kind) in tiles.items()
-    )
+    boxes = (f'<div class="{kind}"><dt>{label}</dt><dd>{count:,}</dd></div>' for label, (count, kind) in tiles.items())
     links, parts = [], []
     for heading, text in sections.items():
         anchor = heading.lower().replace(" ", "-")
         links.append(f'<a href="#{anchor}">{heading}</a>')
         parts.append(f'<section id="{anchor}"><h2>{heading}</h2>\n{text}\n</section>')
-    content = {"numbers": "".join(numbers), "links": " ".join(links), "sections": "\n".join(parts)}
+    content = {"numbers": "".join(boxes), "links": " ".join(links), "sections": "\n".join(parts)}
     content["title"] = escape(title)
     return re.sub(r"{{(\w+)}}", lambda found: content[found[1]], _PAGE)
 

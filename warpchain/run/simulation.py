@@ -24,6 +24,7 @@ LONGEST = 1e9
 """Durations [s] from here on are refused."""
 MOST_PLACES = 10_000_000
 """Most links × instants of a trajectory, which take 0.5 GB."""
+_Numbers = Sequence[int] | NDArray[np.integer[Any]]
 _UNSOFTENED = {"soften_pile": False, "soften_drive": False}
 """A given chain has no phases in which joints soften."""
 
@@ -121,10 +122,7 @@ def simulate(
     check_links_on_gpu(state.links, options.device, "position")
     instants = _checked_times(end, times)
     if len(instants) * state.links > MOST_PLACES:
-        raise InputError(
-            f"times: {len(instants)} instants of {state.links} links are too many; "
-            f"give at most {MOST_PLACES // state.links}"
-        )
+        raise InputError(f"times: {len(instants)} instants are too many; give at most {MOST_PLACES // state.links}")
     if floor is not False and not (floor is None and state.is_placed_as_in(state.setup)):
         setup.floor.check_above(state.position, chain.link_length, "position")
     with gpu_turn([options.device]):
@@ -141,13 +139,9 @@ def _checked_state(given: State | Parameters | str, position: Array | None, velo
     if position is not None or velocity is not None:
         raise InputError("position: given together with a state, which has positions and velocities; leave them out")
     if given.axes is not None:
-        raise InputError(
-            "parameters: the plane of this state tilts, and simulate keeps it fixed; give walk(start=…) it"
-        )
+        raise InputError("parameters: the plane of this state tilts, which simulate does not do; give walk(start=…) it")
     if given.memory and given.memory["state/softness"] > 0:
-        raise InputError(
-            "parameters: joints of this state are softened, which only a walk goes on with; give walk(start=…) it"
-        )
+        raise InputError("parameters: joints of this state are softened, as only a walk goes on; give walk(start=…) it")
     return given
 
 
@@ -193,9 +187,7 @@ class Chains:
         position = checked_array(position, "position", "W", "n", 3)
         velocity, (worlds, links, _) = checked_array(velocity, "velocity", *position.shape), position.shape
         if len(parameters) != worlds or not all(isinstance(each, Parameters) for each in parameters):
-            raise InputError(
-                f"parameters: {shown(parameters)} are not Parameters of {worlds} chains; give those of each"
-            )
+            raise InputError(f"parameters: {shown(parameters)} are not of {worlds} chains; give Parameters of each")
         if worlds < 1 or links < 4 or links % 2:
             raise InputError(f"position: {worlds} chains of {links} links; give chains of an even number of at least 4")
         check_links_on_gpu(links, options.device, "position")
@@ -213,20 +205,18 @@ class Chains:
         """Codes of `Status`, (W,): FINISHED of a chain that can go on."""
         return self._batch.statuses().copy()
 
-    def motions(self, chains: Sequence[int] | NDArray[np.integer[Any]] | None = None) -> tuple[Array, Array]:
+    def motions(self, chains: _Numbers | None = None) -> tuple[Array, Array]:
         """Place and angle of the links of all chains, or of some numbers, (W, n, 3); and their rates."""
         return self._batch.motions(self._numbers(chains), self._links)
 
-    def set_velocity(self, chains: Sequence[int] | NDArray[np.integer[Any]], velocity: Array) -> None:
+    def set_velocity(self, chains: _Numbers, velocity: Array) -> None:
         """Give some chains, by their numbers, other velocities, (chains, n, 3); an `InputError` if they do not fit."""
         numbers = self._numbers(chains)
         rates = checked_array(velocity, "velocity", len(numbers), self._links, 3)
         if numbers:
             self._batch.place(numbers, self.motions(numbers)[0], rates)
 
-    def run(
-        self, until: float, chains: Sequence[int] | NDArray[np.integer[Any]] | None = None, *, to_rest: bool = False
-    ) -> None:
+    def run(self, until: float, chains: _Numbers | None = None, *, to_rest: bool = False) -> None:
         """Carry on all chains that can go on, or those of some numbers.
 
         Args:
@@ -247,7 +237,7 @@ class Chains:
                 self._batch.run(going, self._features)
         self.time = until
 
-    def _numbers(self, chains: Sequence[int] | NDArray[np.integer[Any]] | None) -> list[int]:
+    def _numbers(self, chains: _Numbers | None) -> list[int]:
         """Numbers of chains, by default all, or an `InputError`."""
         count = len(self.status)
         numbers: list[int] = checked(chains, "chains", list[Annotated[int, Field(ge=0, lt=count)]] | None)

@@ -101,9 +101,7 @@ def walk(
 def _check_repeated(setup: object, others: Mapping[str, object], seed: int | None) -> None:
     """Refuse what is no complete setup, settings beside one, and what is no seed, by an `InputError`."""
     if not isinstance(setup, Setup):
-        raise InputError(
-            f"setup: {shown(setup)} is none of a walk; give setup of a WalkResult, such as load_walk(…).setup"
-        )
+        raise InputError(f"setup: {shown(setup)} is none; give that of a WalkResult, such as load_walk(…).setup")
     if others:
         raise InputError(f"{', '.join(others)}: given together with setup, which is complete; leave one out")
     checked(seed, "seed", Seed | None)

@@ -4,12 +4,12 @@ A worker runs the walks of shards, writes each shard to an immutable file and re
 any executor in the style of ``concurrent.futures`` will do, on this machine or another that sees the same folder.
 """
 
-import concurrent.futures
 import itertools
 import os
 import re
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -38,6 +38,8 @@ from warpchain.walks.rows import MISSING, derived_columns, faults_of_columns, fi
 from warpchain.walks.scheduler import compile_kernels, run_setups
 
 T = TypeVar("T")
+Part = tuple[int, int]
+"""Number of a part of a sweep, and number of parts."""
 
 KEYS: Final = (*BlockKeys.model_fields, "same_samples_along", "record", "name", "seed")
 """Keys of a sweep file that are keywords."""
@@ -132,7 +134,7 @@ def _checked_call(
     device: str | None,
     workers: int | None,
     part: str | None,
-) -> tuple[Sweep, Path, tuple[int, int], int | None]:
+) -> tuple[Sweep, Path, Part, int | None]:
     """The sweep on its device, its folder, its part, and the number of workers; an `InputError` for all refused."""
     problems: list[str] = []
 
@@ -185,7 +187,7 @@ def sweep_of_keywords(given: Mapping[str, object], out: str | os.PathLike[str] |
     return load_sweep(content)
 
 
-def checked_part(given: object) -> tuple[int, int]:
+def checked_part(given: object) -> Part:
     """Number of a part and number of parts of "k/N", 1/1 of None, or an `InputError`."""
     if given is None:
         return 1, 1
@@ -196,13 +198,7 @@ def checked_part(given: object) -> tuple[int, int]:
 
 
 def _run_in_folder(
-    planned: Sweep,
-    folder: Path,
-    executor: Any,
-    workers: int | None,
-    fresh: bool,
-    part: tuple[int, int],
-    report: OnProgress,
+    planned: Sweep, folder: Path, executor: Any, workers: int | None, fresh: bool, part: Part, report: OnProgress
 ) -> None:
     """Run what is missing in a folder."""
     axes = (*Options.model_fields, "links", "start", "plane")  # along them kernels may differ
@@ -233,7 +229,7 @@ def _run_in_folder(
             tasks = _tasks(planned, missing, at_once if pulse is None else 1)  # threads take turns on a GPU
             where = str(store.directory), store.stamp
             submitted = (executor.submit(run_shards, planned, *where, tuple(task), pulse) for task in tasks)
-            _follow(submitted, 2 * at_once, pulse, planned, store, missing, progress, report)
+            _follow(submitted, 2 * at_once, pulse or Pulse(), store, progress, report)
         counts = counts_text(progress) or "nothing to do"
         store.log(f"complete after {progress.seconds:.1f} s: {counts}")
 
@@ -288,21 +284,19 @@ def run_shards(planned: Sweep, directory: str, stamp: str, shards: Sequence[Shar
 
 
 def _follow(
-    tasks: Iterator[concurrent.futures.Future[None]],
+    tasks: Iterator[Future[None]],
     at_once: int,
-    pulse: Pulse | None,
-    planned: Sweep,
+    pulse: Pulse,
     store: SweepFolder,
-    missing: Sequence[Shard],
     progress: SweepProgress,
     report: OnProgress,
 ) -> None:
     """Ask for so many tasks at once, so that memory does not grow with the sweep, and count the shards they write."""
     report(progress)
-    began, written, blocks = time.perf_counter(), 0, planned.blocks
-    folder, left = store.directory / "shards", {shard.name: shard for shard in missing}
+    began, written, blocks = time.perf_counter(), 0, store.manifest.sweep.blocks
+    folder, left = store.directory / "shards", {shard.name: shard for shard in store.missing()}
     lengths = {name: np.concatenate([block.parameter(name).ravel() for block in blocks]) for name in LENGTHS}
-    pending: set[concurrent.futures.Future[None]] = set()
+    pending: set[Future[None]] = set()
     try:
         while True:
             with losses_named():
@@ -310,7 +304,7 @@ def _follow(
                     pending.add(future)
                 if not pending:
                     break
-                finished, pending = concurrent.futures.wait(pending, POLL, concurrent.futures.FIRST_COMPLETED)
+                finished, pending = wait(pending, POLL, FIRST_COMPLETED)
                 for future in finished:
                     future.result()
             for name in left.keys() & set(os.listdir(folder)):
@@ -322,7 +316,7 @@ def _follow(
                 progress.statuses.update(Status(int(code)).label for code in rows["status"])
                 progress.inaccurate += int(np.any([*found.values()], axis=0).sum())
                 written += len(shard)
-            progress.done = progress.before + max(written, 0 if pulse is None else pulse.over)
+            progress.done = progress.before + max(written, pulse.over)
             progress.seconds = time.perf_counter() - began
             report(progress)
     finally:

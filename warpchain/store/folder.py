@@ -30,10 +30,10 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from warpchain.files import given_path, make_folder, naming, remove_output, write_whole
+from warpchain.files import AnyPath, given_path, make_folder, naming, remove_output, write_whole
 from warpchain.inputs.validation import DamagedFileError, InputError, InputWarning
 from warpchain.store import shards
-from warpchain.store.shards import Folder, Manifest, Shard, read_manifest, stamp
+from warpchain.store.shards import Manifest, Shard, read_manifest, stamp
 from warpchain.sweeps.designs import EXTENSIBLE
 from warpchain.sweeps.plan import Sweep
 from warpchain.version import NUMERICS_VERSION
@@ -69,7 +69,7 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
 
     @classmethod
     def open(
-        cls, directory: Folder, sweep: Sweep, *, fresh: bool = False, shard_size: int, part: tuple[int, int] = (1, 1)
+        cls, directory: AnyPath, sweep: Sweep, *, fresh: bool = False, shard_size: int, part: tuple[int, int] = (1, 1)
     ) -> Self:
         """Begin a sweep in a folder, made if need be, or go on with it, with more samples if the sweep has more.
 
@@ -141,7 +141,7 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
 
 
 def read_rows(
-    directory: Folder, manifest: Manifest, damaged: dict[str, str] | None = None
+    directory: AnyPath, manifest: Manifest, damaged: dict[str, str] | None = None
 ) -> tuple[list[Rows], list[NDArray[Any]]]:
     """For each block the rows of its walks, and of each what opens the file with its motion, and the group in there.
 
@@ -227,10 +227,7 @@ def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
         if more < count:
             raise InputError(f"{holds} {more} are asked for; give samples: {count} or more, or another folder")
         if more > count and block.sampler not in EXTENSIBLE:
-            raise InputError(
-                f"{holds} a {block.sampler} of {more} samples has other points; give samples: {count}, sampler: random "
-                "from the start, or another folder"
-            )
+            raise InputError(f"{holds} a {block.sampler} does not grow; give samples: {count}, or another folder")
     return found if there == asked else replace(manifest, versions=found.versions)
 
 

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any, Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.files import unreadable, write_whole
+from warpchain.files import AnyPath, unreadable, write_whole
 from warpchain.hdf5_files import hdf5_image, open_regular, reading_hdf5
 from warpchain.inputs.validation import InputError
 from warpchain.sweeps.designs import EXTENSIBLE
@@ -37,8 +37,6 @@ from warpchain.walks.walk_result import write_motion
 
 if TYPE_CHECKING:
     import h5py
-
-Folder = str | os.PathLike[str]
 
 OWN: Final = ("sweep.h5", "sweep.yaml", "shards", "log.txt")
 """What a sweep has in its folder, beside the lock."""
@@ -145,7 +143,7 @@ def _bounds(walks: int, most: int) -> list[int]:
     return bounds
 
 
-def stored_sweep(path: Folder, content: Mapping[str, object]) -> Sweep:
+def stored_sweep(path: AnyPath, content: Mapping[str, object]) -> Sweep:
     """The sweep in a file of results, given its canonical form; an `InputError` if this warpchain refuses it."""
     try:
         return Sweep.of(content)
@@ -153,7 +151,7 @@ def stored_sweep(path: Folder, content: Mapping[str, object]) -> Sweep:
         raise InputError(f"{path}: {error.args[0]}; read it with the version that wrote it") from None
 
 
-def read_manifest(directory: Folder) -> Manifest:
+def read_manifest(directory: AnyPath) -> Manifest:
     """The manifest of a folder; an `OSError` if unreadable, an `InputError` if it holds no sweep of this version."""
     path = Path(directory) / "sweep.h5"
     if not os.path.lexists(path):
@@ -178,7 +176,7 @@ _NAME: Final = re.compile(r"\d{6,}\.h5")
 FOREIGN: Final = "a shard of another sweep; move it out of this folder"
 
 
-def stamp(directory: Folder) -> str:
+def stamp(directory: AnyPath) -> str:
     """What tells whether the folder still holds the same sweep: the SHA-256 of its sweep.h5."""
     try:
         with open_regular(Path(directory) / "sweep.h5") as file:
@@ -189,7 +187,7 @@ def stamp(directory: Folder) -> str:
 
 
 def write_shard(
-    directory: Folder, expected: str, shard: Shard, rows: Rows, motions: Mapping[int, Mapping[str, Any]]
+    directory: AnyPath, expected: str, shard: Shard, rows: Rows, motions: Mapping[int, Mapping[str, Any]]
 ) -> None:
     """Write a shard into a folder that is open in the process that runs the sweep; workers need no lock for it.
 
@@ -220,7 +218,7 @@ def write_shard(
     write_whole(Path(directory) / "shards" / shard.name, hdf5_image(KIND, fill))
 
 
-def read_shard(directory: Folder, shard: Shard) -> Rows:
+def read_shard(directory: AnyPath, shard: Shard) -> Rows:
     """The rows of a shard; needs no lock; errors as of `opened_shard`."""
     with opened_shard(directory, shard.name, shard.digest) as file:
         return rows_of(file, shard.kind)
@@ -233,7 +231,7 @@ def rows_of(file: "h5py.File", kind: np.dtype[np.void]) -> Rows:
     return rows
 
 
-def shard_files(directory: Folder) -> list[str]:
+def shard_files(directory: AnyPath) -> list[str]:
     """Names of all files of shards, sorted; an `InputError` names one that is none, but for hidden files."""
     folder = Path(directory) / "shards"
     try:
@@ -249,7 +247,7 @@ def shard_files(directory: Folder) -> list[str]:
 
 
 @contextmanager
-def opened_shard(directory: Folder, name: str, digest: str) -> "Iterator[h5py.File]":
+def opened_shard(directory: AnyPath, name: str, digest: str) -> "Iterator[h5py.File]":
     """The shard of this name and digest; an `OSError` if it is unreadable, an `InputError` if damaged or foreign."""
     path = Path(directory) / "shards" / name
     with reading_hdf5(path, KIND, "delete it and run the sweep again, which computes only its walks") as file:

@@ -40,9 +40,7 @@ class _Range(BaseModel):
         intervals = int((last - first) / step) if self.count is None else self.count - 1
         below = first + intervals * step
         if self.count is None and below != last:
-            raise InputError(
-                f"to: steps of {step} from {first} miss {last}; give {below} or {below + step}, or a count"
-            )
+            raise InputError(f"to: steps of {step} from {first} miss {last}; give {below}, {below + step} or a count")
         values = [first + number * step for number in range(intervals)] + [last]
         return [int(value) if value == int(value) and abs(value) < 2**53 else float(value) for value in values]
 

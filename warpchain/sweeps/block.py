@@ -182,17 +182,8 @@ class Block:
             **({} if self.preset is None else {"preset": self.preset}),
             "samples": self.samples_given,
             "sampler": self.sampler,
-            **{
-                section: {
-                    name: value for name, value in getattr(first, section).model_dump().items() if name not in replaced
-                }
-                for section in SECTIONS
-            },
+            **{section: getattr(first, section).model_dump(exclude=replaced) for section in SECTIONS},
             "distributions": {"all": "fixed"} | {name: each.canonical() for name, each in self.distributions.items()},
             **({"points": {name: list(values) for name, values in self.points.items()}} if self.points else {}),
-            "grid": {
-                name: json_value(self.named.get(name)) or list(values)
-                for name, values in self.axes.items()
-                if name != POINT
-            },
+            "grid": {n: json_value(self.named.get(n)) or list(values) for n, values in self.axes.items() if n != POINT},
         }

@@ -11,7 +11,6 @@ and the index only: no table of walks exists, and a walk is the same whoever ask
 import bisect
 import hashlib
 import json
-import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -20,6 +19,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.files import AnyPath
 from warpchain.inputs.distributions import DRAW_LIMIT, Distribution, draw, placed, random_generator
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS
@@ -35,6 +35,8 @@ from warpchain.walks.motion import Keep
 
 Point = dict[str, float]
 """Drawn values by name."""
+Cell = tuple[int, ...]
+"""Place of a cell along every axis of its block."""
 
 LEAST_SHARE: Final = 0.05
 """Least share of a distribution that must be physical; where less is, redrawing would take too long."""
@@ -49,7 +51,7 @@ class PlannedWalk:
 
     index: int
     block: int
-    cell: tuple[int, ...]
+    cell: Cell
     sample: int
     setup: Setup
     drawn: Point
@@ -74,7 +76,7 @@ class Sweep:
     recording: Recording
 
     @classmethod
-    def of(cls, source: "str | os.PathLike[str] | Mapping[str, object]", **replaced: object) -> "Sweep":
+    def of(cls, source: "AnyPath | Mapping[str, object]", **replaced: object) -> "Sweep":
         """The sweep of a file, or of the content of one, whose cells were checked before, see `read_sweep`."""
         return cls(*read_sweep(source, **replaced))
 
@@ -110,14 +112,14 @@ class Sweep:
 
     def undrawn(self, indices: Iterable[int]) -> Iterator[PlannedWalk]:
         """Walks without their draws, which take most of the time; options and number of links never depend on them."""
-        before: tuple[int, tuple[int, ...]] | None = None
+        before: tuple[int, Cell] | None = None
         for index in map(int, indices):
             number, cell, sample = self._located(index)
             if (number, cell) != before:
                 before, fixed = (number, cell), self.blocks[number].fixed(cell)
             yield PlannedWalk(index, number, cell, sample, fixed, {})
 
-    def _located(self, index: int) -> tuple[int, tuple[int, ...], int]:
+    def _located(self, index: int) -> tuple[int, Cell, int]:
         """Number of a walk's block, its cell and its sample."""
         sample, cell = divmod(index, self.blocks[0].stride)
         number = bisect.bisect_right(self.blocks, cell, key=lambda block: block.first_cell) - 1
@@ -140,11 +142,8 @@ class Sweep:
         """Check every cell: its fixed values, its distributions, and that a random sample makes a possible walk."""
         most = max(block.samples for block in self.blocks)
         for name, choice in self.recording.choices.items():
-            if choice.samples != "all" and choice.samples[-1] >= most:
-                raise InputError(
-                    f"sweep.record.{name}.samples: {choice.samples[-1]} is no sample of any block; "
-                    f"give numbers from 0 to {most - 1}"
-                )
+            if choice.samples != "all" and (last := choice.samples[-1]) >= most:
+                raise InputError(f"sweep.record.{name}.samples: no block has sample {last}; give 0 to {most - 1}")
         for block in self.blocks:
             first = before = None
             checked: dict[str, Distribution] = {}
@@ -170,9 +169,7 @@ class Sweep:
             here, there = getattr(first, name), getattr(options, name)
             if here != there and name not in block.varied:
                 raise InputError(
-                    f"{block.path}.grid: {name} is {here!r} in one cell and {there!r} in another, as methods "
-                    f"or devices have it; give {name} once for all, or each such method, and each kind of "
-                    "device, a block of its own"
+                    f"{block.path}.grid: {name} is {here!r} in one cell, {there!r} in another; give it, or use blocks"
                 )
         for name, choice in self.recording.choices.items():
             choice.steps(options, f"sweep.record.{name}")
@@ -180,11 +177,10 @@ class Sweep:
     def _first_possible(
         self,
         block: Block,
-        cell: tuple[int, ...],
+        cell: Cell,
         fixed: Setup,
         distributions: Mapping[str, Distribution],
         row: int,
-        *,
         designed: bool,
     ) -> tuple[list[Point], list[Setup]]:
         """Points for the walks of sample `row` of a cell, the first that make possible walks only, and their setups.
@@ -209,7 +205,7 @@ class Sweep:
                 problem = str(error)
         raise InputError(f"{block.path}.distributions: {DRAW_LIMIT} samples made no possible walk; the last: {problem}")
 
-    def _stream(self, block: Block, cell: tuple[int, ...]) -> int:
+    def _stream(self, block: Block, cell: Cell) -> int:
         """Number of a cell's random stream, through all blocks; axes in `same_samples_along` do not count."""
         number = 0
         for (name, values), place in zip(block.axes.items(), cell, strict=True):
@@ -247,7 +243,7 @@ class Sweep:
         return hashlib.sha256(text.encode()).hexdigest()
 
 
-def load_sweep(source: "str | os.PathLike[str] | Mapping[str, object] | Sweep", **replaced: object) -> Sweep:
+def load_sweep(source: "AnyPath | Mapping[str, object] | Sweep", **replaced: object) -> Sweep:
     """Load and check a sweep.
 
     Every cell is checked, see `Sweep.check`.

@@ -56,11 +56,8 @@ def frame_axes(planes: Array) -> Array:
 
 def state_of_plane(plane: Array) -> dict[str, Array]:
     """The fields of a `State` that tell its plane, (PLANE_VALUES,)."""
-    return {
-        "origin": plane[layout.ORIGIN : layout.ORIGIN + 3],
-        "axes": frame_axes(plane[None])[0],
-        "plane_rates": plane[:3],
-    }
+    origin = plane[layout.ORIGIN : layout.ORIGIN + 3]
+    return {"origin": origin, "axes": frame_axes(plane[None])[0], "plane_rates": plane[:3]}
 
 
 def plane_of_state(state: State) -> Array:

@@ -2,11 +2,12 @@
 
 The drive (settle, spin-up, hold until steady) needs a sprocket and no floor, the walk a floor and no sprocket. The
 equations of the drive do not contain the floor, so the chain is driven about the origin and raised to its clearance at
-the release.
+the release. The state of a walk at any time after that is that of the walk, run again until then.
 """
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.engine.batch import Batch
+from warpchain.engine.devices import gpu_turn
 from warpchain.engine.snapshot import CACHES, change, restore, take_snapshot
 from warpchain.engine.sprocket_motion import motion_rows
 from warpchain.engine.tallies import CONTACTS, COUNTS, EXTREMES, LOST
@@ -23,7 +25,7 @@ from warpchain.inputs.scene import joint_radius, link_values, settling_time
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.inputs.state import State
-from warpchain.inputs.validation import InputError
+from warpchain.inputs.validation import InputError, checked
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.status import Status
@@ -35,6 +37,8 @@ from warpchain.walks.recorder import Recorder
 
 _OF_THE_RUN = ("raised", "drive_time", "drift", "_at_full_speed", "_has_sprocket")
 """What a run knows of the time before its release."""
+FINER = 8
+"""By how much launches become shorter each time that one has gone too far."""
 _NO_FALL: Mapping[str, float] = {
     **dict.fromkeys(("lateral_drift", "final_tilt", "final_yaw", "greatest_tilt", "fell_at"), math.nan),
     **dict.fromkeys(("fell_over", "fell_before_collapse"), -1),
@@ -145,24 +149,15 @@ class WalkRun:
         try:
             return lay_chain(ellipse(scene.ellipse_aspect), scene.links, length, speed, scene.phase)
         except ValueError:
-            raise InputError(
-                f"scene.ellipse_aspect: {scene.links} links cannot follow an ellipse of aspect "
-                f"{scene.ellipse_aspect}; give one closer to 1, or more links"
-            ) from None
+            raise InputError(f"scene.ellipse_aspect: too far from 1 for {scene.links} links; give another") from None
 
     def _start_drive(self) -> None:
         """Lay the chain on its sprocket; it is to settle there, if it starts at rest."""
         (position, velocity), drive = drive_of(self.setup, self._links)
         self._at_full_speed, self._hold_softness = drive["hold_start"], drive["hold_softness"]
         self._batch.set_drive(self._world, **drive)
-        self._batch.load(
-            self._world,
-            position,
-            velocity,
-            stop_time=self._settled,
-            stop_status=Status.FINISHED,
-            softness=self._hold_softness,
-        )
+        load = partial(self._batch.load, self._world, position, velocity, softness=self._hold_softness)
+        load(stop_time=self._settled, stop_status=Status.FINISHED)
 
     @property
     def phase(self) -> str:
@@ -365,13 +360,47 @@ class WalkRun:
     def _load(self, position: Array, velocity: Array) -> None:
         """Begin the walk of a chain on its floor."""
         self._batch.set_drive(self._world, farthest=self._farthest)
-        self._batch.load(
-            self._world,
-            position,
-            velocity,
-            stop_time=self._walk_end,
-            stop_status=Status.TIME_LIMIT,
-            attempts_before=int(self._before["counts"][[layout.ACCEPTED, layout.REJECTED]].sum()),
-            softness=self._hold_softness,
-            has_frame_marks=self.recorder.keep.frame_interval > 0,
-        )
+        before = int(self._before["counts"][[layout.ACCEPTED, layout.REJECTED]].sum())
+        has_marks = self.recorder.keep.frame_interval > 0
+        load = partial(self._batch.load, self._world, position, velocity, softness=self._hold_softness)
+        load(stop_time=self._walk_end, stop_status=Status.TIME_LIMIT, attempts_before=before, has_frame_marks=has_marks)
+
+
+def state_at(setup: Setup, t: object, end: float) -> State:
+    """The state of a walk at the end of its first step at or after a time [s], see `WalkResult.state`.
+
+    Launches that go past that step are undone and shortened, down to one attempt: so the walk makes the steps that it
+    always makes, and none for this time. Its end [s] is NaN if it came before the release. An `InputError` says that
+    there is no such time, or that the walk, run again, ends before.
+    """
+    time: float = checked(t, "t", float, "s")
+    first = setup.scene.release[-1][0] if setup.scene.release is not None else 0.0  # then the sprocket vanishes
+    if setup.start is not None:
+        first = setup.start.time
+    if np.isnan(end):
+        raise InputError("t: the walk ended before its release, and has no such time; see its status")
+    if setup.start is None and 0 <= time < first:
+        raise InputError(f"t: {time:g} s: the sprocket is there until {first:g} s, and a state has none; give more")
+    if not first <= time <= end:
+        raise InputError(f"t: {time:g} s is not in the walk; give a time from {first:g} to {end:.6g}")
+    with gpu_turn([setup.options.device]):
+        batch = Batch(1, setup.scene.links, setup.options, faces=len(setup.floor.laws))
+        run = WalkRun(batch, 0, setup)
+        attempts = batch.attempts_of_launch
+        for features in run.phases():
+            while not (has_come := run.is_free and batch.time(0) >= time) and batch.status(0) == Status.RUNNING:
+                before = take_snapshot(batch, 0) if run.is_free else None
+                batch.launch([0], features, attempts)
+                if before is not None and batch.time(0) >= time and attempts > 1:
+                    restore(batch, 0, before)
+                    attempts = max(1, attempts // FINER)
+            if has_come:
+                return State(
+                    position=batch.position(0),
+                    velocity=batch.velocity(0),
+                    setup=replace(setup, start=None),
+                    time=batch.time(0),
+                    memory=run.memory(),
+                    **(state_of_plane(batch.plane(0)) if setup.scene.plane == "tilting" else {}),
+                )
+        raise InputError(f"t: run again, the walk ends as {run.status.label} at {batch.time(0):.6g} s; give less")

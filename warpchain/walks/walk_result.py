@@ -35,7 +35,6 @@ from warpchain.status import Status
 from warpchain.walks.faults import FAULTS, LENGTHS, MOST_ENERGY_ERROR, energy_error, faults, least
 from warpchain.walks.landmarks import RELEASE, bounces
 from warpchain.walks.moving_plane import in_room
-from warpchain.walks.stored_state import read_state, write_state
 
 if TYPE_CHECKING:
     import h5py
@@ -59,6 +58,15 @@ ENERGIES: Final = {
     "residual": "energy at release, less that at the end and all losses: the error of the integration",
 }
 """Keys of `WalkResult.energy`. Losses count as positive."""
+_GROUP: Final = "start"
+"""Group of the state that a walk began from, so that it can be run again to the bit."""
+_STATE: Final = {
+    "position": ("m, m, rad", "x, y and angle of each link"),
+    "velocity": ("m/s, m/s, rad/s", "their rates"),
+    "origin": ("m", "origin of the plane's coordinates in the room"),
+    "axes": ("1", "axes of x and y of the plane in the room"),
+    "plane_rates": ("m/s, rad/s, rad/s", "speed across the plane, and its turning rates about x and y"),
+}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -222,7 +230,7 @@ class WalkResult:
         Raises:
             InputError: `t` is no such time, the chain was never released, or the device of the walk is not here.
         """
-        from warpchain.walks.revisit import state_at
+        from warpchain.walks.walk_phases import state_at
 
         is_released = not np.isnan(self.energy["kinetic_at_release"])
         return state_at(self.setup, t, self.walk_time if is_released else np.nan)
@@ -407,3 +415,29 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
 def _setup_as_dict(setup: Setup) -> dict[str, Any]:
     models = {name: getattr(setup, name).model_dump() for name in ("parameters", "scene", "options")}
     return {"preset": setup.preset, **models}
+
+
+def write_state(file: "h5py.File", state: State) -> None:
+    """Write a state of a walk; its setup is that of the file."""
+    put(file, f"{_GROUP}/time", state.time, "s", "time since the release")
+    for name, (unit, meaning) in _STATE.items():
+        if (values := getattr(state, name)) is not None:
+            put(file, f"{_GROUP}/{name}", values, unit, meaning)
+    for name, values in state.memory.items():
+        put(file, f"{_GROUP}/memory/{name}", values, "1", "what else the walk had then")
+
+
+def read_state(file: "h5py.File", setup: Setup) -> State | None:
+    """The state that a walk began from; None if it began as its scene says."""
+    if _GROUP not in file:
+        return None
+    group, memory = file[_GROUP], {}
+
+    def remember(name: str, node: object) -> None:
+        if hasattr(node, "dtype"):
+            memory[name] = np.array(node)
+
+    if "memory" in group:
+        group["memory"].visititems(remember)
+    arrays = {name: group[name][()] for name in _STATE if name in group}
+    return State(setup=setup, time=float(group["time"][()]), memory=memory, **arrays)
