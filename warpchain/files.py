@@ -15,7 +15,7 @@ import stat
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 AnyPath = str | os.PathLike[str]
 DISK_FAILURES: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
@@ -125,14 +125,16 @@ def make_folder(folder: Path) -> None:
 
 
 @contextmanager
-def naming(target: Path) -> Iterator[None]:
-    """Turn an `OSError` of the `with` block into one of one line that names a file and what to do."""
+def naming(target: AnyPath, verb: Literal["written", "read"] = "written") -> Iterator[None]:
+    """Turn an `OSError` of the `with` block into one of its class in one line, which names a file and what to do."""
     try:
         yield
     except OSError as error:
         number = error.errno or errno.EIO  # without a number: a library that writes a format failed
-        remedy = _REMEDIES.get(number, "see to the disk")
-        raise failure(number, f"{target}: cannot be written ({reason(error)}); {remedy}") from error
+        remedy = _REMEDIES.get(number, "see to the disk") if verb == "written" else "give the path of a readable file"
+        problem = type(error)(f"{target}: cannot be {verb} ({reason(error)}); {remedy}")
+        problem.errno = number
+        raise problem from error
 
 
 _REMEDIES: Final = {
@@ -147,10 +149,3 @@ _REMEDIES: Final = {
 def reason(error: OSError) -> str:
     """The system's short text for an error; HDF5 hides it in a paragraph."""
     return os.strerror(error.errno) if error.errno else " ".join(str(error).split())
-
-
-def unreadable(path: AnyPath, error: OSError) -> OSError:
-    """One line for what the system refused to read, of the same class."""
-    problem = type(error)(f"{path}: cannot be read ({reason(error)}); give the path of a readable file")
-    problem.errno = error.errno
-    return problem

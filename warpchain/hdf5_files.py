@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Final, get_args
 
 import numpy as np
 
-from warpchain.files import AnyPath, unreadable
+from warpchain.files import AnyPath, naming
 from warpchain.inputs.validation import DamagedFileError, InputError
 from warpchain.version import FORMAT_VERSION, version_refusal
 
@@ -161,19 +161,16 @@ def kind_of_hdf5(path: AnyPath, wanted: str) -> str:
 
 def _compare(path: AnyPath, remedy: str, wanted: str | None) -> None:
     """Compare the checksum of a file; errors as of `reading_hdf5`."""
-    with open_regular(path) as file:
-        try:
-            head = file.read(len(_SIGNATURE))
-            left = file.seek(0, os.SEEK_END) - _LINE_LENGTH
-            file.seek(max(0, left))
-            end = file.read()
-            file.seek(0)
-            digest = hashlib.sha256()
-            while left > 0 and (piece := file.read(min(left, _PIECE))):
-                digest.update(piece)
-                left -= len(piece)
-        except OSError as error:
-            raise unreadable(path, error) from error
+    with open_regular(path) as file, naming(path, "read"):
+        head = file.read(len(_SIGNATURE))
+        left = file.seek(0, os.SEEK_END) - _LINE_LENGTH
+        file.seek(max(0, left))
+        end = file.read()
+        file.seek(0)
+        digest = hashlib.sha256()
+        while left > 0 and (piece := file.read(min(left, _PIECE))):
+            digest.update(piece)
+            left -= len(piece)
     if end == _LINE.format(digest.hexdigest()).encode():
         return
     if wanted and head != _SIGNATURE and b"warpchain SHA-256: " not in end:
@@ -187,11 +184,10 @@ def open_regular(path: AnyPath) -> BinaryIO:
     Opening a pipe or a device does not wait: what is no regular file is refused by an `InputError`.
     """
     try:
-        file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK))
+        with naming(path, "read"):
+            file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK))
     except IsADirectoryError:
         raise InputError(f"{path}: is a folder, not a file; give another path") from None
-    except OSError as error:
-        raise unreadable(path, error) from error
     if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
         file.close()
         raise InputError(f"{path}: a pipe or a device, not a file; give another path")

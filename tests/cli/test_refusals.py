@@ -25,7 +25,6 @@ REFUSED = {
     "walk -o new --device cuda:98": "options.device: there is no cuda:98 on this machine",
     "walk --config nowhere.yaml": "nowhere.yaml: No such file",
     "walk --frobnicate": "No such option: --frobnicate; see warpchain walk --help",
-    "walk --animate walk.gif": "No such option: --animate; give -o DIR, then run `warpchain animate DIR`",
     "walk extra": "Got unexpected extra argument(s) (extra); see warpchain walk --help",
     "walk -o walk.h5": "walk.h5: cannot be written (Not a directory); give a folder that is there",
     f"walk -o {'x' * 300}": "xxx",

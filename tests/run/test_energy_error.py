@@ -17,7 +17,7 @@ from warpchain.run.progress_bar import SweepProgress
 from warpchain.run.sweep_run import sweep
 from warpchain.store.sweep_result import load
 from warpchain.sweeps.plan import load_sweep
-from warpchain.walks.faults import ENERGY_REMEDY, FAULTS, LENGTHS
+from warpchain.walks.landmarks import ENERGY_REMEDY, FAULTS, LENGTHS
 from warpchain.walks.rows import faults_of_columns
 
 COARSE = {

@@ -14,7 +14,7 @@ from tests.support.sweep_content import content
 from warpchain.inputs.validation import FIELDS, InputError
 from warpchain.run.sweep_run import sweep_of_keywords
 from warpchain.store.sweep_result import merge
-from warpchain.sweeps.axes import is_axis
+from warpchain.sweeps.block import is_axis
 from warpchain.sweeps.plan import load_sweep
 
 STEP = [[-1, 0], [0.1, 0], [0.1, -0.05], [1, -0.05]]

@@ -31,7 +31,7 @@ def test_threads_take_turns_on_a_gpu(monkeypatch: pytest.MonkeyPatch, device: st
         inside.pop()
         return []
 
-    shards = Manifest.of(planned, 8).wanted
+    shards = Manifest(planned, 8).wanted
     monkeypatch.setattr(runner, "compile_kernels", lambda setups: None)
     monkeypatch.setattr(runner, "run_setups", run_walks)
     with concurrent.futures.ThreadPoolExecutor(2) as pool:

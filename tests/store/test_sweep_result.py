@@ -53,7 +53,7 @@ def test_arrays_have_named_axes(folder: Path) -> None:
     """Every walk is where block, cell and sample say, every column under its name and to the bit."""
     result = load(folder)
     assert result.name == "synthetic" and result.seed == SWEEP.seed and list(result.blocks) == ["rest", "ellipse"]
-    rows = np.concatenate([synthetic_rows(SWEEP, shard) for shard in Manifest.of(SWEEP, SHARD_SIZE).wanted])
+    rows = np.concatenate([synthetic_rows(SWEEP, shard) for shard in Manifest(SWEEP, SHARD_SIZE).wanted])
     rest, ellipse = result.blocks["rest"], result.blocks["ellipse"]
     assert rest.dims == ("links", "frequency", "sample") and rest.shape == rest.dx.shape == (3, 2, 20)
     assert ellipse.dims == ("gravity", "sample") and ellipse.shape == (5, 8)

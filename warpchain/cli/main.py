@@ -15,8 +15,7 @@ from typing import Annotated, Any, Final, NoReturn
 
 import typer
 
-from warpchain.cli.bench_commands import bench
-from warpchain.cli.input_commands import parameters, schema
+from warpchain.cli.input_commands import bench, parameters, schema
 from warpchain.cli.interrupts import INTERRUPTED, interrupts_heard
 from warpchain.cli.sweep_commands import info, merge, plot, report, sweep
 from warpchain.cli.walk_commands import FAILED, animate, walk
@@ -25,9 +24,6 @@ from warpchain.version import VERSION
 
 REFUSED: Final = 2
 """Exit status beside `FAILED` and `INTERRUPTED`."""
-
-FORMER_OPTIONS: Final = {"--animate": "give -o DIR, then run `warpchain animate DIR`"}
-"""Options that were removed → what to do instead."""
 
 app = typer.Typer(pretty_exceptions_enable=False, rich_markup_mode=None)  # boxes of rich would double the time of help
 
@@ -61,8 +57,7 @@ def _refuse_for(error: Exception) -> None:
     if isinstance(error, typer.TyperException):
         context = getattr(error, "ctx", None)
         command = context.command_path if context is not None else "warpchain"
-        remedy = FORMER_OPTIONS.get(getattr(error, "option_name", ""), f"see {command} --help")
-        problems, status = [f"{error.format_message().rstrip('.')}; {remedy}"], error.exit_code
+        problems, status = [f"{error.format_message().rstrip('.')}; see {command} --help"], error.exit_code
     elif isinstance(error, OSError):
         status = FAILED if error.errno in DISK_FAILURES else REFUSED
     elif isinstance(error, InputError):

@@ -1,18 +1,14 @@
 """The commands of the command line that are about sweeps: sweep, info, plot, report, merge."""
 
 import contextlib
-import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import Annotated, Final, Literal
 
 import typer
 
 from warpchain.cli.walk_commands import FAILED
 from warpchain.cli.words import JSON, argument, option, output, output_path
-
-if TYPE_CHECKING:
-    from warpchain.store.sweep_result import SweepResult
 
 _FILE: Final = "The sweep, or the bare name of one that comes with warpchain, such as figure6."
 _DEVICE: Final = "cpu, cuda (the first GPU) or cuda:N, instead of what the sweep says."
@@ -60,6 +56,7 @@ def sweep(
     from warpchain.cli.output import print_sweep
     from warpchain.run.gpu_workers import gpu_workers
     from warpchain.run.sweep_run import sweep as run
+    from warpchain.status import Status
 
     if gpus is not None:
         if workers is not None:
@@ -85,7 +82,12 @@ def sweep(
         print(f"the same command{', without --fresh,' if fresh else ''} goes on with the sweep", file=sys.stderr)
         raise
     print_sweep(result, as_json)
-    _note_failures(result)
+    counts = result.summary()
+    failed = [status for status in Status if not status.ok and counts.get(status.label)]
+    for status in failed:
+        print(f"{counts[status.label]} {status.label}: {status.sentence}", file=sys.stderr)
+    if failed:
+        raise typer.Exit(FAILED)
 
 
 def info(
@@ -131,7 +133,7 @@ def plot(
         raise InputError("--quantity: a saved walk has no columns; leave it out, or give the folder of a sweep")
     if kind is not None and not is_walk:
         raise InputError("--kind: a sweep has none; leave it out, or give the file of a saved walk")
-    folder = folder or (path.parent if os.path.isfile(path) else path)
+    folder = folder or (path.parent if path.is_file() else path)
     make_folder(folder)
     drawn = (
         draw_figures(found, folder, kinds_of(found) if kind is None else (kind,))
@@ -168,7 +170,7 @@ def report(
 
     if device is not None and walk is None:
         raise InputError("--device: no walk is run for this page; add --walk INDEX, or leave it out")
-    path = path or (directory.parent if os.path.isfile(directory) else directory) / "report.html"
+    path = path or (directory.parent if directory.is_file() else directory) / "report.html"
     write_report(directory, path, animation_of=walk, device=device)
     print(printable(str(path)))
 
@@ -198,15 +200,3 @@ def _checked_gpus(wanted: int) -> None:
         raise InputError("--gpus: no GPU is found on this machine; leave it out to run on the CPU") from None
     if wanted > there:
         raise InputError(f"--gpus: {wanted} wanted, but this machine has {there}; give at most {there}")
-
-
-def _note_failures(result: "SweepResult") -> None:
-    """Say which walks failed and leave with exit status 1 if any did."""
-    from warpchain.status import Status
-
-    ended = {status.label: status for status in Status if not status.ok}
-    failed = {label: n for label, n in result.summary().items() if n and label in ended}
-    for label, count in failed.items():
-        print(f"{count} {label}: {ended[label].sentence}", file=sys.stderr)
-    if failed:
-        raise typer.Exit(FAILED)

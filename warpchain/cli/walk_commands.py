@@ -60,9 +60,7 @@ def walk(
     preset: Annotated[_Text, option("NAME", _PRESETS)] = None,
     method: Annotated[_Text, option("NAME", _METHODS)] = None,
     tolerance: Annotated[_Text, option("NUMBER", _TOLERANCE, "--tol")] = None,
-    device: Annotated[
-        _Text, option("NAME", "Where it runs: cpu, cuda (the first GPU) or cuda:N. Default: cpu.")
-    ] = None,
+    device: Annotated[_Text, option("NAME", "Where it runs: cpu, cuda (first GPU) or cuda:N. Default: cpu.")] = None,
     assignments: Annotated[list[str] | None, option("NAME=VALUE", _SET, "--set")] = None,
     seed: Annotated[_Text, option("S", _SEED)] = None,
     config: Annotated[Path | None, option("FILE.yaml", _CONFIG)] = None,
@@ -108,8 +106,12 @@ def walk(
         setup = continued(base.start, given)
     else:
         sections = {name: {**own.get(name, {}), **values} for name, values in given.items()}
-        setup = resolve(preset or DEFAULT_PRESET, **sections, seed=number, records_loads=record_loads)
-    interval = _frame_interval(folder, frame_interval, record_loads)
+        setup = resolve(preset or DEFAULT_PRESET, **sections, seed=number, loads=record_loads)
+    if folder is None and (frame_interval is not None or record_loads):
+        name = "--record-loads" if frame_interval is None else "--frame-interval"
+        raise InputError(f"{name}: there is no folder to write to; add -o DIR")
+    usual = None if folder is None else 1e-4 if record_loads else 2e-3
+    interval = usual if frame_interval is None else parse_yaml(frame_interval, "frame_interval")
     if folder is not None:
         try_walk_folder(folder)
     with changing_line() as show:
@@ -194,17 +196,3 @@ def _saved(path: Path, index: str | None) -> tuple["Setup", int | None]:
         raise InputError(f"--like: {path} has many walks; give --index, the number of one, as well")
     block, place = found.located(parse_yaml(index, "--index"))
     return block.setup_at(place), block.origin.seed
-
-
-def _frame_interval(folder: Path | None, text: str | None, records_loads: bool) -> Any:
-    """Time between two frames [s], which the walk checks; None without a folder to write them to."""
-    from warpchain.inputs.validation import InputError
-    from warpchain.inputs.yaml_files import parse_yaml
-
-    if folder is None:
-        for name, given in (("--frame-interval", text is not None), ("--record-loads", records_loads)):
-            if given:
-                raise InputError(f"{name}: there is no folder to write to; add -o DIR")
-        return None
-    usual = 1e-4 if records_loads else 2e-3
-    return usual if text is None else parse_yaml(text, "frame_interval")

@@ -8,7 +8,7 @@ What is drawn is a mapping of names to distributions, in the order of drawing. A
 """
 
 import math
-from collections.abc import Container, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from statistics import NormalDist
 from typing import Annotated, Final
@@ -62,10 +62,6 @@ class Uniform:
     def _physical_ends(self) -> tuple[float, float]:
         return max(self.lower, self.bounds[0]), min(self.upper, self.bounds[1])
 
-    def __str__(self) -> str:
-        """In words, for error messages."""
-        return f"between {self.lower} and {self.upper}"
-
     def canonical(self) -> dict[str, object]:
         """Its form in a sweep file."""
         return {"uniform": [self.lower, self.upper]}
@@ -110,10 +106,6 @@ class Gaussian:
         """The physical bounds in standard deviations from the mean."""
         least, most = self.bounds
         return (least - self._placed_mean) / self.sigma, (most - self._placed_mean) / self.sigma
-
-    def __str__(self) -> str:
-        """In words, for error messages."""
-        return f"about {self.mean} with standard deviation {self.sigma}"
 
     def canonical(self) -> dict[str, object]:
         """Its form in a sweep file."""
@@ -171,10 +163,8 @@ def draw(distributions: Mapping[str, Distribution], rng: np.random.Generator) ->
                 drawn[name] = value
                 break
         else:
-            raise InputError(
-                f"{SECTION_OF[name]}.{name}: {DRAW_LIMIT} draws {distribution} were all outside the physical bounds; "
-                "give a mean inside them"
-            )
+            path, law = f"{SECTION_OF[name]}.{name}", distribution.canonical()
+            raise InputError(f"{path}: {DRAW_LIMIT} draws of {law} were all out of bounds; give a mean inside them")
     return drawn
 
 
@@ -183,12 +173,3 @@ def random_generator(seed: int, cell: int = 0, sample: int = 0) -> np.random.Gen
     entropy = checked(seed, "seed", Seed)
     key = [checked(number, name, _Index) for name, number in (("cell", cell), ("sample", sample))]
     return np.random.default_rng(np.random.SeedSequence(entropy, spawn_key=key))
-
-
-def sampled(setup: Setup, rng: np.random.Generator, kept: Container[str] = ()) -> Setup:
-    """The setup with the quantities of `TABLE`, but those kept, drawn about its own values, in the order of the table.
-
-    An `InputError` says that no draw was physical, or that the drawn values together make no possible walk.
-    """
-    drawn = {name: distribution for name, distribution in TABLE.items() if name not in kept}
-    return setup.with_drawn(draw(placed(drawn, setup), rng))

@@ -11,9 +11,6 @@ from warpchain.kernels.methods.method import find_method, method_names
 METHODS: Final[Mapping[str, str]] = {name: find_method(name).title for name in method_names()}
 """Integrators, each described in a few words."""
 
-FORMER_METHODS: Final[Mapping[str, str]] = {"rodas4p": "dp5", "rodas5p": "dp5"}
-"""Integrators that were removed → what to write instead."""
-
 BURST_TOLERANCE: Final = 1e-4
 """Default of `hybrid`: its bursts are of order 3, and at 1e-6 slower than `rkf78`.
 

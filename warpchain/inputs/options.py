@@ -6,7 +6,7 @@ from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from warpchain.inputs.methods import BURST_TOLERANCE, FORMER_METHODS, METHODS, METHODS_BY_NEED
+from warpchain.inputs.methods import BURST_TOLERANCE, METHODS, METHODS_BY_NEED
 from warpchain.inputs.validation import InputError, Section, Whole, number_field, shown, suggestion
 from warpchain.kernels.methods.explicit_tableaus import HYBRID
 from warpchain.kernels.methods.method import find_method, method_names
@@ -38,8 +38,6 @@ def replaced_by(options: Mapping[str, object]) -> set[str]:
 
 def _known_method(method: str) -> str:
     """The word or integrator, if there is one of this name."""
-    if method in FORMER_METHODS:
-        raise ValueError(f"{shown(method)} was removed; give {FORMER_METHODS[method]}")
     known = (*METHODS_BY_NEED, *method_names())
     if method not in known:
         raise ValueError(f"{shown(method)} is unknown; {suggestion(method, known)}")

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
-from warpchain.inputs.distributions import random_generator, sampled
+from warpchain.inputs.distributions import TABLE, draw, placed, random_generator
 from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL, Options, replaced_by
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.parameters import preset as parameter_preset
@@ -16,8 +16,9 @@ from warpchain.inputs.state import DEFAULT_PRESET, Setup, State
 from warpchain.inputs.validation import InputError, shown, validated
 from warpchain.kernels.methods.method import find_method
 
-__all__ = ["DEFAULT_PRESET", "Setup", "combined", "continued", "options_beside", "resolve"]
+__all__ = ["DEFAULT_PRESET", "Setup", "Values", "combined", "continued", "options_beside", "resolve"]
 
+Values = Mapping[str, object]
 OF_THE_WALK: Final = (
     *("walk_limit", "walk_until", "distance_limit", "floor", "slope"),
     *("charm_mass", "charm_inertia", "charm_radius", "charm_link", "stiff_joint", "stiff_joint_factor"),
@@ -27,13 +28,7 @@ OF_THE_WALK: Final = (
 
 
 def resolve(
-    preset: str,
-    *,
-    scene: Mapping[str, object],
-    options: Mapping[str, object],
-    parameters: Mapping[str, object],
-    seed: int | None = None,
-    records_loads: bool = False,
+    preset: str, *, scene: Values, options: Values, parameters: Values, seed: int | None = None, loads: bool = False
 ) -> Setup:
     """Check a user's values, complete them, and draw the sample of a seed, if there is one.
 
@@ -43,13 +38,16 @@ def resolve(
     """
     checked = validated(Scene, scene, "scene")
     changed = parameter_preset(preset).with_values(parameters)
-    setup = combined(preset, changed, checked, options_beside(checked.plane, options, records_loads))
-    return setup if seed is None else sampled(setup, random_generator(seed), kept={*scene, *parameters})
+    setup = combined(preset, changed, checked, options_beside(checked.plane, options, loads))
+    if seed is None:
+        return setup
+    drawn = {name: distribution for name, distribution in TABLE.items() if name not in {*scene, *parameters}}
+    return setup.with_drawn(draw(placed(drawn, setup), random_generator(seed)))
 
 
-def options_beside(plane: str, options: Mapping[str, object], records_loads: bool = False) -> Options:
+def options_beside(plane: str, options: Values, loads: bool = False) -> Options:
     """The checked options; `Scene.plane`, and whether joint forces are recorded, may decide what `standard` is."""
-    if (plane == "tilting" or records_loads) and options.get("method", "standard") == "standard":
+    if (plane == "tilting" or loads) and options.get("method", "standard") == "standard":
         options = {**options, "method": "explicit"}
     return validated(Options, options, "options")
 
@@ -80,7 +78,7 @@ def check_has_joint_forces(options: Options) -> None:
         raise InputError(f"options.method: {shown(options.method)} has rigid joints, without forces; give explicit")
 
 
-def continued(state: State, sections: Mapping[str, Mapping[str, object]]) -> Setup:
+def continued(state: State, sections: Mapping[str, Values]) -> Setup:
     """The setup of a walk from a state, with other values of what comes behind the release; else an `InputError`."""
     if early := [name for name in sections["scene"] if name not in OF_THE_WALK]:
         raise InputError(f"{', '.join(early)}: given together with a state, whose chain is released; leave it out")

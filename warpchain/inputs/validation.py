@@ -11,7 +11,7 @@ import reprlib
 import textwrap
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Final, TypeVar, get_args
+from typing import Annotated, Any, Final, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationError
@@ -79,7 +79,7 @@ def number_field(default: Any, unit: str, description: str | None = None, **more
     return Field(default, description=description, json_schema_extra={"unit": unit, **more}, **limits)
 
 
-WHOLE: Final = BeforeValidator(lambda given: int(given) if isinstance(given, float) and given.is_integer() else given)
+WHOLE: Final = BeforeValidator(lambda x: int(x) if isinstance(x, float) and x.is_integer() else x)
 """Of whole numbers: 60.0 is sixty."""
 Whole = Annotated[int, WHOLE]
 
@@ -93,13 +93,6 @@ def field_unit(field: FieldInfo) -> str:
 def field_limits(field: FieldInfo) -> dict[str, float]:
     """The limits `ge`, `gt`, `le`, `lt` that a field has."""
     return {name: float(getattr(limit, name)) for limit in field.metadata for name in _LIMITS if hasattr(limit, name)}
-
-
-def field_choices(field: FieldInfo) -> tuple[Any, ...]:
-    """The words or truth values that a field may have; none for numbers and other texts."""
-    extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
-    words: Any = extra.get("enum", [word for word in get_args(field.annotation) if isinstance(word, str)])
-    return (True, False) if field.annotation is bool else tuple(words)
 
 
 def field_bounds(field: FieldInfo) -> tuple[float, float]:

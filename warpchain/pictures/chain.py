@@ -4,7 +4,7 @@ A view is a matrix of three orthogonal unit vectors, shape (3, 3): what points t
 up, and what points towards the viewer.
 """
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib import colormaps
@@ -17,16 +17,14 @@ from warpchain.inputs.arrays import Array
 from warpchain.inputs.scene import link_values
 from warpchain.inputs.sprocket_motion import sprocket_places
 from warpchain.pictures.style import DASHES, FAINT, GROUND, INK
-
-if TYPE_CHECKING:
-    from warpchain.walks.walk_result import WalkResult
+from warpchain.pictures.walk_shape import Walk
 
 SIDE: Final = np.eye(3)
 ABOVE: Final = np.eye(3)[[0, 2, 1]]
 """Its upper axis is z, which such a viewer sees grow downwards: invert it."""
 
 
-def circle_radii(walk: "WalkResult") -> Array:
+def circle_radii(walk: Walk) -> Array:
     """Radius of the circles of each link [m], shape (n,)."""
     return link_values(walk.setup.scene, walk.setup.parameters).radius
 
@@ -78,7 +76,7 @@ def draw_chain(
     return links
 
 
-def sprocket_circle(walk: "WalkResult") -> Array | None:
+def sprocket_circle(walk: Walk) -> Array | None:
     """Points of the sprocket's circle at the release x, y, z [m], shape (100, 3); None without one."""
     if walk.sprocket_center is None:
         return None
@@ -87,7 +85,7 @@ def sprocket_circle(walk: "WalkResult") -> Array | None:
     return np.asarray(circle + np.array([*walk.sprocket_center, 0.0]))
 
 
-def draw_release(axes: Axes, walk: "WalkResult", view: Array) -> None:
+def draw_release(axes: Axes, walk: Walk, view: Array) -> None:
     """Dashed, where the sprocket was at the release, if there was one, and how high above the floor."""
     circle = sprocket_circle(walk)
     if circle is None:
@@ -101,13 +99,13 @@ def draw_release(axes: Axes, walk: "WalkResult", view: Array) -> None:
         axes.plot(*(view @ part.T)[:2], color=FAINT, linewidth=1.0, linestyle=DASHES, zorder=1.5, label=label)
 
 
-def sprocket_centers(walk: "WalkResult", times: Array) -> Array:
+def sprocket_centers(walk: Walk, times: Array) -> Array:
     """The sprocket's centre x, y at times since the release [m], shape (t, 2); NaN where it has vanished."""
     center = (np.nan, np.nan) if walk.sprocket_center is None else walk.sprocket_center
     return sprocket_places(walk.setup.scene.release, times) + center
 
 
-def draw_sprocket(axes: Axes, walk: "WalkResult", time: float, **style: Any) -> list[Patch]:
+def draw_sprocket(axes: Axes, walk: Walk, time: float, **style: Any) -> list[Patch]:
     """The sprocket at a time since the release [s], if it has not vanished."""
     (center,) = sprocket_centers(walk, np.array([time]))
     if np.isnan(center[0]):
@@ -116,7 +114,7 @@ def draw_sprocket(axes: Axes, walk: "WalkResult", time: float, **style: Any) -> 
     return [axes.add_patch(Circle(tuple(center), walk.sprocket_radius, **style))]
 
 
-def walk_box(walk: "WalkResult", joints: Array) -> tuple[Array, Array]:
+def walk_box(walk: Walk, joints: Array) -> tuple[Array, Array]:
     """Least and greatest x, y, z of a walk and its sprocket, with a margin; from the floor on [m], each shape (3,)."""
     widest = circle_radii(walk).max()
     margin = widest + 2 * max(widest, walk.setup.parameters.half_width)
@@ -131,7 +129,7 @@ def walk_box(walk: "WalkResult", joints: Array) -> tuple[Array, Array]:
     return low, high
 
 
-def stretches(walk: "WalkResult", left: float, right: float) -> list[tuple[str, str, Array]]:
+def stretches(walk: Walk, left: float, right: float) -> list[tuple[str, str, Array]]:
     """What of the floor has coefficients of its own, between two x [m].
 
     For each pair of coefficients a colour, a label, and ends of the straight faces that have it [m], (f, 2, 2).
@@ -151,7 +149,7 @@ def stretches(walk: "WalkResult", left: float, right: float) -> list[tuple[str, 
     return [(to_hex(color), "e = {:g}, μ = {:g}".format(*law), its) for color, law, its in found if len(its)]
 
 
-def draw_ground(axes: Axes, walk: "WalkResult", line: Array, bottom: float) -> None:
+def draw_ground(axes: Axes, walk: Walk, line: Array, bottom: float) -> None:
     """The floor along its `Floor.line`, from the side, down to `bottom` [m], with labelled `stretches`."""
     axes.add_patch(Polygon([(line[0, 0], bottom), *line, (line[-1, 0], bottom)], facecolor=GROUND, zorder=3))
     axes.plot(*line.T, color=INK, linewidth=1.0, zorder=3)

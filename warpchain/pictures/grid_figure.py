@@ -13,7 +13,6 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
-from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import NullLocator
@@ -22,7 +21,7 @@ from numpy.typing import NDArray
 from warpchain.inputs.validation import InputError, shown
 from warpchain.pictures import labels, style
 from warpchain.pictures.labels import math_symbol, short_texts, unit_text, with_unit
-from warpchain.pictures.style import BLUE, FAINT, GROUND, LINE_COLORS, RED, NothingToShow, panel_grid, tidy
+from warpchain.pictures.style import BLUE, FAINT, GROUND, LINE_COLORS, RED, AnyFigure, NothingToShow, panel_grid, tidy
 
 if TYPE_CHECKING:
     from warpchain.store.cell_statistics import CellStatistics
@@ -66,12 +65,8 @@ class Panel(NamedTuple):
 
 
 def draw_grid(
-    blocks: "Mapping[str, CellStatistics]",
-    quantity: str = "dx",
-    *,
-    x: str | None = None,
-    figure: Figure | SubFigure | None = None,
-) -> Figure | SubFigure:
+    blocks: "Mapping[str, CellStatistics]", quantity: str, x: str | None = None, figure: AnyFigure | None = None
+) -> AnyFigure:
     """Draw a quantity over the grids of one block or several.
 
     Lines have bars of one standard error; a single line has lighter ones of one standard deviation, too. A red cross on
@@ -260,7 +255,7 @@ def _draw_map(axes: Axes, panel: Panel, limits: tuple[float, float]) -> Any:
 
 
 def _draw_legends(
-    owner: Figure | SubFigure, areas: Sequence[Axes], panels: Sequence[Panel], palettes: Mapping[str, Mapping[Any, str]]
+    owner: AnyFigure, areas: Sequence[Axes], panels: Sequence[Panel], palettes: Mapping[str, Mapping[Any, str]]
 ) -> None:
     """One legend of all panels; if their lines are of several axes, each panel has one of its own, too."""
     look: dict[str, Any] = {"frameon": False, "fontsize": "small"}

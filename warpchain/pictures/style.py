@@ -15,6 +15,7 @@ from matplotlib.figure import Figure, SubFigure
 from warpchain.files import write_whole
 from warpchain.inputs.validation import InputError
 
+AnyFigure = Figure | SubFigure
 LINE_COLORS: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Colours that people with any kind of colour vision can tell apart (Okabe and Ito, 2008)."""
 BLUE, RED, GREEN = LINE_COLORS[:3]
@@ -71,7 +72,7 @@ def tidy(axes: Axes, *, grid: Literal["x", "y", "both"] | None = None) -> None:
 
 
 def panel_grid(
-    figure: Figure | SubFigure, count: int, columns: int, *, sharex: bool, sharey: bool = True
+    figure: AnyFigure, count: int, columns: int, *, sharex: bool, sharey: bool = True
 ) -> tuple[list[Axes], list[Axes]]:
     """Put panels into an empty figure, by rows: the panels, and the axes that stay empty, which show nothing.
 

@@ -6,7 +6,7 @@ Sizes of a film strip on paper are in inches: constrained layout clips labels of
 plain: formulas would take a third of the time that this figure takes, and every walk has one.
 """
 
-from typing import TYPE_CHECKING, Any, Final, get_args
+from typing import Any, Final, get_args
 
 import numpy as np
 from matplotlib import colormaps
@@ -21,11 +21,8 @@ from warpchain.inputs.arrays import Array
 from warpchain.loop.stationary_loop import StationaryLoop
 from warpchain.pictures import chain
 from warpchain.pictures.style import BLUE, DASHES, DOTS, FAINT, GREEN, GROUND, INK, RED, InlineFigure, tidy
-from warpchain.pictures.walk_shape import Kind, center_in_room, checked_joints, setting
+from warpchain.pictures.walk_shape import Kind, Walk, center_in_room, checked_joints, setting
 from warpchain.status import Status
-
-if TYPE_CHECKING:
-    from warpchain.walks.walk_result import WalkResult
 
 FALLEN: Final = 45.0
 """Tilt beyond which a chain has fallen over [degrees]."""
@@ -49,7 +46,7 @@ _CLOSE_UP_LINKS, _CLOSE_UP_ASPECT = 9, 1.5
 _HALO: Final = (withStroke(linewidth=2.5, foreground="white"),)
 
 
-def draw(walk: "WalkResult", kind: Kind, *, figure: Figure | None = None, ax: Axes | None = None) -> Figure:
+def draw(walk: Walk, kind: Kind, *, figure: Figure | None = None, ax: Axes | None = None) -> Figure:
     """Draw a walk; arguments and errors as of `WalkResult.plot`."""
     if kind not in get_args(Kind):
         raise ValueError(f"kind: {kind!r} is unknown; give {', '.join(map(repr, get_args(Kind)))}")
@@ -64,17 +61,16 @@ def draw(walk: "WalkResult", kind: Kind, *, figure: Figure | None = None, ax: Ax
     if ax is not None:
         _energy(walk, ax)
         return ax.figure.figure if isinstance(ax.figure, SubFigure) else ax.figure
-    sizes = {"height_and_speed": (6.4, 5.0), "loop": (10.0, 6.4), "energy": (6.4, 4.0), "tilt": (6.4, 5.0)}
-    figure = InlineFigure(figsize=sizes[kind], layout="constrained") if figure is None else figure
-    draws = {"height_and_speed": _height_and_speed, "loop": _loop, "tilt": _tilt}
+    size = {"loop": (10.0, 6.4), "energy": (6.4, 4.0)}.get(kind, (6.4, 5.0))
+    figure = InlineFigure(figsize=size, layout="constrained") if figure is None else figure
     if kind == "energy":
         _energy(walk, figure.subplots())
     else:
-        draws[kind](walk, figure)
+        {"height_and_speed": _height_and_speed, "loop": _loop, "tilt": _tilt}[kind](walk, figure)
     return figure
 
 
-def _height_and_speed(walk: "WalkResult", figure: Figure) -> None:
+def _height_and_speed(walk: Walk, figure: Figure) -> None:
     """Height and horizontal speed of the centre of mass against time since the release, as in Figure 5.
 
     A thin line is the height of a floor that is not flat, below the centre of mass; it is thick and has a label where
@@ -97,7 +93,7 @@ def _height_and_speed(walk: "WalkResult", figure: Figure) -> None:
     _finish(walk, height, speed)
 
 
-def _energy(walk: "WalkResult", ax: Axes) -> None:
+def _energy(walk: Walk, ax: Axes) -> None:
     """Energies of a walk against time, and what was lost by then.
 
     Lost is the energy at the release less that of the moment. The dot at the end is the sum of the ledger's losses,
@@ -119,7 +115,7 @@ def _energy(walk: "WalkResult", ax: Axes) -> None:
     _finish(walk, ax)
 
 
-def _tilt(walk: "WalkResult", figure: Figure) -> None:
+def _tilt(walk: Walk, figure: Figure) -> None:
     """Tilt and yaw of the plane, and lateral drift of the centre of mass, against time.
 
     Marked are the moments at which the chain was first tilted by 45°, beyond which it has fallen over, and at which
@@ -147,7 +143,7 @@ def _tilt(walk: "WalkResult", figure: Figure) -> None:
     _finish(walk, angles, drift)
 
 
-def _finish(walk: "WalkResult", *panels: Axes) -> None:
+def _finish(walk: Walk, *panels: Axes) -> None:
     """Title, grids, and the common axis of time up to the end of the walk."""
     for axes in panels:
         tidy(axes, grid="both")
@@ -155,7 +151,7 @@ def _finish(walk: "WalkResult", *panels: Axes) -> None:
     panels[-1].set(xlabel="time since release $t$ / s", xlim=(0.0, float(walk.time[-1]) or None))
 
 
-def _loop(walk: "WalkResult", figure: Figure) -> None:
+def _loop(walk: Walk, figure: Figure) -> None:
     """The mean loop of a walk before its release, to scale, and its curvature and tension along the arc.
 
     A `ValueError` says that the time before the release was not kept, or is not enough for a mean loop.
@@ -225,7 +221,7 @@ def _mark(axes: Axes, x: float, y: float, text: str) -> None:
     axes.annotate(text, (x, y), (8, -4), textcoords="offset points", va="top", color=INK, fontsize="small")
 
 
-def film_strip(walk: "WalkResult", figure: Figure | None = None) -> Figure:
+def film_strip(walk: Walk, figure: Figure | None = None) -> Figure:
     """The chain along a walk with frames, drawn to scale, and close-ups of up to four moments.
 
     In the strip the centre of mass moves equally far from each instant to the next. Above each chain stands its time;
@@ -325,7 +321,7 @@ def _write_times(axes: Axes, times: Array, joints: Array, colors: Array, gap: fl
         axes.text(place[0], place[1], f"{moment:.2f} s", ha="center", va="bottom", zorder=6, **style)
 
 
-def _draw_distance(axes: Axes, walk: "WalkResult", low: float, depth: float) -> None:
+def _draw_distance(axes: Axes, walk: Walk, low: float, depth: float) -> None:
     """The distance walked, if there is one, so far [m] below a slope, or below the lowest place of another floor."""
     if not np.isfinite(walk.dx):
         return
@@ -341,7 +337,7 @@ def _draw_distance(axes: Axes, walk: "WalkResult", low: float, depth: float) -> 
     axes.text(x.mean(), y.mean(), text, rotation=-slope, ha="center", va="center", bbox=box, zorder=6)
 
 
-def _moments(walk: "WalkResult") -> list[tuple[int, str, Array]]:
+def _moments(walk: Walk) -> list[tuple[int, str, Array]]:
     """At most four frames in order of time, no frame twice, with what happens there and where, (2,)."""
     joints, radius = walk.frame_joints, chain.circle_radii(walk).max()
     above = walk.setup.floor.distances(joints.reshape(-1, 2)).reshape(joints.shape[:-1])

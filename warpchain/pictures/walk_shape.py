@@ -13,17 +13,21 @@ from warpchain.inputs.arrays import Array
 if TYPE_CHECKING:
     from warpchain.walks.walk_result import WalkResult
 
+    Walk = WalkResult
+else:
+    Walk = object
+
 Kind = Literal["film_strip", "height_and_speed", "loop", "energy", "tilt"]
 """Figures of a walk; `tilt` only of one whose plane tilts."""
 
 
-def kinds_of(walk: "WalkResult") -> tuple[Kind, ...]:
+def kinds_of(walk: Walk) -> tuple[Kind, ...]:
     """The figures that a walk has, if it was recorded."""
     kinds: tuple[Kind, ...] = get_args(Kind)
     return tuple(kind for kind in kinds if kind != "tilt" or walk.joints_in_room is not None)
 
 
-def checked_joints(walk: "WalkResult") -> Array:
+def checked_joints(walk: Walk) -> Array:
     """The joints of a walk in the room [m], shape (f, n, 3); z = 0 if its plane is fixed.
 
     A `ValueError` says that the walk has no frames or broken ones.
@@ -39,16 +43,16 @@ def checked_joints(walk: "WalkResult") -> Array:
     return joints
 
 
-def center_in_room(walk: "WalkResult") -> Array:
+def center_in_room(walk: Walk) -> Array:
     """Centre of mass x, y, z [m], shape (t, 3); z = 0 if the plane is fixed."""
     return np.column_stack([walk.center, np.zeros(len(walk.time)) if walk.joints_in_room is None else walk.center_z])
 
 
-def setting(walk: "WalkResult") -> str:
+def setting(walk: Walk) -> str:
     """Links and frequency, as a title."""
     return walk.setup.described.replace(" at ", ", ", 1)
 
 
-def headline(walk: "WalkResult") -> str:
+def headline(walk: Walk) -> str:
     """Links, frequency and, if it came to rest, how far it walked."""
     return setting(walk) + (f": Δx = {walk.dx:.3f} m" if math.isfinite(walk.dx) else "")

@@ -175,36 +175,29 @@ def sensitivities(result: SweepResult) -> list[Sensitivity]:
     named = [given["name"] for given in result.sweep["blocks"] if given["sampler"] == "saltelli"]
     if not named:
         raise NothingToShow("no block is sampled for Sobol indices; give sampler: saltelli")
-    found = [cell for name in named for cell in _sensitivities(result.blocks[name], name if len(named) > 1 else "")]
+    found = []
+    for name in named:
+        block = result.blocks[name]
+        for place in np.ndindex(*block.shape[:-1]):
+            rested = block.columns["status"][place] == Status.AT_REST
+            walks = np.where(rested, block.columns["dx"][place], np.nan)
+            whole = walks.reshape(-1, walks_per_sample("saltelli", len(block.drawn)))
+            complete = whole[np.isfinite(whole).all(axis=1)]
+            samples, indices = len(complete), np.array(sobol_indices(complete))
+            if samples < 2 or not np.isfinite(indices).all():
+                continue
+            rng = random_generator(0)
+            draws = (rng.integers(0, samples, samples) for _ in range(_RESAMPLES))
+            resampled = [sobol_indices(complete[draw]) for draw in draws]
+            # The indices are NaN for a resample without variance, which repeats a single sample.
+            intervals = np.nanpercentile(resampled, (50 * (1 - CONFIDENCE), 50 * (1 + CONFIDENCE)), axis=0)
+            cell = labels.cell_text(cell_values(block.axes, place))
+            text = ": ".join([*[name] * (len(named) > 1), *[cell] * bool(cell)]) or block.name
+            lost = len(whole) - samples
+            found.append(Sensitivity(text, block.drawn, indices, intervals.transpose(1, 2, 0), samples, lost))
     if not found:
         raise NothingToShow("no cell has two complete samples for Sobol indices yet; let the sweep go on")
     return found
-
-
-def _sensitivities(block: BlockResult, name: str) -> Iterator[Sensitivity]:
-    """The cells of a block, named so, that have two complete samples of different distances."""
-    for place in np.ndindex(*block.shape[:-1]):
-        rested = block.columns["status"][place] == Status.AT_REST
-        walks = np.where(rested, block.columns["dx"][place], np.nan)
-        whole = walks.reshape(-1, walks_per_sample("saltelli", len(block.drawn)))
-        complete = whole[np.isfinite(whole).all(axis=1)]
-        samples, indices = len(complete), np.array(sobol_indices(complete))
-        if samples < 2 or not np.isfinite(indices).all():
-            continue
-        rng = random_generator(0)
-        draws = (rng.integers(0, samples, samples) for _ in range(_RESAMPLES))
-        resampled = [sobol_indices(complete[draw]) for draw in draws]
-        # The indices are NaN for a resample without variance, which repeats a single sample.
-        intervals = np.nanpercentile(resampled, (50 * (1 - CONFIDENCE), 50 * (1 + CONFIDENCE)), axis=0)
-        cell = labels.cell_text(cell_values(block.axes, place))
-        yield Sensitivity(
-            cell=": ".join(filter(None, (name, cell))) or block.name,
-            names=block.drawn,
-            indices=indices,
-            intervals=intervals.transpose(1, 2, 0),
-            samples=samples,
-            lost=len(whole) - samples,
-        )
 
 
 def sensitivity(result: SweepResult) -> Picture:

@@ -120,7 +120,10 @@ def simulate(
     chain = state.parameters if gravity else state.parameters.with_values({"gravity": 0.0})
     setup = replace(state.setup, scene=scene, parameters=chain)
     check_links_on_gpu(state.links, options.device, "position")
-    instants = _checked_times(end, times)
+    instants = np.linspace(0.0, end, 101) if times is None else checked_array(times, "times", "t")
+    is_rising = times is None or bool(np.all(np.diff(instants) > 0))
+    if not len(instants) or instants[0] < 0 or instants[-1] > end or not is_rising:
+        raise InputError(f"times: give rising instants between 0 and the duration of {end} s")
     if len(instants) * state.links > MOST_PLACES:
         raise InputError(f"times: {len(instants)} instants are too many; give at most {MOST_PLACES // state.links}")
     if floor is not False and not (floor is None and state.is_placed_as_in(state.setup)):
@@ -273,13 +276,3 @@ def _follow(batch: Batch, body: str, instants: Array, end: float) -> Trajectory:
         greatest_opening=extremes["opening"],
         greatest_penetration={kind: extremes[kind] for kind in kinds},
     )
-
-
-def _checked_times(duration: float, times: Sequence[float] | Array | None) -> Array:
-    """Instants of a trajectory, which rise within the duration, or an `InputError`."""
-    if times is None:
-        return np.linspace(0.0, duration, 101)
-    instants = checked_array(times, "times", "t")
-    if not len(instants) or instants[0] < 0 or instants[-1] > duration or np.any(np.diff(instants) <= 0):
-        raise InputError(f"times: give rising instants between 0 and the duration of {duration} s")
-    return instants

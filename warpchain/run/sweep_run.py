@@ -5,6 +5,7 @@ any executor in the style of ``concurrent.futures`` will do, on this machine or 
 """
 
 import itertools
+import math
 import os
 import re
 import time
@@ -20,26 +21,27 @@ from pydantic import Field
 
 from warpchain.engine.devices import gpu_turn, has_gpu_turn, start_device
 from warpchain.engine.processors import processors
+from warpchain.files import AnyPath
 from warpchain.inputs.options import Options, on_gpu
 from warpchain.inputs.sections import SECTION_OF, by_section, takes_fields
-from warpchain.inputs.setup import DEFAULT_PRESET, Setup
+from warpchain.inputs.setup import DEFAULT_PRESET, Setup, Values
 from warpchain.inputs.validation import InputError, Whole, by_name, checked, checked_path, plain, shown, validated
-from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text, progress_bar
+from warpchain.run import progress_bar
+from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text
 from warpchain.run.workers import Pulse, losses_named, pulsing_threads
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
-from warpchain.store.shards import Shard, read_shard, write_shard
+from warpchain.store.shards import Part, Shard, opened_shard, rows_of, stamp, write_shard
 from warpchain.store.sweep_result import SweepResult, load
-from warpchain.sweeps.axes import is_axis
-from warpchain.sweeps.plan import PlannedWalk, Sweep, load_sweep
+from warpchain.sweeps.block import is_axis
+from warpchain.sweeps.plan import PlannedWalk, Source, Sweep, load_sweep
 from warpchain.sweeps.sweep_file import VERSION, BlockKeys
-from warpchain.walks.faults import LENGTHS
+from warpchain.walks.landmarks import LENGTHS
 from warpchain.walks.rows import MISSING, derived_columns, faults_of_columns, fill_row, missing_rows
 from warpchain.walks.scheduler import compile_kernels, run_setups
 
 T = TypeVar("T")
-Part = tuple[int, int]
-"""Number of a part of a sweep, and number of parts."""
+Task = Future[None]
 
 KEYS: Final = (*BlockKeys.model_fields, "same_samples_along", "record", "name", "seed")
 """Keys of a sweep file that are keywords."""
@@ -120,20 +122,14 @@ def sweep(
     if hasattr(executor, "get_executor"):
         count = count or sum(executor.nthreads().values())
         executor = executor.get_executor(pure=False)  # pure: a task that failed would fail again, unrun
-    with ExitStack() as shown:
-        if on_progress is None:
-            on_progress = shown.enter_context(progress_bar()) if progress else lambda progress: None
-        _run_in_folder(planned, folder, executor, count, fresh, own, on_progress)
+    with progress_bar.changing_line(every=progress_bar.LINE_EVERY if progress else math.inf) as show:
+        report = on_progress or (lambda seen: show(progress_bar.progress_text(seen)) if progress else None)
+        _run_in_folder(planned, folder, executor, count, fresh, own, report)
     return load(folder)
 
 
 def _checked_call(
-    source: str | os.PathLike[str] | Mapping[str, Any] | Sweep | None,
-    out: str | os.PathLike[str] | None,
-    settings: Mapping[str, object],
-    device: str | None,
-    workers: int | None,
-    part: str | None,
+    source: Source | None, out: AnyPath | None, given: Values, device: str | None, workers: int | None, part: str | None
 ) -> tuple[Sweep, Path, Part, int | None]:
     """The sweep on its device, its folder, its part, and the number of workers; an `InputError` for all refused."""
     problems: list[str] = []
@@ -149,7 +145,7 @@ def _checked_call(
         found = sweep_of_keywords(settings, folder) if source is None else load_sweep(source, **replaced)
         return found if device is None else on_device(found, device)
 
-    settings = {name: value for name, value in settings.items() if value is not None or name not in KEYS}
+    settings = {name: value for name, value in given.items() if value is not None or name not in KEYS}
     replaced = {name: plain(settings[name], name) for name in ("seed", "samples") if name in settings}
     if source is not None and (others := [name for name in settings if name not in replaced]):
         names = ", ".join(others)
@@ -162,7 +158,7 @@ def _checked_call(
     return planned, folder, own, count
 
 
-def sweep_of_keywords(given: Mapping[str, object], out: str | os.PathLike[str] | None) -> Sweep:
+def sweep_of_keywords(given: Values, out: AnyPath | None) -> Sweep:
     """The sweep that keyword arguments describe; an `InputError` with a line for each value that is refused.
 
     They are `KEYS`, and fields of a walk by name or symbol; a list or a range is an axis of the grid, behind those
@@ -227,7 +223,7 @@ def _run_in_folder(
             executor, pulse = held.enter_context(pulsing_threads(at_once))
         if missing:
             tasks = _tasks(planned, missing, at_once if pulse is None else 1)  # threads take turns on a GPU
-            where = str(store.directory), store.stamp
+            where = str(store.directory), stamp(store.directory)
             submitted = (executor.submit(run_shards, planned, *where, tuple(task), pulse) for task in tasks)
             _follow(submitted, 2 * at_once, pulse or Pulse(), store, progress, report)
         counts = counts_text(progress) or "nothing to do"
@@ -252,10 +248,10 @@ def on_device(planned: Sweep, device: str) -> Sweep:
     return moved
 
 
-def run_shards(planned: Sweep, directory: str, stamp: str, shards: Sequence[Shard], pulse: Pulse | None = None) -> None:
+def run_shards(planned: Sweep, directory: str, seal: str, shards: Sequence[Shard], pulse: Pulse | None = None) -> None:
     """Run the walks of some shards and write each shard as soon as its walks are over; what a worker does.
 
-    The folder has to have the stamp, see `SweepFolder.stamp`. The pulse counts the walks that are over, and stops the
+    The seal is the `stamp` that the folder has to have. The pulse counts the walks that are over, and stops the
     work: unfinished shards are not written.
     """
     stop = None if pulse is None else pulse.stop
@@ -280,28 +276,22 @@ def run_shards(planned: Sweep, directory: str, stamp: str, shards: Sequence[Shar
             if keeps[number].series_every is not None:
                 motions[shard][row] = run.recorder.motion()
             if (rows[shard]["status"] != MISSING).all():
-                write_shard(directory, stamp, shard, rows.pop(shard), motions.pop(shard))
+                write_shard(directory, seal, shard, rows.pop(shard), motions.pop(shard))
 
 
 def _follow(
-    tasks: Iterator[Future[None]],
-    at_once: int,
-    pulse: Pulse,
-    store: SweepFolder,
-    progress: SweepProgress,
-    report: OnProgress,
+    tasks: Iterator[Task], at_once: int, pulse: Pulse, store: SweepFolder, progress: SweepProgress, report: OnProgress
 ) -> None:
     """Ask for so many tasks at once, so that memory does not grow with the sweep, and count the shards they write."""
     report(progress)
     began, written, blocks = time.perf_counter(), 0, store.manifest.sweep.blocks
     folder, left = store.directory / "shards", {shard.name: shard for shard in store.missing()}
     lengths = {name: np.concatenate([block.parameter(name).ravel() for block in blocks]) for name in LENGTHS}
-    pending: set[Future[None]] = set()
+    pending: set[Task] = set()
     try:
         while True:
             with losses_named():
-                for future in itertools.islice(tasks, at_once - len(pending)):
-                    pending.add(future)
+                pending.update(itertools.islice(tasks, at_once - len(pending)))
                 if not pending:
                     break
                 finished, pending = wait(pending, POLL, FIRST_COMPLETED)
@@ -309,7 +299,8 @@ def _follow(
                     future.result()
             for name in left.keys() & set(os.listdir(folder)):
                 shard = left.pop(name)
-                rows = read_shard(store.directory, shard)
+                with opened_shard(store.directory, name, shard.digest) as file:
+                    rows = rows_of(file, shard.kind)
                 columns = {name: rows[name] for name in rows.dtype.names or ()}
                 own = {name: values[shard.walks % blocks[0].stride] for name, values in lengths.items()}
                 found = faults_of_columns(columns | derived_columns(columns), own)

@@ -3,7 +3,7 @@
 import math
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.setup import Setup
-from warpchain.inputs.validation import InputError, InputWarning, plain, shown, suggestion
+from warpchain.inputs.validation import InputError, InputWarning, checked, plain, shown, suggestion
 from warpchain.status import Status
 from warpchain.store.cell_statistics import CellStatistics
 from warpchain.sweeps.block import POINT, Block
 from warpchain.sweeps.plan import Sweep
 from warpchain.walks import rows
-from warpchain.walks.faults import LENGTHS
+from warpchain.walks.landmarks import LENGTHS
 from warpchain.walks.rows import COLUMNS, MISSING, Column, quantity_of
 from warpchain.walks.walk_result import WalkResult, read_motion
 
@@ -111,12 +111,6 @@ class BlockResult:
     def is_there(self) -> NDArray[np.bool_]:
         """Whether a walk has been computed, shape `shape`."""
         return np.asarray(self.columns["status"] != MISSING)
-
-    def filled_from(self, other: "BlockResult") -> "BlockResult":
-        """The same block with the walks that only another result of it has."""
-        there = self.is_there
-        columns = {name: np.where(there, values, other.columns[name]) for name, values in self.columns.items()}
-        return replace(self, columns=columns, motions=np.where(there, self.motions, other.motions))
 
     @property
     def kept(self) -> NDArray[np.bool_]:
@@ -247,7 +241,7 @@ class BlockResult:
 
     @cached_property
     def faults(self) -> dict[str, NDArray[np.bool_]]:
-        """What makes walks inaccurate, a key of `warpchain.walks.faults.FAULTS` → whether each walk has it."""
+        """What makes walks inaccurate, a key of `warpchain.walks.landmarks.FAULTS` → whether each walk has it."""
         return rows.faults_of_columns(self.columns, {name: self.planned.parameter(name) for name in LENGTHS})
 
     @property
@@ -326,9 +320,7 @@ def counted(summary: Mapping[str, int]) -> str:
 
 def located(blocks: Sequence[BlockResult], index: object) -> tuple[BlockResult, tuple[int, ...]]:
     """Block and place along axes and samples of the walk with a number; an `InputError` if there is none."""
-    number = plain(index, "index")
-    if isinstance(number, bool) or not isinstance(number, int):
-        raise InputError(f"index: {shown(number)} is not the number of a walk; give a whole number")
+    number: int = checked(index, "index", int)
     found = [(block, tuple(map(int, at))) for block in blocks for at in np.argwhere(block.columns["index"] == number)]
     if not found:
         largest = max(int(block.columns["index"].max()) for block in blocks)

@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from warpchain.files import AnyPath, given_path, make_folder, naming, remove_output, write_whole
 from warpchain.inputs.validation import DamagedFileError, InputError, InputWarning
 from warpchain.store import shards
-from warpchain.store.shards import Manifest, Shard, read_manifest, stamp
+from warpchain.store.shards import Manifest, Part, Shard, read_manifest
 from warpchain.sweeps.designs import EXTENSIBLE
 from warpchain.sweeps.plan import Sweep
 from warpchain.version import NUMERICS_VERSION
@@ -62,15 +62,8 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
     lock: int
     found: NDArray[np.bool_]
 
-    @property
-    def stamp(self) -> str:
-        """What `write_shard` wants of a worker."""
-        return stamp(self.directory)
-
     @classmethod
-    def open(
-        cls, directory: AnyPath, sweep: Sweep, *, fresh: bool = False, shard_size: int, part: tuple[int, int] = (1, 1)
-    ) -> Self:
+    def open(cls, directory: AnyPath, sweep: Sweep, shard_size: int, fresh: bool = False, part: Part = (1, 1)) -> Self:
         """Begin a sweep in a folder, made if need be, or go on with it, with more samples if the sweep has more.
 
         `fresh` deletes what a sweep has left there, and begins. New shards have `shard_size` walks, those that are
@@ -88,7 +81,7 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         is_new = not (path / "lock").exists()
         lock = _locked(path)
         try:
-            manifest = _prepared(path, sweep, Manifest.of(sweep, shard_size, part), fresh)
+            manifest = _prepared(path, sweep, Manifest(sweep, shard_size, part), fresh)
             folder = cls(path, manifest, lock, np.zeros(len(manifest.keys), bool))
             folder._check()
             folder._describe()

@@ -18,15 +18,15 @@ import os
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.files import AnyPath, unreadable, write_whole
+from warpchain.files import AnyPath, naming, write_whole
 from warpchain.hdf5_files import hdf5_image, open_regular, reading_hdf5
 from warpchain.inputs.validation import InputError
 from warpchain.sweeps.designs import EXTENSIBLE
@@ -38,6 +38,8 @@ from warpchain.walks.walk_result import write_motion
 if TYPE_CHECKING:
     import h5py
 
+Part = tuple[int, int]
+"""Number of a part of a sweep, and number of parts."""
 OWN: Final = ("sweep.h5", "sweep.yaml", "shards", "log.txt")
 """What a sweep has in its folder, beside the lock."""
 EARLIER: Final = "sweep.json"
@@ -80,14 +82,9 @@ class Manifest:
 
     sweep: Sweep
     shard_size: int
-    numerics_version: int
-    versions: dict[str, str]
-    part: tuple[int, int] = (1, 1)
-
-    @classmethod
-    def of(cls, sweep: Sweep, shard_size: int, part: tuple[int, int] = (1, 1)) -> Self:
-        """The manifest of a new folder."""
-        return cls(sweep, shard_size, NUMERICS_VERSION, package_versions(), part)
+    part: Part = (1, 1)
+    numerics_version: int = NUMERICS_VERSION
+    versions: dict[str, str] = field(default_factory=package_versions)
 
     @cached_property
     def digest(self) -> str:
@@ -148,7 +145,8 @@ def stored_sweep(path: AnyPath, content: Mapping[str, object]) -> Sweep:
     try:
         return Sweep.of(content)
     except InputError as error:
-        raise InputError(f"{path}: {error.args[0]}; read it with the version that wrote it") from None
+        problem = error.args[0].partition("; ")[0]
+        raise InputError(f"{path}: {problem}; read it with the version that wrote it") from None
 
 
 def read_manifest(directory: AnyPath) -> Manifest:
@@ -165,9 +163,9 @@ def read_manifest(directory: AnyPath) -> Manifest:
         return Manifest(
             stored_sweep(path, json.loads(file.attrs["sweep"])),
             int(file.attrs["shard_size"]),
+            (int(file.attrs["part"][0]), int(file.attrs["part"][1])),
             int(file.attrs["numerics_version"]),
             json.loads(file.attrs["versions"]),
-            (int(file.attrs["part"][0]), int(file.attrs["part"][1])),
         )
 
 
@@ -218,12 +216,6 @@ def write_shard(
     write_whole(Path(directory) / "shards" / shard.name, hdf5_image(KIND, fill))
 
 
-def read_shard(directory: AnyPath, shard: Shard) -> Rows:
-    """The rows of a shard; needs no lock; errors as of `opened_shard`."""
-    with opened_shard(directory, shard.name, shard.digest) as file:
-        return rows_of(file, shard.kind)
-
-
 def rows_of(file: "h5py.File", kind: np.dtype[np.void]) -> Rows:
     """The rows in an open shard; asked for their type, h5py would take twice as long."""
     rows = np.zeros(file["rows"].shape, kind)
@@ -235,11 +227,10 @@ def shard_files(directory: AnyPath) -> list[str]:
     """Names of all files of shards, sorted; an `InputError` names one that is none, but for hidden files."""
     folder = Path(directory) / "shards"
     try:
-        names = sorted(name for name in os.listdir(folder) if not name.startswith("."))
+        with naming(folder, "read"):
+            names = sorted(name for name in os.listdir(folder) if not name.startswith("."))
     except FileNotFoundError:
         return []
-    except OSError as error:
-        raise unreadable(folder, error) from error
     if strange := [name for name in names if not _NAME.fullmatch(name)]:
         more = f" (and {len(strange) - 1} more)" if strange[1:] else ""
         raise InputError(f"{folder / strange[0]}: not a shard of this sweep; move it out of this folder{more}")

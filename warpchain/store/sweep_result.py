@@ -282,7 +282,20 @@ def merge(sources: AnyPath | Sequence[AnyPath], path: AnyPath) -> None:
     folders = [sources] if isinstance(sources, str | os.PathLike) else list(sources)
     target = given_path(path)
     checked_output(target, _MERGED)
-    whole = _filled(folders)
+    first, *others = folders
+    whole = load(first)
+    for folder in others:
+        result = load(folder)
+        if any(whole.provenance[name] != result.provenance[name] for name in ("digest", "numerics_version")):
+            raise InputError(f"{folder}: is not the sweep of {first}, with the same seed and samples; give its parts")
+        blocks = {}
+        for block, other in zip(whole.blocks.values(), result.blocks.values(), strict=True):
+            there = block.is_there
+            if (there & other.is_there).any():
+                raise InputError(f"{folder}: has walks that a folder before it has; give each part of a sweep once")
+            columns = {key: np.where(there, values, other.columns[key]) for key, values in block.columns.items()}
+            blocks[block.name] = replace(block, columns=columns, motions=np.where(there, block.motions, other.motions))
+        whole = replace(whole, blocks=blocks)
     write_whole(target, hdf5_image(KIND, partial(_fill, whole=whole)), _MERGED)
     if missing := whole.missing_count:
         warnings.warn(
@@ -291,21 +304,6 @@ def merge(sources: AnyPath | Sequence[AnyPath], path: AnyPath) -> None:
             InputWarning,
             stacklevel=2,
         )
-
-
-def _filled(folders: Sequence[AnyPath]) -> SweepResult:
-    """The result of all folders; an `InputError` if two have the same walk, or they are not of one sweep."""
-    first, *others = folders
-    whole = load(first)
-    for folder in others:
-        result = load(folder)
-        if any(whole.provenance[name] != result.provenance[name] for name in ("digest", "numerics_version")):
-            raise InputError(f"{folder}: is not the sweep of {first}, with the same seed and samples; give its parts")
-        pairs = list(zip(whole.blocks.values(), result.blocks.values(), strict=True))
-        if any((a.is_there & b.is_there).any() for a, b in pairs):
-            raise InputError(f"{folder}: has walks that a folder before it has; give each part of a sweep once")
-        whole = replace(whole, blocks={a.name: a.filled_from(b) for a, b in pairs})
-    return whole
 
 
 def _is_merged(path: Path) -> bool:

@@ -156,10 +156,8 @@ class Sweep:
                 distributions = placed(block.distributions, fixed)
                 for name, distribution in distributions.items():
                     if distribution != checked.get(name) and distribution.share() < LEAST_SHARE:
-                        raise InputError(
-                            f"{block.path}.distributions.{name}: less than {LEAST_SHARE:.0%} of the draws "
-                            f"{distribution} are physical; give a uniform distribution"
-                        )
+                        path, law = f"{block.path}.distributions.{name}", distribution.canonical()
+                        raise InputError(f"{path}: less than {LEAST_SHARE:.0%} of {law} is physical; give uniform")
                 checked = distributions
                 self._first_possible(block, cell, fixed, distributions, 0, designed=False)
 
@@ -169,19 +167,13 @@ class Sweep:
             here, there = getattr(first, name), getattr(options, name)
             if here != there and name not in block.varied:
                 raise InputError(
-                    f"{block.path}.grid: {name} is {here!r} in one cell, {there!r} in another; give it, or use blocks"
+                    f"{block.path}.grid: {name} is {here!r} in one cell, {there!r} in another; give each a block"
                 )
         for name, choice in self.recording.choices.items():
             choice.steps(options, f"sweep.record.{name}")
 
     def _first_possible(
-        self,
-        block: Block,
-        cell: Cell,
-        fixed: Setup,
-        distributions: Mapping[str, Distribution],
-        row: int,
-        designed: bool,
+        self, block: Block, cell: Cell, fixed: Setup, laws: Mapping[str, Distribution], row: int, designed: bool
     ) -> tuple[list[Point], list[Setup]]:
         """Points for the walks of sample `row` of a cell, the first that make possible walks only, and their setups.
 
@@ -189,11 +181,11 @@ class Sweep:
         """
         stream = self._stream(block, cell)
         rng, problem = random_generator(self.seed, stream, row), ""
-        makers: list[Callable[[], Point]] = [lambda: draw(distributions, rng)] * DRAW_LIMIT
+        makers: list[Callable[[], Point]] = [lambda: draw(laws, rng)] * DRAW_LIMIT
         if designed:
-            matrix = design_points(block.sampler, self.seed, stream, block.samples_given, len(distributions))
+            matrix = design_points(block.sampler, self.seed, stream, block.samples_given, len(laws))
             fractions = iter(matrix[row].tolist())
-            makers = [lambda: {name: each.quantile(next(fractions)) for name, each in distributions.items()}, *makers]
+            makers = [lambda: {name: each.quantile(next(fractions)) for name, each in laws.items()}, *makers]
         for point in makers:
             points = [point()]
             if block.sampler == "saltelli":  # rows of A and B, and A with one value of B, of each quantity in turn
@@ -243,7 +235,11 @@ class Sweep:
         return hashlib.sha256(text.encode()).hexdigest()
 
 
-def load_sweep(source: "AnyPath | Mapping[str, object] | Sweep", **replaced: object) -> Sweep:
+Source = AnyPath | Mapping[str, object] | Sweep
+"""What says what a sweep is: a file, its content, or a sweep."""
+
+
+def load_sweep(source: Source, **replaced: object) -> Sweep:
     """Load and check a sweep.
 
     Every cell is checked, see `Sweep.check`.

@@ -25,8 +25,7 @@ from warpchain.inputs.scene import COMPOUND
 from warpchain.inputs.sections import SECTIONS
 from warpchain.inputs.validation import FIELDS, SECTION_OF, STRICT, SYMBOL_OF, InputError, ModelT, Whole, shown
 from warpchain.inputs.yaml_files import read_yaml
-from warpchain.sweeps.axes import CELL_LIMIT, Name, axis, list_of, named_axis
-from warpchain.sweeps.block import POINT, Block, Value
+from warpchain.sweeps.block import CELL_LIMIT, POINT, Block, Name, Sections, Value, axis, list_of, named_axis
 from warpchain.sweeps.designs import SAMPLERS, check_design
 from warpchain.sweeps.recording import Frames, Recording
 
@@ -292,10 +291,8 @@ def read_sweep(
         blocks = [_block("main", "sweep", None, file)]
     else:
         blocks = [_block(each.name, f"sweep.blocks[{i}]", file, each) for i, each in enumerate(file.blocks)]
-    same, known = (
-        {*map(validation.full_name, file.same_samples_along)},
-        {name for block in blocks for name in block.axes},
-    )
+    same = {*map(validation.full_name, file.same_samples_along)}
+    known = {name for block in blocks for name in block.axes}
     for name in same - known:
         remedy = validation.suggestion(name, sorted(known))
         raise InputError(f"sweep.same_samples_along: {shown(name)} is no axis of any block; {remedy}")
@@ -330,9 +327,7 @@ def _block(name: str, path: str, outer: BlockKeys | None, inner: BlockKeys) -> B
     return Block(path, name, fixed, sections, axes, named, points, drawn, sampler or "random", samples)
 
 
-def _drawn(
-    given: Mapping[str, Any], sections: Mapping[str, Mapping[str, Value]], varied: set[str], path: str
-) -> dict[str, Distribution]:
+def _drawn(given: Mapping[str, Any], sections: Sections, varied: set[str], path: str) -> dict[str, Distribution]:
     """What a block draws, in the order of drawing.
 
     Given values are exact, unless their quantity has a distribution of its own name, without a mean and ends.

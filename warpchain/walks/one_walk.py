@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Annotated
 
 from pydantic import Field
@@ -12,7 +11,7 @@ from warpchain.inputs.setup import Setup, check_has_joint_forces
 from warpchain.inputs.validation import InputError, checked, plain
 from warpchain.walks.motion import LONGEST_INTERVAL, Keep
 from warpchain.walks.scheduler import compile_kernels, run_setups
-from warpchain.walks.walk_phases import WalkRun
+from warpchain.walks.walk_phases import Progress, WalkRun
 from warpchain.walks.walk_result import WalkResult
 
 SHORTEST_INTERVAL = 1e-6
@@ -21,23 +20,6 @@ _INTERVAL = Annotated[float, Field(ge=SHORTEST_INTERVAL, lt=LONGEST_INTERVAL)]
 _BEFORE = Annotated[float, Field(ge=0, le=LONGEST_INTERVAL)]
 RECORD_BEFORE = 0.5
 """Time [s] before the release that is kept if frames are, unless told otherwise."""
-
-
-@dataclass(frozen=True)
-class Progress:
-    """Where a walk is.
-
-    Attributes:
-        phase: ``"compile"``, ``"settle"``, ``"spin up"``, ``"hold"`` or ``"walk"``.
-        time: Simulated time [s] since the start, in phase ``"walk"`` since the release.
-        speed: Speed [m/s] along the loop, in phase ``"walk"`` of the centre of mass.
-        attempts: Attempted steps so far.
-    """
-
-    phase: str
-    time: float
-    speed: float
-    attempts: int
 
 
 OnProgress = Callable[[Progress], None]
@@ -72,8 +54,7 @@ def run_walk(
 
     def watch(run: WalkRun) -> None:
         if on_progress is not None:
-            attempts = run.counts["accepted"] + run.counts["rejected"]
-            on_progress(Progress(run.phase, run.walk_time or run.simulated_time, run.speed, attempts))
+            on_progress(run.progress())
 
     with gpu_turn([setup.options.device]):
         if on_progress is not None:

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from warpchain.engine.tallies import CONTACTS, LOST
 from warpchain.inputs.distributions import DRAWABLE
 from warpchain.inputs.validation import FIELDS, field_unit
-from warpchain.walks.faults import MOST_ENERGY_ERROR, energy_error, faults
+from warpchain.walks.landmarks import MOST_ENERGY_ERROR, energy_error, faults
 from warpchain.walks.walk_result import NUMBERS, WalkResult
 
 Rows = NDArray[np.void]
+Columns = Mapping[str, NDArray[Any]]
 
 KEYS: Final = np.dtype([("block", "<i4"), ("cell", "<i4"), ("sample", "<i4")])
 """What a row is found by: number of its block, of its cell in C order over the axes, of its sample in the cell."""
@@ -107,7 +108,7 @@ def numbers_of(values: Mapping[str, Any]) -> dict[str, Any]:
     return found
 
 
-def derived_columns(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[np.float64]]:
+def derived_columns(columns: Columns) -> dict[str, NDArray[np.float64]]:
     """The columns that are computed from others."""
     at_release = columns["energy_kinetic_at_release"] + columns["energy_potential_at_release"]
     return {"energy_at_release": at_release, "energy_error": energy_error(at_release, columns["energy_residual"])}
@@ -135,10 +136,8 @@ def field_column(name: str) -> Column:
     return Column("<f8", field_unit(field), f"{meaning}; as drawn for the walk" if name.endswith(_DRAWN) else meaning)
 
 
-def faults_of_columns(
-    columns: Mapping[str, NDArray[Any]], lengths: Mapping[str, NDArray[Any]]
-) -> dict[str, NDArray[np.bool_]]:
-    """Whether each walk in columns of a sweep has each of `warpchain.walks.faults.FAULTS`.
+def faults_of_columns(columns: Columns, lengths: Columns) -> dict[str, NDArray[np.bool_]]:
+    """Whether each walk in columns of a sweep has each of `warpchain.walks.landmarks.FAULTS`.
 
     Lengths are the least of each of `LENGTHS` [m] before anything was drawn, along the axes of the columns.
     """

@@ -7,7 +7,7 @@ the release. The state of a walk at any time after that is that of the walk, run
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -30,9 +30,8 @@ from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.status import Status
 from warpchain.walks.drive import drive_of
-from warpchain.walks.landmarks import at_release
+from warpchain.walks.landmarks import angles, at_release, plane_of_state, released_plane, state_of_plane
 from warpchain.walks.motion import NOTHING, Keep
-from warpchain.walks.moving_plane import angles, plane_of_state, released_plane, state_of_plane
 from warpchain.walks.recorder import Recorder
 
 _OF_THE_RUN = ("raised", "drive_time", "drift", "_at_full_speed", "_has_sprocket")
@@ -43,6 +42,23 @@ _NO_FALL: Mapping[str, float] = {
     **dict.fromkeys(("lateral_drift", "final_tilt", "final_yaw", "greatest_tilt", "fell_at"), math.nan),
     **dict.fromkeys(("fell_over", "fell_before_collapse"), -1),
 }
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a walk is.
+
+    Attributes:
+        phase: ``"compile"``, ``"settle"``, ``"spin up"``, ``"hold"`` or ``"walk"``.
+        time: Simulated time [s] since the start, in phase ``"walk"`` since the release.
+        speed: Speed [m/s] along the loop, in phase ``"walk"`` of the centre of mass.
+        attempts: Attempted steps so far.
+    """
+
+    phase: str
+    time: float
+    speed: float
+    attempts: int
 
 
 def phase_features(setup: Setup) -> dict[str, Features]:
@@ -88,6 +104,7 @@ class WalkRun:
         self._settled = settling_time(scene)
         self._tilts = scene.plane == "tilting"
         self._level = math.cos(math.radians(scene.slope))  # of a distance along the floor
+        self._walk_end = min(scene.walk_limit, scene.walk_until or math.inf)  # since the release, if it is not at rest
         self._farthest = (scene.distance_limit or 0.0) * self._level  # along x
 
     def phases(self) -> Iterator[Features]:
@@ -115,7 +132,11 @@ class WalkRun:
             self._release(*self._ellipse())
         else:
             hanging = math.nan
-            self._start_drive()
+            (position, velocity), drive = drive_of(setup, self._links)
+            self._at_full_speed, self._hold_softness = drive["hold_start"], drive["hold_softness"]
+            batch.set_drive(world, **drive)
+            load = partial(batch.load, world, position, velocity, softness=self._hold_softness)
+            load(stop_time=self._settled, stop_status=Status.FINISHED)
             if setup.scene.start == "rest":
                 yield features["driven"]
                 if batch.status(world) != Status.FINISHED:
@@ -151,40 +172,11 @@ class WalkRun:
         except ValueError:
             raise InputError(f"scene.ellipse_aspect: too far from 1 for {scene.links} links; give another") from None
 
-    def _start_drive(self) -> None:
-        """Lay the chain on its sprocket; it is to settle there, if it starts at rest."""
-        (position, velocity), drive = drive_of(self.setup, self._links)
-        self._at_full_speed, self._hold_softness = drive["hold_start"], drive["hold_softness"]
-        self._batch.set_drive(self._world, **drive)
-        load = partial(self._batch.load, self._world, position, velocity, softness=self._hold_softness)
-        load(stop_time=self._settled, stop_status=Status.FINISHED)
-
-    @property
-    def phase(self) -> str:
-        """`settle`, `spin up`, `hold` or `walk`."""
-        if self._released:
-            return "walk"
-        now = self._batch.time(self._world)
-        return "settle" if now < self._settled else "spin up" if now < self._at_full_speed else "hold"
-
-    @property
-    def _walk_end(self) -> float:
-        """Time [s] since the release at which a walk ends that is not at rest."""
-        scene = self.setup.scene
-        return min(scene.walk_limit, scene.walk_until or math.inf)
-
     @property
     def counts(self) -> dict[str, int]:
         """Counters of all phases so far."""
         before = self._before["counts"] if self._released else 0
         return dict(zip(COUNTS, (before + self._batch.host["state/counts"][self._world]).tolist(), strict=True))
-
-    @property
-    def extremes(self) -> dict[str, float]:
-        """Greatest opening and depths [m] of all phases so far."""
-        now = self._batch.host["state/extremes"][self._world]
-        now = np.fmax(self._before["extremes"], now) if self._released else now
-        return dict(zip(EXTREMES, now.tolist(), strict=True))
 
     @property
     def walk_time(self) -> float:
@@ -199,18 +191,18 @@ class WalkRun:
     @property
     def hold_time(self) -> float:
         """Time [s] for which the loop was held at full frequency; NaN if it was not."""
-        if not self._has_sprocket:
-            return math.nan
         end = self.drive_time if self._released else self._batch.time(self._world)
-        return max(0.0, end - self._at_full_speed)
+        return max(0.0, end - self._at_full_speed) if self._has_sprocket else math.nan
 
-    @property
-    def speed(self) -> float:
-        """Speed [m/s] of the centre of mass in the walk, along the loop before."""
-        sample = self._batch.last_sample(self._world)
+    def progress(self) -> Progress:
+        """Where the walk is."""
+        now, sample = self._batch.time(self._world), self._batch.last_sample(self._world)
+        attempts = self.counts["accepted"] + self.counts["rejected"]
         if self._released:
-            return math.hypot(sample[layout.CENTER_U], sample[layout.CENTER_V])
-        return float(sample[layout.LOOP_SPEED])
+            speed = math.hypot(sample[layout.CENTER_U], sample[layout.CENTER_V])
+            return Progress("walk", now or self.drive_time, speed, attempts)
+        phase = "settle" if now < self._settled else "spin up" if now < self._at_full_speed else "hold"
+        return Progress(phase, now, float(sample[layout.LOOP_SPEED]), attempts)
 
     def energy(self) -> dict[str, float]:
         """Where the energy of the walk went [J]; NaN before the release. Keys: `walk_result.ENERGIES`."""
@@ -263,7 +255,10 @@ class WalkRun:
 
     def outcome(self) -> dict[str, Any]:
         """Results of the walk apart from its motion, by the names of the fields of `WalkResult`."""
-        counts, extremes = self.counts, self.extremes
+        counts, greatest = self.counts, self._batch.host["state/extremes"][self._world]
+        if self._released:
+            greatest = np.fmax(self._before["extremes"], greatest)
+        extremes = dict(zip(EXTREMES, greatest.tolist(), strict=True))
         is_at_rest = self.status == Status.AT_REST
         first, last = self._batch.first_sample(self._world), self._batch.last_sample(self._world)
         # Δx is x of the centre of mass, because the sprocket's centre is at x = 0; on a slope, along the floor

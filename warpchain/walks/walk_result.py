@@ -22,9 +22,9 @@ from warpchain.engine.tallies import COUNTS, DEPTHS, EXTREMES, IMPULSES, LOST
 from warpchain.files import write_whole
 from warpchain.hdf5_files import Stored, hdf5_image, put, read_fields, reading_hdf5, stored_fields, write_fields
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.scene import Scene, contact_radius
+from warpchain.inputs.scene import contact_radius
+from warpchain.inputs.sections import SECTIONS
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError, json_value, validated
@@ -32,9 +32,7 @@ from warpchain.kernels import layout
 from warpchain.loop.stationary_loop import BEFORE, FIELDS, BeforeRelease
 from warpchain.pictures.walk_shape import Kind
 from warpchain.status import Status
-from warpchain.walks.faults import FAULTS, LENGTHS, MOST_ENERGY_ERROR, energy_error, faults, least
-from warpchain.walks.landmarks import RELEASE, bounces
-from warpchain.walks.moving_plane import in_room
+from warpchain.walks.landmarks import FAULTS, LENGTHS, MOST_ENERGY_ERROR, RELEASE, bounces, energy_error, faults, least
 
 if TYPE_CHECKING:
     import h5py
@@ -48,6 +46,7 @@ WANTED: Final = "give a saved walk; `walk --like SWEEP --index I` saves one"
 
 _SINCE_FLOOR: Final = "time since the last impulse on the floor; NaN if there was none"
 _FIXED: Final = "if the plane is fixed"
+_NEVER: Final = "NaN if it never was"
 
 ENERGIES: Final = {
     "kinetic_at_release": "kinetic energy at release",
@@ -93,22 +92,16 @@ class WalkResult:
         Stored(
             "1",
             "greatest change of the held loop's mean height, width or place, relative to height or width, while it was "
-            "last watched; NaN if it never was",
+            f"last watched; {_NEVER}",
         ),
     ]
     lateral_drift: Annotated[
         float, Stored("m", "z of the centre of mass at rest, to the right; NaN unless the plane tilts")
     ]
-    final_tilt: Annotated[
-        float, Stored("rad", "tilt of the plane at the end, positive to the left; NaN if the plane is fixed")
-    ]
-    final_yaw: Annotated[
-        float, Stored("rad", "heading of the plane at the end, anticlockwise; NaN if the plane is fixed")
-    ]
-    greatest_tilt: Annotated[float, Stored("rad", "greatest size of the tilt in the walk; NaN if the plane is fixed")]
-    fell_at: Annotated[
-        float, Stored("s", "from the release until the plane was first tilted by 45°; NaN if it never was")
-    ]
+    final_tilt: Annotated[float, Stored("rad", f"tilt of the plane at the end, positive to the left; NaN {_FIXED}")]
+    final_yaw: Annotated[float, Stored("rad", f"heading of the plane at the end, anticlockwise; NaN {_FIXED}")]
+    greatest_tilt: Annotated[float, Stored("rad", f"greatest size of the tilt in the walk; NaN {_FIXED}")]
+    fell_at: Annotated[float, Stored("s", f"from the release until the plane was first tilted by 45°; {_NEVER}")]
     fell_over: Annotated[int, Stored("1", "1 if the plane was ever tilted by 45°, 0 if not; −1 if the plane is fixed")]
     fell_before_collapse: Annotated[
         int, Stored("1", "1 if it fell over before its loop collapsed, 0 if not; −1 if the plane is fixed")
@@ -192,7 +185,7 @@ class WalkResult:
         """Joints x, y, z [m] in the room, (f, n, 3), if the plane tilts; else None: `frame_joints` are in the room."""
         if self.setup.scene.plane == "fixed":
             return None
-        return in_room(self.frame_joints, self.frame_origin, self.frame_axes)
+        return self.frame_origin[:, None, :] + self.frame_joints @ self.frame_axes
 
     def __repr__(self) -> str:
         """One line with the most important numbers."""
@@ -393,12 +386,8 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
     with reading_hdf5(path, KIND, remedy, WANTED) as file:
         given = json.loads(file.attrs["setup"])
         try:
-            setup = Setup(
-                preset=given["preset"],
-                parameters=validated(Parameters, given["parameters"], "parameters"),
-                scene=validated(Scene, given["scene"], "scene"),
-                options=validated(Options, given["options"], "options"),
-            )
+            sections: Any = {name: validated(model, given[name], name) for name, model in SECTIONS.items()}
+            setup = Setup(preset=given["preset"], **sections)
             setup = replace(setup, start=read_state(file, setup))
         except InputError as error:
             raise InputError(f"{path}: {error}; read it with the version that wrote it") from None
