@@ -132,7 +132,8 @@ def naming(target: AnyPath, verb: Literal["written", "read"] = "written") -> Ite
     except OSError as error:
         number = error.errno or errno.EIO  # without a number: a library that writes a format failed
         remedy = _REMEDIES.get(number, "see to the disk") if verb == "written" else "give the path of a readable file"
-        problem = type(error)(f"{target}: cannot be {verb} ({reason(error)}); {remedy}")
+        reason = os.strerror(error.errno) if error.errno else " ".join(str(error).split())  # HDF5 has a paragraph
+        problem = type(error)(f"{target}: cannot be {verb} ({reason}); {remedy}")
         problem.errno = number
         raise problem from error
 
@@ -144,8 +145,3 @@ _REMEDIES: Final = {
     errno.ENAMETOOLONG: "give a shorter path",
 }
 """Errno with which the system refuses to write → what to do."""
-
-
-def reason(error: OSError) -> str:
-    """The system's short text for an error; HDF5 hides it in a paragraph."""
-    return os.strerror(error.errno) if error.errno else " ".join(str(error).split())

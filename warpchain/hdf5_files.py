@@ -23,7 +23,7 @@ import numpy as np
 
 from warpchain.files import AnyPath, naming
 from warpchain.inputs.validation import DamagedFileError, InputError
-from warpchain.version import FORMAT_VERSION, version_refusal
+from warpchain.version import FORMAT_VERSION
 
 if TYPE_CHECKING:
     import h5py
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 _SIGNATURE: Final = b"\x89HDF\r\n\x1a\n"
 _LINE: Final = "\nwarpchain SHA-256: {}\n"
 _LINE_LENGTH: Final = len(_LINE.format("0" * 64))
-_PIECE: Final = 2**20
 _FIXED: Final[dict[str, Any]] = {"libver": ("v108", "v108"), "track_order": True}
 """Version bounds without which equal content would not give equal bytes; they also leave out times."""
 
@@ -58,10 +57,6 @@ class Stored:
         sizes = self.shape.split()
         shape = f"{self.meaning}, shape ({', '.join(sizes)}{',' * (len(sizes) == 1)})"
         return f"{shape}; none {self.empty}" if self.empty else shape
-
-    def sizes(self, named: Mapping[str, int]) -> tuple[int, ...]:
-        """The shape as numbers, given what its letters stand for."""
-        return tuple(named[size] if size in named else int(size) for size in self.shape.split())
 
     def path(self, name: str) -> str:
         """Where a file keeps the field of this name."""
@@ -101,6 +96,7 @@ def put(group: "h5py.Group", path: str, value: Any, unit: str, meaning: str) -> 
 def read_fields(group: "h5py.Group", kept: Mapping[str, Stored], links: int) -> dict[str, Any]:
     """What `write_fields` wrote; arrays of floats come back in double precision."""
     values: dict[str, Any] = {}
+    sizes = {"t": 0, "f": 0, "n": links, "2": 2, "3": 3}
     for name, stored in kept.items():
         path = stored.path(name)
         if stored.keys:
@@ -110,7 +106,7 @@ def read_fields(group: "h5py.Group", kept: Mapping[str, Stored], links: int) -> 
         elif path in group:
             values[name] = group[path][()].astype(np.float64)
         else:
-            values[name] = np.empty(stored.sizes({"t": 0, "f": 0, "n": links}))
+            values[name] = np.empty([sizes[size] for size in stored.shape.split()])
     return values
 
 
@@ -148,8 +144,10 @@ def reading_hdf5(path: AnyPath, kind: str | None, remedy: str, wanted: str | Non
     with h5py.File(path, "r", locking=False) as file:
         if kind is not None and (found := file.attrs["format"]) != kind:
             raise InputError(f"{path}: a {found}, not a {kind}; {wanted or 'move it out of this folder'}")
-        if refusal := version_refusal(int(file.attrs["format_version"]), remedy):
-            raise InputError(f"{path}: {refusal}")
+        if (version := int(file.attrs["format_version"])) != FORMAT_VERSION:
+            later = f", but this warpchain reads {FORMAT_VERSION}; update warpchain"
+            earlier = f" of an earlier warpchain, which reads it; {remedy}"
+            raise InputError(f"{path}: format version {version}{later if version > FORMAT_VERSION else earlier}")
         yield file
 
 
@@ -168,7 +166,7 @@ def _compare(path: AnyPath, remedy: str, wanted: str | None) -> None:
         end = file.read()
         file.seek(0)
         digest = hashlib.sha256()
-        while left > 0 and (piece := file.read(min(left, _PIECE))):
+        while left > 0 and (piece := file.read(min(left, 2**20))):
             digest.update(piece)
             left -= len(piece)
     if end == _LINE.format(digest.hexdigest()).encode():

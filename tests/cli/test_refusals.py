@@ -43,7 +43,7 @@ REFUSED = {
     "sweep figure6": "--output: missing; give a folder for the results with -o DIR",
     "sweep x -o new": f"x: neither a file nor a shipped sweep; give one of {', '.join(shipped_sweeps())}",
     "sweep tiny.yaml -o new --device cuda:98": "options.device: there is no cuda:98 on this machine",  # started early
-    "sweep --new no/new.yaml": "--new: no/new.yaml: cannot be written (No such file or directory); give",
+    "sweep --new no/new.yaml": "no/new.yaml: cannot be written (No such file or directory); give",
     "sweep --new new.yaml -o new": "--new: given together with other arguments; leave them out",
     "sweep --new new.yaml --seed 0": "--new: given together with other arguments; leave them out",
     "sweep tiny.yaml -o new --gpus 2 --workers 3": "--workers: given together with --gpus; leave one out",

@@ -41,8 +41,8 @@ def parameters(
     from warpchain.inputs.options import Options
     from warpchain.inputs.parameters import preset as parameter_preset
     from warpchain.inputs.scene import Scene
-    from warpchain.inputs.sections import SECTION_OF, SECTIONS, SYMBOL_OF, dotted_name
-    from warpchain.inputs.validation import FIELDS, field_limits, field_unit, shown
+    from warpchain.inputs.setup import SECTIONS
+    from warpchain.inputs.validation import FIELDS, SECTION_OF, SYMBOL_OF, dotted_name, field_limits, field_unit, shown
 
     wanted = {name if name in SECTIONS else dotted_name(name, shown(name)) for name in names or SECTIONS}
     models = (parameter_preset(preset), Scene(), Options())

@@ -51,7 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 def _refuse_for(error: Exception) -> None:
     """Print what was refused or failed, and exit; return if the error is a defect of the program."""
     from warpchain.inputs.validation import DamagedFileError, InputError, one_line
-    from warpchain.run.workers import LostWorkersError
+    from warpchain.run.gpu_workers import LostWorkersError
 
     problems, status = [str(error)], REFUSED
     if isinstance(error, typer.TyperException):
@@ -89,20 +89,15 @@ def _warnings_on_one_line() -> Iterator[None]:
         yield
 
 
-def _print_version(wanted: bool) -> None:
-    if wanted:
-        print("warpchain", VERSION)
-        raise typer.Exit
-
-
 @app.callback(invoke_without_command=True)
 def _warpchain(
     context: typer.Context,
-    version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
-    ] = False,
+    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
 ) -> None:
     """Walking roller chains: a loop of chain, spun up on a sprocket, is dropped and walks away."""
+    if version:
+        print("warpchain", VERSION)
+        raise typer.Exit
     if context.invoked_subcommand is None:
         print(context.get_help())
 

@@ -26,8 +26,6 @@ _PICTURES: Final = (*(f"{kind}.png" for kind in get_args(Kind)), "walk.gif")
 """What `plot` and `animate` write beside the record unless told otherwise."""
 _MOST_CELLS: Final = 1000
 """Most cells of a sweep that a table lists; one of 100,000 would take minutes to lay out."""
-_WIDE: Final = 180
-"""Columns of a table where there is no terminal to ask."""
 
 
 def print_table(headings: Iterable[str], rows: Iterable[Sequence[str]], left: Container[str] = ()) -> None:
@@ -40,7 +38,8 @@ def print_table(headings: Iterable[str], rows: Iterable[Sequence[str]], left: Co
         table.add_column(heading, justify="left" if heading in left else "right", no_wrap=heading != "meaning")
     for row in rows:
         table.add_row(*("" if text.startswith("nan") else text for text in row))
-    Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else _WIDE).print(table)
+    width = None if sys.stdout.isatty() else 180  # where there is no terminal to ask
+    Console(highlight=False, markup=False, width=width).print(table)
 
 
 def print_sweep(result: "SweepResult", as_json: bool) -> None:

@@ -59,12 +59,21 @@ def sweep(
     from warpchain.status import Status
 
     if gpus is not None:
+        from warpchain.engine.devices import gpu_count
+
         if workers is not None:
             raise InputError("--workers: given together with --gpus; leave one out")
         if device not in (None, "cuda"):
             raise InputError(f"--device: {device} is given together with --gpus; give cuda, or leave one out")
         device = "cuda"
-        _checked_gpus(gpus)
+        try:
+            there = gpu_count()
+        except InputError as error:
+            if not str(error).startswith("options.device"):
+                raise
+            raise InputError("--gpus: no GPU is found on this machine; leave it out to run on the CPU") from None
+        if gpus > there:
+            raise InputError(f"--gpus: {gpus} wanted, but this machine has {there}; give at most {there}")
     try:
         with contextlib.nullcontext() if gpus is None else gpu_workers(gpus) as executor:
             result = run(
@@ -185,18 +194,3 @@ def merge(
 
     merge_shards(directories, path)
     print(printable(str(path)))
-
-
-def _checked_gpus(wanted: int) -> None:
-    """Check that this machine has so many GPUs; else an `InputError`."""
-    from warpchain.engine.devices import gpu_count
-    from warpchain.inputs.validation import InputError
-
-    try:
-        there = gpu_count()
-    except InputError as error:
-        if not str(error).startswith("options.device"):
-            raise
-        raise InputError("--gpus: no GPU is found on this machine; leave it out to run on the CPU") from None
-    if wanted > there:
-        raise InputError(f"--gpus: {wanted} wanted, but this machine has {there}; give at most {there}")

@@ -4,15 +4,12 @@ import json
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import Annotated, Any, Final
 
 import typer
 
 from warpchain.cli.words import JSON, argument, option, output
 from warpchain.inputs.methods import METHODS
-
-if TYPE_CHECKING:
-    from warpchain.inputs.setup import Setup
 
 FAILED: Final = 1
 """Exit status of a command whose walks failed."""
@@ -72,15 +69,15 @@ def walk(
     as_json: Annotated[bool, JSON] = False,
 ) -> None:
     """Spin up one chain, drop it, and follow it until it rests."""
-    from warpchain.cli.output import print_walk, try_walk_folder, write_walk
+    from warpchain.cli.output import print_walk, saved, try_walk_folder, write_walk
     from warpchain.inputs.distributions import Seed
     from warpchain.inputs.options import replaced_by
-    from warpchain.inputs.sections import SECTIONS
-    from warpchain.inputs.setup import DEFAULT_PRESET, continued, resolve
+    from warpchain.inputs.setup import DEFAULT_PRESET, SECTIONS, continued, resolve
     from warpchain.inputs.validation import InputError, checked, printable
     from warpchain.inputs.yaml_files import parse_yaml
     from warpchain.run.progress_bar import changing_line, walk_progress_text
     from warpchain.walks.one_walk import run_walk
+    from warpchain.walks.walk_result import WalkResult
 
     named = {"links": links, "frequency": frequency, "start": start}
     given = _given_values(named | {"method": method, "tolerance": tolerance, "device": device}, assignments or [])
@@ -90,7 +87,16 @@ def walk(
         for name, value in (("--config", config), ("--preset", preset), ("--seed", seed)):
             if value is not None:
                 raise InputError(f"{name}: given together with --like, and a saved walk has its own; leave one out")
-        base, number = _saved(like, index)
+        found = saved(like, "give a saved walk, or the folder or merged file of a sweep and --index")
+        if isinstance(found, WalkResult):
+            if index is not None:
+                raise InputError(f"--index: given, but {like} is a single walk; leave it out")
+            base, number = found.setup, found.seed
+        elif index is None:
+            raise InputError(f"--like: {like} has many walks; give --index, the number of one, as well")
+        else:
+            block, place = found.located(parse_yaml(index, "--index"))
+            base, number = block.setup_at(place), block.origin.seed
         replaced = replaced_by(given["options"])
         preset, own = base.preset, {name: getattr(base, name).model_dump(exclude=replaced) for name in SECTIONS}
     elif config is not None:
@@ -160,8 +166,7 @@ def animate(
 
 def _given_values(named: Mapping[str, str | None], assignments: Sequence[str]) -> dict[str, dict[str, object]]:
     """Values of the command line by section; named options and `NAME=VALUE` are on a par."""
-    from warpchain.inputs.sections import SECTION_OF, by_section, dotted_name
-    from warpchain.inputs.validation import InputError, shown
+    from warpchain.inputs.validation import SECTION_OF, InputError, by_section, dotted_name, shown
     from warpchain.inputs.yaml_files import parse_yaml
 
     pairs = [(name, text) for name, text in named.items() if text is not None]
@@ -178,21 +183,3 @@ def _given_values(named: Mapping[str, str | None], assignments: Sequence[str]) -
             raise InputError(f"{path}: given twice on the command line; give it once")
         values[name] = parse_yaml(text, path)
     return by_section(values)
-
-
-def _saved(path: Path, index: str | None) -> tuple["Setup", int | None]:
-    """Setup and seed of a saved walk, or of the walk with a number of a sweep."""
-    from warpchain.cli.output import saved
-    from warpchain.inputs.validation import InputError
-    from warpchain.inputs.yaml_files import parse_yaml
-    from warpchain.walks.walk_result import WalkResult
-
-    found = saved(path, "give a saved walk, or the folder or merged file of a sweep and --index")
-    if isinstance(found, WalkResult):
-        if index is not None:
-            raise InputError(f"--index: given, but {path} is a single walk; leave it out")
-        return found.setup, found.seed
-    if index is None:
-        raise InputError(f"--like: {path} has many walks; give --index, the number of one, as well")
-    block, place = found.located(parse_yaml(index, "--index"))
-    return block.setup_at(place), block.origin.seed

@@ -15,7 +15,6 @@ from warpchain.inputs.validation import InputError, Whole, checked, shown
 
 UNITS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 _POSITIVE: Final = Annotated[float, Field(gt=0)]
-_EDGES: Final = Annotated[list[float], Field(min_length=4, max_length=4)]
 
 
 def read(
@@ -56,7 +55,7 @@ def read(
     checked(frequency, "frequency", _POSITIVE, "Hz")
     checked(fps, "fps", _POSITIVE | None)
     checked(speed, "speed", _POSITIVE | None, "m/s")
-    checked(outline, "outline", _EDGES | None)
+    checked(outline, "outline", Annotated[list[float], Field(min_length=4, max_length=4)] | None)
     if unit not in (None, *UNITS) or direction not in ("right", "left"):
         raise InputError(f"unit: {shown(unit)}, direction: {shown(direction)}; give m, cm or mm, and right or left")
     lines = [_cells(line) for line in Path(path).read_text(encoding="utf-8-sig", errors="replace").splitlines()]

@@ -18,9 +18,8 @@ from pydantic import Field
 
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene, link_values
-from warpchain.inputs.sections import SECTION_OF
 from warpchain.inputs.state import Setup
-from warpchain.inputs.validation import FIELDS, InputError, Whole, checked, field_bounds
+from warpchain.inputs.validation import FIELDS, SECTION_OF, InputError, Whole, checked, field_bounds
 
 DRAW_LIMIT: Final = 1000
 """Draws of one quantity before giving up; a mean inside the bounds needs two on average at worst."""

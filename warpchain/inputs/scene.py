@@ -17,14 +17,10 @@ MOST_LINKS: Final = 100_000
 """A chain of so many links takes 0.4 GB, and kernels of its own."""
 MOST_LINKS_ON_GPU: Final = 1024
 """A chain is a block of threads there, one for each link, and CUDA has no larger blocks."""
-HIGHEST_FREQUENCY: Final = 300.0
-"""Greatest frequency of a sprocket, far above what any loop holds [Hz]; a greater one is in turns a minute."""
 LEAST_SPROCKET: Final = 1e-3
 """Least distance of the joints from the sprocket's centre, in link lengths; far smaller ones are lost in rounding."""
 HIGHEST: Final = 1e6
 """Greatest height, where numbers still tell a nanometre [m]."""
-HIGHEST_LOAD: Final = 1e4
-"""Greatest factor by which loads are multiplied; more than some hundred make joints stretch and steps short."""
 FASTEST_TAP: Final = 1e3
 """Greatest speed [m/s] and rate [rad/s] of the plane at the release, far beyond that of any loop."""
 LONGEST: Final = 1e6
@@ -49,7 +45,7 @@ class Scene(Section):
 
     links: Whole = number_field(60, "1", symbol="n", ge=4, le=MOST_LINKS)
     """number of links around the loop, even where inner and outer links alternate"""
-    frequency: float = number_field(15.0, "Hz", symbol="ν", ge=0, le=HIGHEST_FREQUENCY)
+    frequency: float = number_field(15.0, "Hz", symbol="ν", ge=0, le=300.0)  # more is in turns a minute
     """turns of the sprocket per second at the release"""
     start: Literal["rest", "spinning", "ellipse"] = "rest"
     """at rest on the sprocket, circulating on it, or a circulating ellipse without sprocket"""
@@ -68,7 +64,7 @@ class Scene(Section):
     chain"""
     spin_up_time: float = number_field(0.3, "s", gt=0, le=LONGEST)
     """time in which the sprocket reaches its frequency"""
-    load_factor: float | None = number_field(None, "1", ge=1, le=HIGHEST_LOAD)
+    load_factor: float | None = number_field(None, "1", ge=1, le=1e4)  # some hundred make joints stretch
     """by which gravity, joint friction and rotary inertia are multiplied while the loop becomes stationary; null: as
     many times as suits the chain, at most 50; 1: not at all"""
     steady_time: float | None = number_field(None, "s", ge=0, le=LONGEST)

@@ -145,11 +145,11 @@ def average_loop(setup: Setup, before: BeforeRelease | None, center: Array | Non
 
     A `ValueError` says that the walk has no sprocket, or has kept nothing of that time or too little.
     """
-    if before is None or center is None:
-        if not setup.has_drive:
-            raise ValueError("walk: it began without a sprocket, so it has no loop on one; take one from its drive on")
-        if center is None:
-            raise ValueError("walk: it ended before its release; see its status, which says what to try")
+    if not setup.has_drive:
+        raise ValueError("walk: it began without a sprocket, so it has no loop on one; take one from its drive on")
+    if center is None:
+        raise ValueError("walk: it ended before its release; see its status, which says what to try")
+    if before is None:
         raise ValueError("walk: nothing was kept of the time before its release; run it again with record_before")
     scene, parameters = setup.scene, setup.parameters
     if setup.options.soften_drive:

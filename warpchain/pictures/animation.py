@@ -44,10 +44,6 @@ _PLAYER: Final = Path(__file__).with_name("player.html")
 """The page with a player, which says what its data are."""
 _HOLD: Final = 1.5
 """Time for which GIF and MP4 show their last picture [s]."""
-_GIF_PICTURES: Final = 1200
-"""Most pictures of a GIF: all are in memory at once, up to 0.5 MB each."""
-_PLAYER_FRAMES: Final = 2000
-"""Most frames of a page, which then has about 1 MB with 60 links."""
 
 _POSITIVE: Final = Annotated[float, Field(gt=0)]
 _GIF_RATE: Final = Annotated[float, Field(ge=1, le=50)]
@@ -93,7 +89,7 @@ def _write_gif(walk: Walk, path: Path, fps: float, slow: float) -> None:
 
     delay = round(100 / fps)
     chosen = _chosen_frames(walk, 100 / delay, slow)
-    if len(chosen) > _GIF_PICTURES:
+    if len(chosen) > 1200:  # all are in memory at once, up to 0.5 MB each
         raise ValueError(f"{path}: {len(chosen)} pictures are too many for a GIF; lower fps or slow, or give .mp4")
     film = Film(walk)
     palette = Image.fromarray(film.picture(len(walk.frame_time) // 2)).quantize(64)
@@ -139,7 +135,7 @@ def player(walk: Walk, slow: float = 4.0) -> str:
     It starts `slow` times slower than the walk. A `ValueError` says that the walk has no frames or broken ones.
     """
     joints, sprocket = checked_joints(walk), walk.sprocket_center
-    count = min(len(walk.frame_time), _PLAYER_FRAMES)
+    count = min(len(walk.frame_time), 2000)  # with 60 links the page has about 1 MB then
     frames = np.rint(np.linspace(0, len(walk.frame_time) - 1, count)).astype(int)
     times, box = walk.frame_time[frames], side_box(walk, joints)
     marks = floor_marks(*box[0])

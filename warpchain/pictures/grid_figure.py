@@ -16,8 +16,8 @@ from matplotlib.colors import to_hex
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import NullLocator
-from numpy.typing import NDArray
 
+from warpchain.inputs.arrays import AnyArray
 from warpchain.inputs.validation import InputError, shown
 from warpchain.pictures import labels, style
 from warpchain.pictures.labels import math_symbol, short_texts, unit_text, with_unit
@@ -26,16 +26,10 @@ from warpchain.pictures.style import BLUE, FAINT, GROUND, LINE_COLORS, RED, AnyF
 if TYPE_CHECKING:
     from warpchain.store.cell_statistics import CellStatistics
 
-Array = NDArray[Any]
-
 MOST_LINES: Final = len(LINE_COLORS)
 """Greatest number of lines in a panel, unless lines are asked for."""
 MOST_PANELS: Final = 24
 """Greatest number of panels of a block; of more, the first are shown."""
-_MOST_TICKS: Final = 8
-"""Up to so many numbers have a tick each, if they are not too close."""
-_MOST_ROWS: Final = 16
-"""Greatest number of labelled rows or columns of a map."""
 _DEEP, _LIGHT = 0.45, 0.15
 """Opacity of the bars of one standard error and one standard deviation."""
 _PANEL_SIZES: Final = {1: (5.2, 3.6), 2: (3.6, 2.9), 3: (3.0, 2.6), 4: (2.6, 2.4)}
@@ -146,7 +140,7 @@ def _panels(cells: "CellStatistics", x: str | None, block: str) -> Iterator[Pane
     is_map, across, along, others = _roles(several, x)
     order = [several.index(axis) for axis in (*others, along, across) if axis is not None]
 
-    def arranged(table: Array) -> Array:
+    def arranged(table: AnyArray) -> AnyArray:
         table = table[np.ix_(*rising)].reshape([len(axis.values) for axis in several]).transpose(order)
         return table[..., np.newaxis, :] if along is None else table
 
@@ -223,13 +217,13 @@ def _draw_lines(axes: Axes, panel: Panel, palette: Mapping[Any, str]) -> None:
         if 0 < 10 * values[0] <= values[-1] and _unevenness(np.log(placed)) < _unevenness(placed):
             axes.set_xscale("log")
             placed = np.log(placed)
-        if len(values) <= _MOST_TICKS and np.diff(placed).min() > 0.08 * np.ptp(placed):
-            axes.set_xticks(values, texts)
+        if len(values) <= 8 and np.diff(placed).min() > 0.08 * np.ptp(placed):
+            axes.set_xticks(values, texts)  # one for each number, if they are few and not too close
             axes.xaxis.set_minor_locator(NullLocator())
     tidy(axes, grid="y")
 
 
-def _unevenness(places: Array) -> float:
+def _unevenness(places: AnyArray) -> float:
     """Coefficient of variation of the gaps."""
     gaps = np.diff(places)
     return float(gaps.std() / gaps.mean())
@@ -242,7 +236,7 @@ def _draw_map(axes: Axes, panel: Panel, limits: tuple[float, float]) -> Any:
     image = axes.imshow(cells.mean, origin="lower", aspect="auto", cmap="viridis", vmin=limits[0], vmax=limits[1])
     for axis, values in ((axes.xaxis, panel.across.values), (axes.yaxis, panel.along.values)):
         texts = short_texts(values)
-        most = _MOST_ROWS if axis is axes.yaxis else max(2, 32 // max(map(len, texts)))
+        most = 16 if axis is axes.yaxis else max(2, 32 // max(map(len, texts)))  # labels
         every = slice(None, None, math.ceil(len(texts) / most))
         axis.set_ticks(range(len(texts))[every], texts[every])
     axes.set_facecolor(GROUND)

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.sections import SECTION_OF
-from warpchain.inputs.validation import DIMENSIONLESS, FIELDS, field_unit, short
+from warpchain.inputs.validation import DIMENSIONLESS, FIELDS, SECTION_OF, field_unit, short
 
 if TYPE_CHECKING:
     from warpchain.store.cell_statistics import CellStatistics
@@ -27,9 +26,6 @@ _NAMES: Final = {
 COUNTS: Final = ("count", "absent", "failed", "missing")
 """Numbers of walks of a cell: at rest with the quantity, at rest without it, ended otherwise, not computed yet."""
 
-_EXACT: Final = 17
-"""Significant digits that tell any two numbers apart."""
-
 
 def value_text(value: Any) -> str:
     """A value of an axis: a number, a name, whether something is on, or null."""
@@ -43,8 +39,8 @@ def short_texts(values: Sequence[Any] | NDArray[Any]) -> list[str]:
     texts = [value_text(value) for value in values]
     if any(value is None or isinstance(value, str | bool | np.bool_) for value in values):
         return texts
-    digits = 2
-    while any(float(text) != value for text, value in zip(texts, values, strict=True)) and digits < _EXACT:
+    digits = 2  # 17 tell any two numbers apart
+    while any(float(text) != value for text, value in zip(texts, values, strict=True)) and digits < 17:
         digits += 1
         texts = [short(value, digits) for value in values]
         if len(set(texts)) == len(texts):

@@ -33,11 +33,6 @@ DASHES: Final[Any] = (0, (4, 3))
 DOTS: Final[Any] = (0, (1, 1.5))
 """A dotted line, as matplotlib takes it."""
 
-PICTURE_DPI: Final = 200
-"""Resolution of a figure in a file of its own [dots per inch]."""
-NOTEBOOK_DPI: Final = 100
-"""Resolution of a figure in a notebook [dots per inch]."""
-
 
 class NothingToShow(InputError):  # noqa: N818 - no error of the program: the sweep was made for something else
     """A sweep lacks the blocks, or does not have the walks yet, that a figure or a number needs."""
@@ -59,7 +54,7 @@ class Picture(NamedTuple):
 
 def save_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
     """Write a figure as a PNG, whole or not at all; an `OSError` if it cannot be written."""
-    write_whole(path, png(figure, PICTURE_DPI))
+    write_whole(path, png(figure, dpi=200))
 
 
 def tidy(axes: Axes, *, grid: Literal["x", "y", "both"] | None = None) -> None:
@@ -94,8 +89,8 @@ class InlineFigure(Figure):
         return png(self)
 
 
-def png(figure: Figure, dpi: float = NOTEBOOK_DPI) -> bytes:
-    """A figure as the bytes of a PNG file.
+def png(figure: Figure, dpi: float = 100) -> bytes:
+    """A figure as the bytes of a PNG file, by default as a notebook shows it.
 
     It is painted directly, which takes half the time of `savefig`: that draws everything once more beforehand.
     """

@@ -43,7 +43,6 @@ _FLOOR: Final = 0.4
 """Height of the floor in the side view."""
 _CLOSE_UP_LINKS, _CLOSE_UP_ASPECT = 9, 1.5
 """Width of a close-up [links], and its width over its height."""
-_HALO: Final = (withStroke(linewidth=2.5, foreground="white"),)
 
 
 def draw(walk: Walk, kind: Kind, *, figure: Figure | None = None, ax: Axes | None = None) -> Figure:
@@ -317,7 +316,8 @@ def _write_times(axes: Axes, times: Array, joints: Array, colors: Array, gap: fl
         while np.any(np.all(np.abs(taken - place) < np.array([0.38, 0.13]) * inch, axis=1)):
             place[1] += 0.02 * inch
         taken = np.append(taken, [place], axis=0)
-        style: dict[str, Any] = {"color": 0.7 * color, "fontsize": "small", "path_effects": _HALO}
+        halo = [withStroke(linewidth=2.5, foreground="white")]
+        style: dict[str, Any] = {"color": 0.7 * color, "fontsize": "small", "path_effects": halo}
         axes.text(place[0], place[1], f"{moment:.2f} s", ha="center", va="bottom", zorder=6, **style)
 
 

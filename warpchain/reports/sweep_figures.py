@@ -34,8 +34,6 @@ _STARTS: Final = {
 """How the chain started → legend, colour, marker."""
 _OTHERS: Final = (*zip((BLUE, *LINE_COLORS[3:6]), "^vP*", strict=True), *[(INK, "X")] * 100)
 """Colour and marker of further blocks of the same start."""
-_MOST_PANELS: Final = 6
-"""Up to so many numbers of links, each with a panel, Figure 6 shows; beyond, a figure of the grid does."""
 
 
 def figures(result: SweepResult, quantity: str = "dx") -> Iterator[Picture]:
@@ -76,7 +74,7 @@ def _varied(block: BlockResult) -> list[str]:
 
 def _is_series(block: BlockResult) -> bool:
     """Whether Figure 6 can show a block: nothing but links, frequency and start varies in it."""
-    few = len(block.axes.get("links", ())) <= _MOST_PANELS
+    few = len(block.axes.get("links", ())) <= 6  # each has a panel; beyond, a figure of the grid is clearer
     return few and set(_varied(block)) <= {"links", "frequency", "start"} and "frequency" not in block.drawn
 
 
@@ -148,7 +146,6 @@ def figure6(result: SweepResult) -> Picture:
 
 CONFIDENCE: Final = 0.95
 """Confidence level of bootstrap intervals."""
-_RESAMPLES: Final = 1000
 
 
 class Sensitivity(NamedTuple):
@@ -187,7 +184,7 @@ def sensitivities(result: SweepResult) -> list[Sensitivity]:
             if samples < 2 or not np.isfinite(indices).all():
                 continue
             rng = random_generator(0)
-            draws = (rng.integers(0, samples, samples) for _ in range(_RESAMPLES))
+            draws = (rng.integers(0, samples, samples) for _ in range(1000))
             resampled = [sobol_indices(complete[draw]) for draw in draws]
             # The indices are NaN for a resample without variance, which repeats a single sample.
             intervals = np.nanpercentile(resampled, (50 * (1 - CONFIDENCE), 50 * (1 + CONFIDENCE)), axis=0)

@@ -11,14 +11,14 @@ from dataclasses import replace
 from html import escape
 from itertools import chain, repeat
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import yaml
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from warpchain.files import AnyPath, Kind, checked_output, write_whole
+from warpchain.inputs.arrays import AnyArray
 from warpchain.inputs.validation import short
 from warpchain.pictures.labels import cell_table, cell_text, cell_values, unit_text
 from warpchain.pictures.style import image, png
@@ -30,12 +30,9 @@ from warpchain.version import VERSION
 from warpchain.walks.landmarks import FAULTS
 from warpchain.walks.walk_result import WalkResult
 
-Array = NDArray[Any]
-
 _MOST_LISTED: Final = 100
 """Greatest number of walks with the same status or fault that are listed one by one."""
 
-_DPI: Final = 160
 
 _PAGE: Final = Path(__file__).with_name("sweep_page.html").read_text(encoding="utf-8")
 """The page, whose policy makes the browser refuse to load anything; `write_report` fills in the double braces."""
@@ -119,7 +116,7 @@ def _cells(result: SweepResult) -> str:
     return "\n".join(parts)
 
 
-def _listed(result: SweepResult, found: Iterable[tuple[str, str, Sequence[Array]]]) -> str:
+def _listed(result: SweepResult, found: Iterable[tuple[str, str, Sequence[AnyArray]]]) -> str:
     """Walks with their block, cell and sample, of many only the first.
 
     Each item of `found` is a heading, what it means and what to try, and which walks of each block it is said of.
@@ -197,7 +194,7 @@ def _compared(walk: WalkResult, block: BlockResult, place: tuple[int, ...]) -> s
 
 def _picture(figure: Figure, caption: str) -> str:
     """A figure with its caption; the image is part of the HTML."""
-    shown = image(png(figure, _DPI), caption, f"{round(96 * figure.get_figwidth())}px")
+    shown = image(png(figure, 160), caption, f"{round(96 * figure.get_figwidth())}px")
     return f"<figure>{shown}<figcaption>{escape(caption)}</figcaption></figure>"
 
 

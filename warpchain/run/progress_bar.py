@@ -45,11 +45,6 @@ class SweepProgress:
         """Walks per second of this run."""
         return (self.done - self.before) / self.seconds if self.seconds > 0 else 0.0
 
-    @property
-    def time_left(self) -> float | None:
-        """Seconds to go at this rate; None before the first walk is over."""
-        return (self.walks - self.done) / self.rate if self.rate > 0 else None
-
 
 OnProgress = Callable[[SweepProgress], None]
 
@@ -91,7 +86,9 @@ def progress_text(progress: SweepProgress) -> str:
     """How far a sweep is, in one line."""
     if progress.compiling:
         return COMPILING
-    left = "" if progress.time_left is None else f"   {timedelta(seconds=round(progress.time_left))} left"
+    left = ""
+    if progress.rate > 0:  # else no walk is over yet
+        left = f"   {timedelta(seconds=round((progress.walks - progress.done) / progress.rate))} left"
     rate = f"{progress.rate:.2f} a second{left}"
     bar = f"[{'#' * (10 * progress.done // progress.walks):10}]"
     return f"{bar} {progress.done:,} of {progress.walks:,} walks   {rate}   {counts_text(progress)}"

@@ -15,7 +15,7 @@ from warpchain.inputs.arrays import Array, checked_array
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene, check_links_on_gpu
-from warpchain.inputs.sections import takes_fields
+from warpchain.inputs.setup import takes_fields
 from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError, checked, plain, shown, validated
 from warpchain.status import Status

@@ -3,10 +3,9 @@
 from typing import Any, Literal
 
 from warpchain.inputs.distributions import Seed
-from warpchain.inputs.sections import by_section, takes_fields
-from warpchain.inputs.setup import DEFAULT_PRESET, Setup, continued, resolve
+from warpchain.inputs.setup import DEFAULT_PRESET, Setup, continued, resolve, takes_fields
 from warpchain.inputs.state import State
-from warpchain.inputs.validation import InputError, by_name, checked, shown
+from warpchain.inputs.validation import InputError, by_name, by_section, checked, shown
 from warpchain.run.progress_bar import changing_line, walk_progress_text
 from warpchain.walks.one_walk import OnProgress, run_walk
 from warpchain.walks.walk_result import WalkResult

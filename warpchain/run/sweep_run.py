@@ -23,12 +23,22 @@ from warpchain.engine.devices import gpu_turn, has_gpu_turn, start_device
 from warpchain.engine.processors import processors
 from warpchain.files import AnyPath
 from warpchain.inputs.options import Options, on_gpu
-from warpchain.inputs.sections import SECTION_OF, by_section, takes_fields
-from warpchain.inputs.setup import DEFAULT_PRESET, Setup, Values
-from warpchain.inputs.validation import InputError, Whole, by_name, checked, checked_path, plain, shown, validated
+from warpchain.inputs.setup import DEFAULT_PRESET, Setup, Values, takes_fields
+from warpchain.inputs.validation import (
+    SECTION_OF,
+    InputError,
+    Whole,
+    by_name,
+    by_section,
+    checked,
+    checked_path,
+    plain,
+    shown,
+    validated,
+)
 from warpchain.run import progress_bar
+from warpchain.run.gpu_workers import Pulse, losses_named, pulsing_threads
 from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text
-from warpchain.run.workers import Pulse, losses_named, pulsing_threads
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
 from warpchain.store.shards import Part, Shard, opened_shard, rows_of, stamp, write_shard
@@ -49,8 +59,6 @@ SHARD_WALKS = 256
 """Most walks in a shard."""
 GPU_TASK_WALKS = 262144
 """Upper bound on the walks of a GPU's task, about; the GPU idles while the last walks finish."""
-POLL = 1.0
-"""Time [s] between two checks for shards that tasks under way have written."""
 PASSES = 8
 """Times that a sweep on a CPU is gone through."""
 SHARDS = 32
@@ -294,7 +302,7 @@ def _follow(
                 pending.update(itertools.islice(tasks, at_once - len(pending)))
                 if not pending:
                     break
-                finished, pending = wait(pending, POLL, FIRST_COMPLETED)
+                finished, pending = wait(pending, 1.0, FIRST_COMPLETED)  # looks for shards every second
                 for future in finished:
                     future.result()
             for name in left.keys() & set(os.listdir(folder)):

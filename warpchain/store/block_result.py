@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.inputs.arrays import AnyArray
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.validation import InputError, InputWarning, checked, plain, shown, suggestion
@@ -27,9 +28,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-Array = NDArray[Any]
-
-_Variables = dict[str, tuple[tuple[str, ...], Array, dict[str, Any]]]
+_Variables = dict[str, tuple[tuple[str, ...], AnyArray, dict[str, Any]]]
 """Name → axes, values and attributes, as xarray takes them."""
 
 
@@ -53,12 +52,12 @@ class BlockResult:
 
     name: str
     number: int
-    axes: dict[str, Array]
+    axes: dict[str, AnyArray]
     drawn: tuple[str, ...]
-    columns: dict[str, Array]
+    columns: dict[str, AnyArray]
     origin: Sweep
     versions: dict[str, str]
-    motions: Array
+    motions: AnyArray
 
     @property
     def planned(self) -> Block:
@@ -75,9 +74,9 @@ class BlockResult:
         """Number of values of each axis, then the number of samples."""
         return self.columns["index"].shape
 
-    def __getattr__(self, name: str) -> Array:
+    def __getattr__(self, name: str) -> AnyArray:
         """A column."""
-        columns: dict[str, Array] = self.__dict__.get("columns", {})
+        columns: dict[str, AnyArray] = self.__dict__.get("columns", {})
         if name not in columns:
             raise AttributeError(f"{name}: no such column; columns are {', '.join(columns)}", name=name, obj=self)
         return columns[name]
@@ -306,7 +305,7 @@ class BlockResult:
         return notes
 
 
-def status_counts(status: Array) -> dict[str, int]:
+def status_counts(status: AnyArray) -> dict[str, int]:
     """Number of walks by status label, in the order of the codes, missing ones last."""
     counts = {code.label: int((status == code).sum()) for code in Status}
     kept = {label: count for label, count in counts.items() if count or label == Status.AT_REST.label}

@@ -77,7 +77,10 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         """
         path = given_path(directory)
         make_folder(path)
-        _refuse_strangers(path)
+        for own in (path / name for name in (*shards.OWN, "lock")):
+            if own.is_symlink() or (own.exists() and not (own.is_file() or own.is_dir())):
+                kind = "a symbolic link" if own.is_symlink() else "a pipe or a device"
+                raise InputError(f"{own}: {kind}, where a sweep writes and deletes; remove it, or give another folder")
         is_new = not (path / "lock").exists()
         lock = _locked(path)
         try:
@@ -231,14 +234,6 @@ def _clear_leftovers(folder: Path) -> None:
             for path in place.iterdir() if place.is_dir() else ():
                 if _PART.fullmatch(path.name) and (path.is_symlink() or not path.is_dir()):
                     path.unlink(missing_ok=True)
-
-
-def _refuse_strangers(folder: Path) -> None:
-    """Refuse a folder in which a name of the sweep's own is a link, pipe or device; an `InputError`."""
-    for path in (folder / name for name in (*shards.OWN, "lock")):
-        if path.is_symlink() or (path.exists() and not (path.is_file() or path.is_dir())):
-            kind = "a symbolic link" if path.is_symlink() else "a pipe or a device"
-            raise InputError(f"{path}: {kind}, where a sweep writes and deletes; remove it, or give another folder")
 
 
 _held: set[int] = set()

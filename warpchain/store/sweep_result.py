@@ -19,10 +19,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpchain.files import AnyPath, Kind, checked_output, given_path, write_whole
 from warpchain.hdf5_files import hdf5_image, kind_of_hdf5, reading_hdf5
+from warpchain.inputs.arrays import AnyArray
 from warpchain.inputs.validation import InputError, InputWarning, shown, suggestion
 from warpchain.store.block_result import BlockResult, counted, located, status_counts
 from warpchain.store.cell_statistics import CellStatistics
@@ -37,8 +37,6 @@ if TYPE_CHECKING:
     import pandas
     import xarray
     from matplotlib.figure import Figure, SubFigure
-
-Array = NDArray[Any]
 
 KIND: Final = "warpchain sweep result"
 REMEDY: Final = "merge the folders again, or fetch another copy of the file"
@@ -245,7 +243,9 @@ def _load_merged(path: AnyPath) -> SweepResult:
         return _result(sweep, provenance, groups, motions)
 
 
-def _result(sweep: Sweep, provenance: dict[str, Any], stored: Sequence[Any], motions: Sequence[Array]) -> SweepResult:
+def _result(
+    sweep: Sweep, provenance: dict[str, Any], stored: Sequence[Any], motions: Sequence[AnyArray]
+) -> SweepResult:
     """A result, given for each block what has its stored columns by name, and its motions, both in any shape."""
     blocks = {}
     for number, block in enumerate(sweep.blocks):
@@ -333,7 +333,7 @@ def _fill(file: "h5py.File", whole: SweepResult) -> None:
             group.copy(motion, group.require_group("motion"), str(place))
 
 
-def _put(group: "h5py.Group", name: str, values: NDArray[Any], notes: Mapping[str, Any], dims: Sequence[str]) -> None:
+def _put(group: "h5py.Group", name: str, values: AnyArray, notes: Mapping[str, Any], dims: Sequence[str]) -> None:
     """Write a variable along some axes, or one of the axes."""
     if values.dtype.kind == "b":  # NetCDF has no truth values; xarray's way to write them
         values, notes = values.astype(np.int8), {**notes, "dtype": "bool"}

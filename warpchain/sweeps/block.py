@@ -19,9 +19,8 @@ from warpchain.inputs import validation
 from warpchain.inputs.distributions import Distribution, Gaussian
 from warpchain.inputs.parameters import preset as parameter_preset
 from warpchain.inputs.scene import COMPOUND, Scene
-from warpchain.inputs.sections import SECTION_OF, SECTIONS
-from warpchain.inputs.setup import Setup, combined, options_beside
-from warpchain.inputs.validation import FIELDS, InputError, checked, json_value, path_of, shown, validated
+from warpchain.inputs.setup import SECTIONS, Setup, combined, options_beside
+from warpchain.inputs.validation import FIELDS, SECTION_OF, InputError, checked, json_value, path_of, shown, validated
 from warpchain.sweeps.designs import walks_per_sample
 from warpchain.walks.landmarks import least
 
@@ -39,8 +38,6 @@ CELL_LIMIT: Final = 100_000
 """Most cells of a sweep, because each is checked when the sweep is loaded."""
 Name = Annotated[str, Field(pattern="^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=validation.LONGEST_NAME)]
 """Of a block, or of a value on an axis."""
-_KEPT: Final = 2**14
-"""Most values of a section that are kept while cells are gone through: more than an axis has."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +114,7 @@ class Block:
         sections = self.sections
         axes = self.axes | {name: tuple(values.values()) for name, values in self.named.items()}
 
-        kept = lru_cache(_KEPT)
+        kept = lru_cache(2**14)  # more than an axis has values
         scene = kept(lambda at: validated(Scene, {**sections["scene"], **dict(at)}, "scene"))
         options = kept(lambda plane, at: options_beside(plane, {**sections["options"], **dict(at)}))
         changed = kept(lambda name, at: parameter_preset(name).with_values({**sections["parameters"], **dict(at)}))

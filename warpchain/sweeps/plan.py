@@ -24,8 +24,7 @@ from warpchain.inputs.distributions import DRAW_LIMIT, Distribution, draw, place
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS
 from warpchain.inputs.scene import Scene
-from warpchain.inputs.sections import SECTIONS
-from warpchain.inputs.setup import Setup
+from warpchain.inputs.setup import SECTIONS, Setup
 from warpchain.inputs.validation import InputError
 from warpchain.sweeps.block import Block
 from warpchain.sweeps.designs import design_points, walks_per_sample
@@ -130,12 +129,9 @@ class Sweep:
 
     def keep(self, walk: PlannedWalk) -> Keep:
         """What is kept of the motion of a walk."""
-        every = {
-            name: choice.steps(walk.setup.options, f"sweep.record.{name}") if choice.includes(walk.sample) else None
-            for name, choice in self.recording.choices.items()
-        }
-        frames = self.recording.frames
-        before = (frames.before or 0.0) if frames is not None and frames.includes(walk.sample) else 0.0
+        chosen = {name: choice for name, choice in self.recording.choices.items() if choice.includes(walk.sample)}
+        every = {name: choice.steps(walk.setup.options, f"sweep.record.{name}") for name, choice in chosen.items()}
+        before = getattr(chosen.get("frames"), "before", None) or 0.0
         return Keep(series_every=every.get("series"), frame_every=every.get("frames"), before=before)
 
     def check(self) -> None:

@@ -5,7 +5,6 @@ that begins with the path of the offending value, such as `sweep.blocks[0].grid.
 package are found by their bare names, and so is the file that a new sweep starts from.
 """
 
-import errno
 import math
 import os
 import re
@@ -17,12 +16,12 @@ from typing import Annotated, Any, Final, Literal, Self
 import pydantic
 from pydantic import AfterValidator, BaseModel, Field, ValidationError, ValidationInfo, model_validator
 
-from warpchain.files import AnyPath, failure, write_whole
+from warpchain.files import AnyPath, write_whole
 from warpchain.inputs import validation
 from warpchain.inputs.distributions import DRAWABLE, LARGEST_SEED, TABLE, Distribution, Gaussian, Uniform
 from warpchain.inputs.parameters import PRESETS
 from warpchain.inputs.scene import COMPOUND
-from warpchain.inputs.sections import SECTIONS
+from warpchain.inputs.setup import SECTIONS
 from warpchain.inputs.validation import FIELDS, SECTION_OF, STRICT, SYMBOL_OF, InputError, ModelT, Whole, shown
 from warpchain.inputs.yaml_files import read_yaml
 from warpchain.sweeps.block import CELL_LIMIT, POINT, Block, Name, Sections, Value, axis, list_of, named_axis
@@ -44,7 +43,6 @@ _Sampler = Literal[*SAMPLERS]  # type: ignore[valid-type]
 _PACKAGE: Final = Path(__file__).parents[1]
 _SHIPPED: Final = _PACKAGE / "shipped_sweeps"
 """In a checkout a link to sweeps/."""
-_TEMPLATE: Final = _PACKAGE / "sweeps" / "new_sweep.yaml"
 
 # Fields by name or symbol
 
@@ -73,12 +71,8 @@ class _Given(BaseModel):
 
 
 _TYPES: Final[Mapping[str, Any]] = {
-    name: Annotated[
-        field.annotation,
-        Field(description=field.description, json_schema_extra=field.json_schema_extra),
-        *field.metadata,
-    ]
-    for name, field in FIELDS.items()
+    name: Annotated[f.annotation, Field(description=f.description, json_schema_extra=f.json_schema_extra), *f.metadata]
+    for name, f in FIELDS.items()
 }
 _AXES: Final = {name: (named_axis if name in COMPOUND else axis)(kind) for name, kind in _TYPES.items()}
 
@@ -382,10 +376,7 @@ def sweep_path(source: AnyPath) -> Path:
 
 def write_new_sweep(path: Path) -> None:
     """Write a small sweep file whose comments explain its keys; an `InputError` if there is a file already."""
-    text = _TEMPLATE.read_text(encoding="utf-8")
+    text = (_PACKAGE / "sweeps" / "new_sweep.yaml").read_text(encoding="utf-8")
     if os.path.lexists(path):
         raise InputError(f"--new: {path} exists; give another name")
-    try:
-        write_whole(path, text)
-    except OSError as error:
-        raise failure(error.errno or errno.EIO, f"--new: {error}") from error
+    write_whole(path, text)

@@ -11,12 +11,10 @@ from warpchain.inputs.setup import Setup, check_has_joint_forces
 from warpchain.inputs.validation import InputError, checked, plain
 from warpchain.walks.motion import LONGEST_INTERVAL, Keep
 from warpchain.walks.scheduler import compile_kernels, run_setups
-from warpchain.walks.walk_phases import Progress, WalkRun
+from warpchain.walks.walk_phases import Progress
 from warpchain.walks.walk_result import WalkResult
 
-SHORTEST_INTERVAL = 1e-6
-"""Least time [s] between two frames, as between two samples."""
-_INTERVAL = Annotated[float, Field(ge=SHORTEST_INTERVAL, lt=LONGEST_INTERVAL)]
+_INTERVAL = Annotated[float, Field(ge=1e-6, lt=LONGEST_INTERVAL)]  # as between two samples
 _BEFORE = Annotated[float, Field(ge=0, le=LONGEST_INTERVAL)]
 RECORD_BEFORE = 0.5
 """Time [s] before the release that is kept if frames are, unless told otherwise."""
@@ -52,16 +50,12 @@ def run_walk(
         before=(RECORD_BEFORE if before is None and interval is not None else before or 0.0) * setup.has_drive,
     )
 
-    def watch(run: WalkRun) -> None:
-        if on_progress is not None:
-            on_progress(run.progress())
-
+    report = on_progress or (lambda progress: None)
     with gpu_turn([setup.options.device]):
-        if on_progress is not None:
-            on_progress(Progress("compile", 0.0, 0.0, 0))
+        report(Progress("compile", 0.0, 0.0, 0))
         compile_kernels([setup])
         started = time.perf_counter()
-        ((_, run),) = run_setups([setup], keeps=[keep], watch=watch)
+        ((_, run),) = run_setups([setup], keeps=[keep], watch=lambda run: report(run.progress()))
         return WalkResult(
             **run.outcome(),
             **run.recorder.motion(),

@@ -25,8 +25,6 @@ MISSING: Final = -1
 """Status of a walk that has not been computed yet; no code of `Status` is negative."""
 
 _DRAWN: Final = "_drawn"
-_PREFIXES: Final = {"greatest_penetration": "penetration"}
-"""Field that is a dictionary → how the names of its columns begin, if not with its own."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +48,7 @@ def _stored_columns() -> Iterator[tuple[str, Column]]:
             continue
         kind = "<i8" if types[name][0] in (int, dict[str, int]) else "<f8"
         for key, meaning in (stored.keys or {"": stored.meaning}).items():
-            prefix = "loss" if name == "energy" and key in LOST else _PREFIXES.get(name, name)
+            prefix = "loss" if name == "energy" and key in LOST else name.removeprefix("greatest_") if key else name
             path = (name, key) if key else (name,)
             yield "_".join((prefix, *path[1:])), Column(kind, stored.unit, meaning, path)
 

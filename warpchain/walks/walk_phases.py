@@ -36,8 +36,6 @@ from warpchain.walks.recorder import Recorder
 
 _OF_THE_RUN = ("raised", "drive_time", "drift", "_at_full_speed", "_has_sprocket")
 """What a run knows of the time before its release."""
-FINER = 8
-"""By how much launches become shorter each time that one has gone too far."""
 _NO_FALL: Mapping[str, float] = {
     **dict.fromkeys(("lateral_drift", "final_tilt", "final_yaw", "greatest_tilt", "fell_at"), math.nan),
     **dict.fromkeys(("fell_over", "fell_before_collapse"), -1),
@@ -207,8 +205,7 @@ class WalkRun:
     def energy(self) -> dict[str, float]:
         """Where the energy of the walk went [J]; NaN before the release. Keys: `walk_result.ENERGIES`."""
         first, last = self._batch.first_sample(self._world), self._batch.last_sample(self._world)
-        losses = self._batch.losses(self._world)
-        lost = {name: losses[name] for name in LOST}
+        lost = {name: loss for name, loss in self._batch.losses(self._world).items() if name in LOST}
         ledger = {
             "kinetic_at_release": float(first[layout.KINETIC]),
             "potential_at_release": float(first[layout.GRAVITATIONAL] + first[layout.SPRING]),
@@ -388,7 +385,7 @@ def state_at(setup: Setup, t: object, end: float) -> State:
                 batch.launch([0], features, attempts)
                 if before is not None and batch.time(0) >= time and attempts > 1:
                     restore(batch, 0, before)
-                    attempts = max(1, attempts // FINER)
+                    attempts = max(1, attempts // 8)
             if has_come:
                 return State(
                     position=batch.position(0),

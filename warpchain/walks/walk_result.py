@@ -24,8 +24,7 @@ from warpchain.hdf5_files import Stored, hdf5_image, put, read_fields, reading_h
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import contact_radius
-from warpchain.inputs.sections import SECTIONS
-from warpchain.inputs.setup import Setup
+from warpchain.inputs.setup import SECTIONS, Setup
 from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError, json_value, validated
 from warpchain.kernels import layout
