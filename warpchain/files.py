@@ -33,20 +33,13 @@ class Kind(NamedTuple):
     has: Callable[[Path], bool]
 
 
-def failure(number: int, text: str) -> OSError:
-    """An `OSError` that reads as the text and has the number of its cause, an errno."""
-    error = OSError(text)
-    error.errno = number
-    return error
-
-
 def given_path(path: AnyPath) -> Path:
     """A path as a user gave it; an `OSError` if it is none, or empty, which `Path` takes for the current folder."""
     text = os.fspath(path)
     if not text:
-        raise failure(errno.ENOENT, "a path is empty; name a file or folder")
+        raise OSError("a path is empty; name a file or folder")
     if re.search("[\0\ud800-\udc7f\udd00-\udfff]", text):
-        raise failure(errno.EINVAL, f"{ascii(text)[:100]}: has a NUL or a lone surrogate; leave it out")
+        raise OSError(f"{ascii(text)[:100]}: has a NUL or a lone surrogate; leave it out")
     return Path(path)
 
 

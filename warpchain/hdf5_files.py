@@ -140,7 +140,20 @@ def reading_hdf5(path: AnyPath, kind: str | None, remedy: str, wanted: str | Non
     """
     import h5py
 
-    _compare(path, remedy, wanted)
+    with open_regular(path) as content, naming(path, "read"):
+        head = content.read(len(_SIGNATURE))
+        left = content.seek(0, os.SEEK_END) - _LINE_LENGTH
+        content.seek(max(0, left))
+        end = content.read()
+        content.seek(0)
+        digest = hashlib.sha256()
+        while left > 0 and (piece := content.read(min(left, 2**20))):
+            digest.update(piece)
+            left -= len(piece)
+    if end != _LINE.format(digest.hexdigest()).encode():
+        if wanted and head != _SIGNATURE and b"warpchain SHA-256: " not in end:
+            raise InputError(f"{path}: not an HDF5 file; {wanted}")
+        raise DamagedFileError(f"{path}: damaged, cut short or of an earlier warpchain; {remedy}")
     with h5py.File(path, "r", locking=False) as file:
         if kind is not None and (found := file.attrs["format"]) != kind:
             raise InputError(f"{path}: a {found}, not a {kind}; {wanted or 'move it out of this folder'}")
@@ -155,25 +168,6 @@ def kind_of_hdf5(path: AnyPath, wanted: str) -> str:
     """The kind of an HDF5 file that `hdf5_image` made; errors as of `reading_hdf5`."""
     with reading_hdf5(path, None, "fetch another copy of it", wanted) as file:
         return str(file.attrs["format"])
-
-
-def _compare(path: AnyPath, remedy: str, wanted: str | None) -> None:
-    """Compare the checksum of a file; errors as of `reading_hdf5`."""
-    with open_regular(path) as file, naming(path, "read"):
-        head = file.read(len(_SIGNATURE))
-        left = file.seek(0, os.SEEK_END) - _LINE_LENGTH
-        file.seek(max(0, left))
-        end = file.read()
-        file.seek(0)
-        digest = hashlib.sha256()
-        while left > 0 and (piece := file.read(min(left, 2**20))):
-            digest.update(piece)
-            left -= len(piece)
-    if end == _LINE.format(digest.hexdigest()).encode():
-        return
-    if wanted and head != _SIGNATURE and b"warpchain SHA-256: " not in end:
-        raise InputError(f"{path}: not an HDF5 file; {wanted}")
-    raise DamagedFileError(f"{path}: damaged, cut short or of an earlier warpchain; {remedy}")
 
 
 def open_regular(path: AnyPath) -> BinaryIO:

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Final, get_args
 from warpchain.engine.tallies import LOST
 from warpchain.files import checked_output, make_folder, naming, remove_output
 from warpchain.inputs.validation import json_value, one_line, printable
-from warpchain.pictures.labels import cell_table
-from warpchain.pictures.walk_shape import Kind
+from warpchain.pictures.labels import Kind, cell_table
 from warpchain.walks.landmarks import FAULTS
 from warpchain.walks.walk_result import WalkResult, load_walk
 

@@ -132,7 +132,7 @@ def plot(
     from warpchain.cli.output import draw_figures, saved
     from warpchain.files import make_folder
     from warpchain.inputs.validation import InputError, printable
-    from warpchain.pictures.walk_shape import kinds_of
+    from warpchain.pictures.labels import kinds_of
     from warpchain.reports.sweep_figures import figures
     from warpchain.walks.walk_result import WalkResult
 

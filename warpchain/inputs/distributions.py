@@ -122,9 +122,9 @@ def _below(end: float) -> float:
 
 TABLE: Final[Mapping[str, Distribution]] = {
     **{
-        name: Gaussian(None, quantity.sigma, field_bounds(FIELDS[name]))
-        for name, quantity in Parameters.quantities().items()
-        if quantity.sigma > 0
+        name: Gaussian(None, q.sigma, field_bounds(FIELDS[name]))
+        for name, q in Parameters.quantities().items()
+        if q.sigma
     },
     "phase": Uniform(0.0, 1.0, field_bounds(FIELDS["phase"])),
     "clearance": Uniform(0.005, 0.015, field_bounds(FIELDS["clearance"])),  # m

@@ -25,8 +25,9 @@ from warpchain.files import checked_output, replacing, write_whole
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.validation import checked
 from warpchain.pictures import chain
+from warpchain.pictures.chain import center_in_room, checked_joints
+from warpchain.pictures.labels import Walk, headline
 from warpchain.pictures.style import BLUE, GROUND, INK, tidy
-from warpchain.pictures.walk_shape import Walk, center_in_room, checked_joints, headline
 
 WIDTH, TALLEST = 960, 560
 """Greatest width and height of a picture [pixels]."""

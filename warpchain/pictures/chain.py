@@ -1,7 +1,8 @@
 """A chain in the room and what is around it, as a viewer far away sees them.
 
 A view is a matrix of three orthogonal unit vectors, shape (3, 3): what points to the right in the picture, what points
-up, and what points towards the viewer.
+up, and what points towards the viewer. Room axes are X forward, Y up and Z = X × Y, to the right of the way the chain
+walks.
 """
 
 from typing import Any, Final
@@ -16,12 +17,33 @@ from matplotlib.patches import Circle, Patch, Polygon
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.scene import link_values
 from warpchain.inputs.sprocket_motion import sprocket_places
+from warpchain.pictures.labels import Walk
 from warpchain.pictures.style import DASHES, FAINT, GROUND, INK
-from warpchain.pictures.walk_shape import Walk
 
 SIDE: Final = np.eye(3)
 ABOVE: Final = np.eye(3)[[0, 2, 1]]
 """Its upper axis is z, which such a viewer sees grow downwards: invert it."""
+
+
+def checked_joints(walk: Walk) -> Array:
+    """The joints of a walk in the room [m], shape (f, n, 3); z = 0 if its plane is fixed.
+
+    A `ValueError` says that the walk has no frames or broken ones.
+    """
+    if len(walk.frame_time) == 0:
+        never = f"it was not released. {walk.status.sentence}"
+        remedy = "run it again with a frame_interval" if len(walk.time) else never
+        raise ValueError(f"walk: it has no frames; {remedy}")
+    in_room = walk.joints_in_room
+    joints = np.insert(walk.frame_joints, 2, 0.0, axis=2) if in_room is None else np.asarray(in_room)
+    if not np.all(np.isfinite(joints)):
+        raise ValueError(f"walk: its frames are not all finite numbers. {walk.status.sentence}")
+    return joints
+
+
+def center_in_room(walk: Walk) -> Array:
+    """Centre of mass x, y, z [m], shape (t, 3); z = 0 if the plane is fixed."""
+    return np.column_stack([walk.center, np.zeros(len(walk.time)) if walk.joints_in_room is None else walk.center_z])
 
 
 def circle_radii(walk: Walk) -> Array:

@@ -137,7 +137,19 @@ def _panels(cells: "CellStatistics", x: str | None, block: str) -> Iterator[Pane
     given = zip(cells.axes.items(), rising, strict=True)
     axes = [Axis(name, tuple(values[order].tolist()), numeric[name]) for (name, values), order in given]
     several = [axis for axis in axes if len(axis.values) > 1]
-    is_map, across, along, others = _roles(several, x)
+
+    def fit(axis: Axis) -> tuple[bool, bool, bool, int]:
+        is_frequency = axis.name == "frequency" and len(axis.values) > 2
+        return axis.name == x, axis.is_numeric, is_frequency, len(axis.values)
+
+    across = max(reversed(several), key=fit)
+    rest = [axis for axis in several if axis is not across]
+    rest.sort(key=lambda axis: len(axis.values))
+    along = rest.pop() if rest else None
+    is_map = along is not None and min(len(along.values), len(across.values)) > MOST_LINES
+    if along is not None and len(along.values) > MOST_LINES and not is_map and x is None:  # beside a short axis
+        across, along = along, across
+    others = [axis for axis in several if axis in rest]
     order = [several.index(axis) for axis in (*others, along, across) if axis is not None]
 
     def arranged(table: AnyArray) -> AnyArray:
@@ -153,23 +165,6 @@ def _panels(cells: "CellStatistics", x: str | None, block: str) -> Iterator[Pane
         title = ", ".join([*[block] * bool(block), *(own[number] for own, number in zip(texts, place, strict=True))])
         here: dict[str, Any] = {name: table[place] for name, table in tables.items()}
         yield Panel(is_map, across, along, title, replace(cells, **here))
-
-
-def _roles(axes: Sequence[Axis], x: str | None) -> tuple[bool, Axis, Axis | None, list[Axis]]:
-    """What the axes of a grid become: whether it is a map, x axis, lines or rows, panels."""
-
-    def fit(axis: Axis) -> tuple[bool, bool, bool, int]:
-        is_frequency = axis.name == "frequency" and len(axis.values) > 2
-        return axis.name == x, axis.is_numeric, is_frequency, len(axis.values)
-
-    across = max(reversed(axes), key=fit)
-    others = [axis for axis in axes if axis is not across]
-    others.sort(key=lambda axis: len(axis.values))
-    along = others.pop() if others else None
-    is_map = along is not None and min(len(along.values), len(across.values)) > MOST_LINES
-    if along is not None and len(along.values) > MOST_LINES and not is_map and x is None:  # beside a short axis
-        across, along = along, across
-    return is_map, across, along, [axis for axis in axes if axis in others]
 
 
 def _palettes(panels: Sequence[Panel]) -> dict[str, dict[Any, str]]:

@@ -1,7 +1,8 @@
-"""Texts on figures and in tables: numbers, units, quantities, cells, and walks that are in no mean."""
+"""Texts on figures and in tables: numbers, units, quantities, cells, walks that are in no mean; kinds and titles."""
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,14 @@ from warpchain.inputs.validation import DIMENSIONLESS, FIELDS, SECTION_OF, field
 
 if TYPE_CHECKING:
     from warpchain.store.cell_statistics import CellStatistics
+    from warpchain.walks.walk_result import WalkResult
+
+    Walk = WalkResult
+else:
+    Walk = object
+
+Kind = Literal["film_strip", "height_and_speed", "loop", "energy", "tilt"]
+"""Figures of a walk; `tilt` only of one whose plane tilts."""
 
 _SYMBOLS: Final = {"dx": "Δx", "links": "n", "frequency": "ν"}
 """The paper's symbols of what is not in Table 1."""
@@ -126,3 +135,19 @@ def lost_note(cells: Sequence[Mapping[str, Any]]) -> str:
     walks = sum(counts.values())
     texts = {"failed": "walks failed", "absent": "have none", "missing": "not run yet"}
     return ", ".join(f"{counts[name]} of {walks} {text}" for name, text in texts.items() if counts[name])
+
+
+def kinds_of(walk: Walk) -> tuple[Kind, ...]:
+    """The figures that a walk has, if it was recorded."""
+    kinds: tuple[Kind, ...] = get_args(Kind)
+    return tuple(kind for kind in kinds if kind != "tilt" or walk.joints_in_room is not None)
+
+
+def setting(walk: Walk) -> str:
+    """Links and frequency, as a title."""
+    return walk.setup.described.replace(" at ", ", ", 1)
+
+
+def headline(walk: Walk) -> str:
+    """Links, frequency and, if it came to rest, how far it walked."""
+    return setting(walk) + (f": Δx = {walk.dx:.3f} m" if math.isfinite(walk.dx) else "")

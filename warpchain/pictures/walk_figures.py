@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from warpchain.inputs.arrays import Array
 from warpchain.loop.stationary_loop import StationaryLoop
 from warpchain.pictures import chain
+from warpchain.pictures.chain import center_in_room, checked_joints
+from warpchain.pictures.labels import Kind, Walk, setting
 from warpchain.pictures.style import BLUE, DASHES, DOTS, FAINT, GREEN, GROUND, INK, RED, InlineFigure, tidy
-from warpchain.pictures.walk_shape import Kind, Walk, center_in_room, checked_joints, setting
 from warpchain.status import Status
 
 FALLEN: Final = 45.0

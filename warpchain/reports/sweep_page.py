@@ -33,7 +33,6 @@ from warpchain.walks.walk_result import WalkResult
 _MOST_LISTED: Final = 100
 """Greatest number of walks with the same status or fault that are listed one by one."""
 
-
 _PAGE: Final = Path(__file__).with_name("sweep_page.html").read_text(encoding="utf-8")
 """The page, whose policy makes the browser refuse to load anything; `write_report` fills in the double braces."""
 _HEAD: Final = _PAGE[: _PAGE.index('<meta name="viewport"')].encode()
@@ -85,21 +84,16 @@ def write_report(folder: AnyPath, path: AnyPath, *, animation_of: int | None = N
             anchor = heading.lower().replace(" ", "-")
             links.append(f'<a href="#{anchor}">{heading}</a>')
             parts.append(f'<section id="{anchor}"><h2>{heading}</h2>\n{text}\n</section>')
-    content = {"title": escape(result.name), "numbers": _tiles(result)}
-    content |= {"links": " ".join(links), "sections": "\n".join(parts)}
-    write_whole(path, re.sub(r"{{(\w+)}}", lambda found: content[found[1]], _PAGE), REPORTS)
-
-
-def _tiles(result: SweepResult) -> str:
-    """The numbers at the top of the page; those that need attention stand out."""
-    good = {status.label for status in Status if status.ok} | {"walks", "missing"}
-    counts = {"walks": result.walk_count}
-    counts |= {label: count for label, count in result.summary().items() if count}
-    counts |= {"inaccurate": result.inaccurate_count} if result.inaccurate_count else {}
-    return "".join(
+    good = {status.label for status in Status if status.ok} | {"walks", "missing"}  # the others stand out
+    counts = {"walks": result.walk_count, **result.summary(), "inaccurate": result.inaccurate_count}
+    boxes = [
         f'<div class="{"" if label in good else "bad"}"><dt>{label.replace("_", " ")}</dt><dd>{count:,}</dd></div>'
         for label, count in counts.items()
-    )
+        if count or label == "walks"
+    ]
+    content = {"title": escape(result.name), "numbers": "".join(boxes)}
+    content |= {"links": " ".join(links), "sections": "\n".join(parts)}
+    write_whole(path, re.sub(r"{{(\w+)}}", lambda found: content[found[1]], _PAGE), REPORTS)
 
 
 def _cells(result: SweepResult) -> str:
@@ -145,7 +139,6 @@ def _walk(result: SweepResult, index: int, device: str | None) -> str:
     planned, frames = block.origin.planned(index), block.origin.recording.frames
     cell = cell_values(block.axes, place[:-1])
     names = [f"block {block.name}"] * (len(result.blocks) > 1) + [cell_text(cell)] * bool(cell)
-    names += [f"sample {place[-1]}"]
     if frames is not None and frames.includes(planned.sample) and block.kept[place]:
         walk, again, source = block.walk_motion(place), "", "Its frames were kept by the sweep."
     else:
@@ -153,7 +146,7 @@ def _walk(result: SweepResult, index: int, device: str | None) -> str:
         again, source = ", run again for this page", _compared(walk, block, place)
     distance = f"Δx = {walk.dx:.4f} m in {walk.walk_time:.2f} s with {walk.bounces} bounce{'s' * (walk.bounces != 1)}"
     end = distance if math.isfinite(walk.dx) else walk.status.label
-    text = f"Walk {index} ({', '.join(names)}){again}: {end}. {source}"
+    text = f"Walk {index} ({', '.join([*names, f'sample {place[-1]}'])}){again}: {end}. {source}"
     parts = [f"<p>{escape(text)}</p>", _player(walk)]
     if len(walk.frame_time) and np.isfinite(walk.frame_joints).all():
         caption = "Height and speed of the centre of mass, as in the paper's Figure 5."

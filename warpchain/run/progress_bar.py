@@ -86,10 +86,9 @@ def progress_text(progress: SweepProgress) -> str:
     """How far a sweep is, in one line."""
     if progress.compiling:
         return COMPILING
-    left = ""
+    rate = f"{progress.rate:.2f} a second"
     if progress.rate > 0:  # else no walk is over yet
-        left = f"   {timedelta(seconds=round((progress.walks - progress.done) / progress.rate))} left"
-    rate = f"{progress.rate:.2f} a second{left}"
+        rate += f"   {timedelta(seconds=round((progress.walks - progress.done) / progress.rate))} left"
     bar = f"[{'#' * (10 * progress.done // progress.walks):10}]"
     return f"{bar} {progress.done:,} of {progress.walks:,} walks   {rate}   {counts_text(progress)}"
 

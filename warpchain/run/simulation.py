@@ -112,7 +112,16 @@ def simulate(
     for name in _UNSOFTENED:
         if getattr(options, name):
             raise InputError(f"options.{name}: only a walk has phases in which joints soften; leave it out")
-    state = _checked_state(parameters, position, velocity)
+    if not isinstance(parameters, State):
+        state = State.of_links(position, velocity, parameters)
+    elif position is not None or velocity is not None:
+        raise InputError("position: given together with a state, which has positions and velocities; leave them out")
+    elif parameters.axes is not None:
+        raise InputError("parameters: the plane of this state tilts, which simulate does not do; give walk(start=…) it")
+    elif parameters.memory and parameters.memory["state/softness"] > 0:
+        raise InputError("parameters: joints of this state are softened, as only a walk goes on; give walk(start=…) it")
+    else:
+        state = parameters
     scene = state.setup.scene
     if floor is not None:
         given = {"floor": "flat" if isinstance(floor, bool) else floor, "slope": 0.0}
@@ -133,19 +142,6 @@ def simulate(
         batch.set_up(0, setup)
         batch.load(0, state.position, state.velocity, stop_time=instants[0], stop_status=Status.FINISHED)
         return _follow(batch, "none" if floor is False else setup.floor.body, instants, end)
-
-
-def _checked_state(given: State | Parameters | str, position: Array | None, velocity: Array | None) -> State:
-    """The state of the chain, or an `InputError`."""
-    if not isinstance(given, State):
-        return State.of_links(position, velocity, given)
-    if position is not None or velocity is not None:
-        raise InputError("position: given together with a state, which has positions and velocities; leave them out")
-    if given.axes is not None:
-        raise InputError("parameters: the plane of this state tilts, which simulate does not do; give walk(start=…) it")
-    if given.memory and given.memory["state/softness"] > 0:
-        raise InputError("parameters: joints of this state are softened, as only a walk goes on; give walk(start=…) it")
-    return given
 
 
 class Chains:

@@ -200,12 +200,9 @@ class BlockResult:
         walk = run_walk(self.setup_at(place), seed=self.origin.seed, **recording)  # type: ignore[arg-type]
         dx, number = self.columns["dx"][place], self.columns["index"][place]
         if self.is_there[place] and not self.has_same(walk, place):
-            warnings.warn(
-                f"walk {number}: Δx is {walk.dx:g} m, and {dx:g} m in the sweep; it is repeated to the bit by the "
-                "version that ran it, on the same kind of processor",
-                InputWarning,
-                stacklevel=2,
-            )
+            problem = f"walk {number}: Δx is {walk.dx:g} m, and {dx:g} m in the sweep"
+            remedy = "it is repeated to the bit by the version that ran it, on the same kind of processor"
+            warnings.warn(f"{problem}; {remedy}", InputWarning, stacklevel=2)
         return walk
 
     def has_same(self, walk: WalkResult, place: tuple[int, ...]) -> bool:
@@ -220,13 +217,16 @@ class BlockResult:
             samples = ", ".join(map(str, kept[:12]))
             remedy = f"give one of the samples {samples}" if samples else "a sweep with record: {series: true} keeps it"
             raise InputError(f"the motion of walk {self.columns['index'][place]} is not there; {remedy}")
-        values = {name: column[place] for name, column in self.columns.items()}
+        numbers: dict[str, Any] = {}
+        for name, column in rows.STORED_COLUMNS.items():
+            owner = numbers.setdefault(column.path[0], {}) if column.path[1:] else numbers
+            owner[column.path[-1]] = self.columns[name][place].item()
         setup = self.setup_at(place)
         at = [int(np.ravel_multi_index(place, self.shape))]
         (motion,) = (read_motion(group, setup.scene.links) for _, group in self.kept_motions(at))
         return WalkResult(
-            status=Status(int(values["status"])),
-            **rows.numbers_of(values),
+            status=Status(int(self.columns["status"][place])),
+            **numbers,
             **motion,
             wall_time=math.nan,
             setup=setup,

@@ -85,9 +85,20 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         lock = _locked(path)
         try:
             manifest = _prepared(path, sweep, Manifest(sweep, shard_size, part), fresh)
-            folder = cls(path, manifest, lock, np.zeros(len(manifest.keys), bool))
-            folder._check()
-            folder._describe()
+            damaged: dict[str, str] = {}
+            rows, _ = read_rows(path, manifest, damaged)
+            found = np.concatenate([block["status"].ravel() for block in rows]) != MISSING
+            folder = cls(path, manifest, lock, found)
+            for name, problem in damaged.items():
+                remove_output(path / "shards" / name)
+                folder.log(f"{problem}; deleted, its walks are computed again")
+                warnings.warn(f"{problem}; its walks are computed again", InputWarning, stacklevel=3)
+            if read_manifest(path).sweep.digest() != manifest.sweep.digest():
+                remove_output(path / "sweep.yaml")  # which is never older than sweep.h5
+                write_whole(path / "sweep.h5", manifest.image())
+            if not (path / "sweep.yaml").exists():
+                text = yaml.safe_dump(manifest.sweep.canonical(), sort_keys=False, allow_unicode=True)
+                write_whole(path / "sweep.yaml", _YAML_HEAD + text)
         except BaseException as error:
             if is_new and isinstance(error, InputError):
                 (path / "lock").unlink(missing_ok=True)
@@ -114,26 +125,6 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
     def __exit__(self, *problem: object) -> None:
         """Close."""
         self.close()
-
-    def _check(self) -> None:
-        """Refuse a folder with foreign shards, delete damaged ones, and note which walks are there."""
-        damaged: dict[str, str] = {}
-        rows, _ = read_rows(self.directory, self.manifest, damaged)
-        self.found[:] = np.concatenate([block["status"].ravel() for block in rows]) != MISSING
-        for name, problem in damaged.items():
-            remove_output(self.directory / "shards" / name)
-            self.log(f"{problem}; deleted, its walks are computed again")
-            warnings.warn(f"{problem}; its walks are computed again", InputWarning, stacklevel=4)
-
-    def _describe(self) -> None:
-        """Write what the folder says of its sweep, if that is new; sweep.yaml is never older than sweep.h5."""
-        description = self.directory / "sweep.yaml"
-        if read_manifest(self.directory).sweep.digest() != self.manifest.sweep.digest():
-            remove_output(description)
-            write_whole(self.directory / "sweep.h5", self.manifest.image())
-        if not description.exists():
-            text = yaml.safe_dump(self.manifest.sweep.canonical(), sort_keys=False, allow_unicode=True)
-            write_whole(description, _YAML_HEAD + text)
 
 
 def read_rows(

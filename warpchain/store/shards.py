@@ -31,6 +31,7 @@ from warpchain.hdf5_files import hdf5_image, open_regular, reading_hdf5
 from warpchain.inputs.validation import InputError
 from warpchain.sweeps.designs import EXTENSIBLE
 from warpchain.sweeps.plan import Sweep
+from warpchain.sweeps.sweep_file import read_sweep
 from warpchain.version import NUMERICS_VERSION, package_versions
 from warpchain.walks.rows import KEYS, MISSING, Rows, row_type
 from warpchain.walks.walk_result import write_motion
@@ -45,6 +46,9 @@ OWN: Final = ("sweep.h5", "sweep.yaml", "shards", "log.txt")
 EARLIER: Final = "sweep.json"
 """What earlier versions have there instead of sweep.h5."""
 MANIFEST: Final = "warpchain sweep"
+KIND: Final = "warpchain shard"
+_NAME: Final = re.compile(r"\d{6,}\.h5")
+FOREIGN: Final = "a shard of another sweep; move it out of this folder"
 
 FIRST_SHARDS: Final = 32
 """Most walks in each of the first four shards."""
@@ -143,7 +147,7 @@ def _bounds(walks: int, most: int) -> list[int]:
 def stored_sweep(path: AnyPath, content: Mapping[str, object]) -> Sweep:
     """The sweep in a file of results, given its canonical form; an `InputError` if this warpchain refuses it."""
     try:
-        return Sweep.of(content)
+        return Sweep(*read_sweep(content))
     except InputError as error:
         problem = error.args[0].partition("; ")[0]
         raise InputError(f"{path}: {problem}; read it with the version that wrote it") from None
@@ -167,11 +171,6 @@ def read_manifest(directory: AnyPath) -> Manifest:
             int(file.attrs["numerics_version"]),
             json.loads(file.attrs["versions"]),
         )
-
-
-KIND: Final = "warpchain shard"
-_NAME: Final = re.compile(r"\d{6,}\.h5")
-FOREIGN: Final = "a shard of another sweep; move it out of this folder"
 
 
 def stamp(directory: AnyPath) -> str:

@@ -243,9 +243,7 @@ def _load_merged(path: AnyPath) -> SweepResult:
         return _result(sweep, provenance, groups, motions)
 
 
-def _result(
-    sweep: Sweep, provenance: dict[str, Any], stored: Sequence[Any], motions: Sequence[AnyArray]
-) -> SweepResult:
+def _result(sweep: Sweep, provenance: dict[str, Any], stored: Sequence[Any], motions: Sequence[Any]) -> SweepResult:
     """A result, given for each block what has its stored columns by name, and its motions, both in any shape."""
     blocks = {}
     for number, block in enumerate(sweep.blocks):
@@ -298,12 +296,9 @@ def merge(sources: AnyPath | Sequence[AnyPath], path: AnyPath) -> None:
         whole = replace(whole, blocks=blocks)
     write_whole(target, hdf5_image(KIND, partial(_fill, whole=whole)), _MERGED)
     if missing := whole.missing_count:
-        warnings.warn(
-            f"{path}: {missing:,} of {whole.walk_count:,} walks are missing; merge again with all parts, once they "
-            "have run",
-            InputWarning,
-            stacklevel=2,
-        )
+        problem = f"{missing:,} of {whole.walk_count:,} walks are missing"
+        remedy = "merge again with all parts, once they have run"
+        warnings.warn(f"{path}: {problem}; {remedy}", InputWarning, stacklevel=2)
 
 
 def _is_merged(path: Path) -> bool:
@@ -334,12 +329,11 @@ def _fill(file: "h5py.File", whole: SweepResult) -> None:
 
 
 def _put(group: "h5py.Group", name: str, values: AnyArray, notes: Mapping[str, Any], dims: Sequence[str]) -> None:
-    """Write a variable along some axes, or one of the axes."""
+    """Write a variable along some axes, or one of the axes; each is closed here, on which bytes depend."""
     if values.dtype.kind == "b":  # NetCDF has no truth values; xarray's way to write them
         values, notes = values.astype(np.int8), {**notes, "dtype": "bool"}
-    if values.dtype.kind == "U":
-        values = values.astype(object)
-    dataset = group.create_dataset(name, data=values, **({"compression": "gzip", "shuffle": True} if dims else {}))
+    data = values.astype(object) if values.dtype.kind == "U" else values
+    dataset = group.create_dataset(name, data=data, **({"compression": "gzip", "shuffle": True} if dims else {}))
     dataset.attrs.update(notes)
     if not dims:
         dataset.make_scale(name)

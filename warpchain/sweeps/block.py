@@ -113,7 +113,6 @@ class Block:
         """The `fixed` setups of some cells; those that are alike in a section share its checked values."""
         sections = self.sections
         axes = self.axes | {name: tuple(values.values()) for name, values in self.named.items()}
-
         kept = lru_cache(2**14)  # more than an axis has values
         scene = kept(lambda at: validated(Scene, {**sections["scene"], **dict(at)}, "scene"))
         options = kept(lambda plane, at: options_beside(plane, {**sections["options"], **dict(at)}))

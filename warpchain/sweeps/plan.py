@@ -74,11 +74,6 @@ class Sweep:
     blocks: tuple[Block, ...]
     recording: Recording
 
-    @classmethod
-    def of(cls, source: "AnyPath | Mapping[str, object]", **replaced: object) -> "Sweep":
-        """The sweep of a file, or of the content of one, whose cells were checked before, see `read_sweep`."""
-        return cls(*read_sweep(source, **replaced))
-
     @cached_property
     def walk_count(self) -> int:
         """Number of walks."""
@@ -113,19 +108,15 @@ class Sweep:
         """Walks without their draws, which take most of the time; options and number of links never depend on them."""
         before: tuple[int, Cell] | None = None
         for index in map(int, indices):
-            number, cell, sample = self._located(index)
+            sample, place = divmod(index, self.blocks[0].stride)
+            number = bisect.bisect_right(self.blocks, place, key=lambda block: block.first_cell) - 1
+            block = self.blocks[number]
+            if not 0 <= sample < block.samples:
+                raise IndexError(f"walk {index} of a sweep of {self.walk_count} walks")
+            cell = tuple(map(int, np.unravel_index(place - block.first_cell, block.shape[:-1])))
             if (number, cell) != before:
-                before, fixed = (number, cell), self.blocks[number].fixed(cell)
+                before, fixed = (number, cell), block.fixed(cell)
             yield PlannedWalk(index, number, cell, sample, fixed, {})
-
-    def _located(self, index: int) -> tuple[int, Cell, int]:
-        """Number of a walk's block, its cell and its sample."""
-        sample, cell = divmod(index, self.blocks[0].stride)
-        number = bisect.bisect_right(self.blocks, cell, key=lambda block: block.first_cell) - 1
-        block = self.blocks[number]
-        if not 0 <= sample < block.samples:
-            raise IndexError(f"walk {index} of a sweep of {self.walk_count} walks")
-        return number, tuple(map(int, np.unravel_index(cell - block.first_cell, block.shape[:-1]))), sample
 
     def keep(self, walk: PlannedWalk) -> Keep:
         """What is kept of the motion of a walk."""
@@ -162,9 +153,7 @@ class Sweep:
         for name in Options.model_fields:
             here, there = getattr(first, name), getattr(options, name)
             if here != there and name not in block.varied:
-                raise InputError(
-                    f"{block.path}.grid: {name} is {here!r} in one cell, {there!r} in another; give each a block"
-                )
+                raise InputError(f"{block.path}.grid: {name} is {here!r} in one cell, {there!r} in another; use blocks")
         for name, choice in self.recording.choices.items():
             choice.steps(options, f"sweep.record.{name}")
 
@@ -175,7 +164,11 @@ class Sweep:
 
         The designed ones are tried first, then random ones; if all are impossible, an `InputError` says so.
         """
-        stream = self._stream(block, cell)
+        number = 0  # of the cell's random stream among those of the block
+        for (name, values), place in zip(block.axes.items(), cell, strict=True):
+            if name not in self.same_samples_along:
+                number = number * len(values) + place
+        stream = block.first_stream + number
         rng, problem = random_generator(self.seed, stream, row), ""
         makers: list[Callable[[], Point]] = [lambda: draw(laws, rng)] * DRAW_LIMIT
         if designed:
@@ -192,14 +185,6 @@ class Sweep:
             except InputError as error:
                 problem = str(error)
         raise InputError(f"{block.path}.distributions: {DRAW_LIMIT} samples made no possible walk; the last: {problem}")
-
-    def _stream(self, block: Block, cell: Cell) -> int:
-        """Number of a cell's random stream, through all blocks; axes in `same_samples_along` do not count."""
-        number = 0
-        for (name, values), place in zip(block.axes.items(), cell, strict=True):
-            if name not in self.same_samples_along:
-                number = number * len(values) + place
-        return block.first_stream + number
 
     def canonical(self) -> dict[str, Any]:
         """The sweep as JSON-able content of a file, with every default and range written out."""
@@ -250,6 +235,6 @@ def load_sweep(source: Source, **replaced: object) -> Sweep:
     """
     if isinstance(source, Sweep) and not replaced:
         return source
-    sweep = Sweep.of(source.canonical() if isinstance(source, Sweep) else source, **replaced)
+    sweep = Sweep(*read_sweep(source.canonical() if isinstance(source, Sweep) else source, **replaced))
     sweep.check()
     return sweep

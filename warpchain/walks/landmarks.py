@@ -16,7 +16,6 @@ from warpchain.inputs.arrays import Array
 from warpchain.inputs.floor import slope_points
 from warpchain.inputs.scene import link_values
 from warpchain.inputs.setup import Setup
-from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError
 from warpchain.kernels import layout
 
@@ -27,7 +26,7 @@ RELEASE: Final = {
     "height": "height of the joints' outline, in their plane",
     "lowest": "y of the lowest point of all circles",
 }
-"""Keys of `WalkResult.release`, see `at_release`."""
+"""Keys of `WalkResult.release`."""
 PAUSE: Final = 0.01
 """A floor impulse so long [s] after the one before begins a new bounce, as kernels count them."""
 SLIDES: Final = 1e-6
@@ -51,13 +50,6 @@ FAULTS: Final = {
 """Faults of a walk, each with what it means and what to try."""
 LENGTHS: Final = ("link_length", "circle_radius", "link_radii", "charm_radius")
 """Quantities against which openings and penetrations are held."""
-
-
-def at_release(sample: Array) -> dict[str, Any]:
-    """Fields of a `WalkResult` out of the first sample of a walk."""
-    columns = [layout.CENTER_X, layout.CENTER_Y, layout.WIDTH, layout.HEIGHT, layout.LOWEST]
-    release = dict(zip(RELEASE, sample[columns].tolist(), strict=True))
-    return {"release": release, "release_speed": float(sample[layout.LOOP_SPEED])}
 
 
 def bounces(time: Array, velocity: Array, setup: Setup) -> dict[str, Array]:
@@ -130,14 +122,6 @@ def state_of_plane(plane: Array) -> dict[str, Array]:
     return {"origin": origin, "axes": frame_axes(plane[None])[0], "plane_rates": plane[:3]}
 
 
-def plane_of_state(state: State) -> Array:
-    """The plane of a state, (PLANE_VALUES,), which must have one."""
-    assert state.origin is not None and state.axes is not None and state.plane_rates is not None
-    first, second = state.axes
-    axes = np.stack([first, second, np.cross(first, second)])  # the plane's axes along axis 0
-    return np.concatenate([state.plane_rates, axes[:, 0], axes[:, 1], state.origin])
-
-
 def energy_error(at_release: ArrayLike, residual: ArrayLike) -> NDArray[np.float64]:
     """Size of the energy unaccounted for [J], relative to kinetic and potential energy at release; NaN before it."""
     energy = np.asarray(at_release, np.float64)
@@ -156,8 +140,5 @@ def faults(energy_error: Any, opening: Any, penetration: Any, lengths: Mapping[s
     """
     link_length, circle_radius, link_radii, charm_radius = (lengths[name] for name in LENGTHS)
     radius = np.minimum(charm_radius, np.where(np.isinf(link_radii), circle_radius, link_radii))
-    return {
-        "energy": energy_error > MOST_ENERGY_ERROR,
-        "opening": opening > link_length,
-        "penetration": penetration > radius,
-    }
+    found = energy_error > MOST_ENERGY_ERROR, opening > link_length, penetration > radius
+    return dict(zip(FAULTS, found, strict=True))

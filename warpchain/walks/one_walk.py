@@ -35,12 +35,11 @@ def run_walk(
     """Run a walk whose setup is complete, samples drawn; the seed is only noted. The rest is as of `warpchain.walk`."""
     interval: float | None = checked(frame_interval, "frame_interval", _INTERVAL | None, "s")
     before: float | None = checked(record_before, "record_before", _BEFORE | None, "s")
-    if interval is None and before:
-        raise InputError("record_before: a time is given, but frame_interval is None; give a frame_interval as well")
+    if interval is None and (before or record_loads):
+        name = "record_before" if before else "record_loads"
+        raise InputError(f"{name}: kept with frames, but frame_interval is None; give a frame_interval as well")
     if record_loads:
         check_has_joint_forces(setup.options)
-        if interval is None:
-            raise InputError("record_loads: loads are kept with frames, but frame_interval is None; give one")
     samples = 0.0 if interval is None else interval / setup.options.record_interval
     keep = Keep(
         series_every=1,
@@ -49,7 +48,6 @@ def run_walk(
         loads=record_loads,
         before=(RECORD_BEFORE if before is None and interval is not None else before or 0.0) * setup.has_drive,
     )
-
     report = on_progress or (lambda progress: None)
     with gpu_turn([setup.options.device]):
         report(Progress("compile", 0.0, 0.0, 0))

@@ -97,15 +97,6 @@ def fill_row(row: Any, outcome: Mapping[str, Any], drawn: Mapping[str, float]) -
         row[drawn_column(name)] = value
 
 
-def numbers_of(values: Mapping[str, Any]) -> dict[str, Any]:
-    """The fields of a `WalkResult` in the columns of one walk, those apart that are no columns."""
-    found: dict[str, Any] = {}
-    for name, column in STORED_COLUMNS.items():
-        owner = found.setdefault(column.path[0], {}) if column.path[1:] else found
-        owner[column.path[-1]] = values[name].item()
-    return found
-
-
 def derived_columns(columns: Columns) -> dict[str, NDArray[np.float64]]:
     """The columns that are computed from others."""
     at_release = columns["energy_kinetic_at_release"] + columns["energy_potential_at_release"]

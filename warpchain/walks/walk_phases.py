@@ -30,7 +30,7 @@ from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.status import Status
 from warpchain.walks.drive import drive_of
-from warpchain.walks.landmarks import angles, at_release, plane_of_state, released_plane, state_of_plane
+from warpchain.walks.landmarks import RELEASE, angles, released_plane, state_of_plane
 from warpchain.walks.motion import NOTHING, Keep
 from warpchain.walks.recorder import Recorder
 
@@ -127,7 +127,14 @@ class WalkRun:
                 batch.set_state(world, first_area=area)
                 batch.resume(world, self._walk_end, Status.TIME_LIMIT)
         elif not setup.has_drive:
-            self._release(*self._ellipse())
+            scene, length = setup.scene, setup.parameters.link_length
+            speed = 2 * math.pi * scene.frequency * joint_radius(scene, setup.parameters)
+            try:
+                laid = lay_chain(ellipse(scene.ellipse_aspect), scene.links, length, speed, scene.phase)
+            except ValueError:
+                problem = f"too far from 1 for {scene.links} links; give one closer to it"
+                raise InputError(f"scene.ellipse_aspect: {problem}") from None
+            self._release(*laid)
         else:
             hanging = math.nan
             (position, velocity), drive = drive_of(setup, self._links)
@@ -160,15 +167,6 @@ class WalkRun:
                 batch.resume(world, self._walk_end, Status.TIME_LIMIT)
         self.is_free = True
         yield features["free"]
-
-    def _ellipse(self) -> tuple[Array, Array]:
-        """Position and velocity (n, 3) of a chain that starts as an ellipse."""
-        scene, length = self.setup.scene, self.setup.parameters.link_length
-        speed = 2 * math.pi * scene.frequency * joint_radius(scene, self.setup.parameters)
-        try:
-            return lay_chain(ellipse(scene.ellipse_aspect), scene.links, length, speed, scene.phase)
-        except ValueError:
-            raise InputError(f"scene.ellipse_aspect: too far from 1 for {scene.links} links; give another") from None
 
     @property
     def counts(self) -> dict[str, int]:
@@ -258,6 +256,8 @@ class WalkRun:
         extremes = dict(zip(EXTREMES, greatest.tolist(), strict=True))
         is_at_rest = self.status == Status.AT_REST
         first, last = self._batch.first_sample(self._world), self._batch.last_sample(self._world)
+        released = first if self._released else np.full_like(first, np.nan)
+        columns = [layout.CENTER_X, layout.CENTER_Y, layout.WIDTH, layout.HEIGHT, layout.LOWEST]
         # Δx is x of the centre of mass, because the sprocket's centre is at x = 0; on a slope, along the floor
         return {
             "status": self.status,
@@ -279,7 +279,8 @@ class WalkRun:
             **self._ending("strands_met_at", "strands_met", layout.STRANDS_MET_AT),
             **self._ending("collapsed_at", "collapse", layout.COLLAPSED_AT),
             "sprocket_height": self.raised if self._has_sprocket else math.nan,
-            **at_release(first if self._released else np.full_like(first, np.nan)),
+            "release": dict(zip(RELEASE, released[columns].tolist(), strict=True)),
+            "release_speed": float(released[layout.LOOP_SPEED]),
         }
 
     def drain(self) -> None:
@@ -313,23 +314,21 @@ class WalkRun:
         restore(batch, world, {name: part for name, part in memory.items() if is_kept or name not in CACHES})
         batch.set_state(world, next_frame=np.floor(start.time / interval) if interval > 0 else -1)
         batch.set_drive(world, farthest=self._farthest)
-        if is_kept and self._is_at(start):
+        here = {"position": batch.position(world), "velocity": batch.velocity(world)}
+        here |= state_of_plane(batch.plane(world)) if self._tilts else {}
+        is_there = all(values.tobytes() == getattr(start, name).tobytes() for name, values in here.items())
+        if is_kept and is_there:  # to the bit
             batch.resume(world, self._walk_end, Status.TIME_LIMIT)
             self.recorder.go_on(memory["state/last_sample"], start.time)
             return None
         if self._tilts:
-            batch.set_plane(world, plane_of_state(start))
+            assert start.origin is not None and start.axes is not None and start.plane_rates is not None
+            e1, e2 = start.axes
+            axes = np.stack([e1, e2, np.cross(e1, e2)])  # the plane's along axis 0
+            batch.set_plane(world, np.concatenate([start.plane_rates, axes[:, 0], axes[:, 1], start.origin]))
         change(batch, world, start.position, start.velocity)
         batch.resume(world, batch.time(world), Status.FINISHED)
         return float(memory["state/first_area"])
-
-    def _is_at(self, start: State) -> bool:
-        """Whether the world has the places and velocities of a state, to the bit."""
-        batch, world = self._batch, self._world
-        here = {"position": batch.position(world), "velocity": batch.velocity(world)}
-        if self._tilts:
-            here |= state_of_plane(batch.plane(world))
-        return all(values.tobytes() == getattr(start, name).tobytes() for name, values in here.items())
 
     def _raise(self, position: Array, clearance: float) -> float:
         """How far a chain at this position must be raised to a clearance [m]."""

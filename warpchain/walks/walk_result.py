@@ -29,7 +29,7 @@ from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError, json_value, validated
 from warpchain.kernels import layout
 from warpchain.loop.stationary_loop import BEFORE, FIELDS, BeforeRelease
-from warpchain.pictures.walk_shape import Kind
+from warpchain.pictures.labels import Kind
 from warpchain.status import Status
 from warpchain.walks.landmarks import FAULTS, LENGTHS, MOST_ENERGY_ERROR, RELEASE, bounces, energy_error, faults, least
 
