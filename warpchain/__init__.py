@@ -56,23 +56,19 @@ if TYPE_CHECKING:
 
 __version__ = _version.VERSION
 
-_HOMES = {
-    "Chains": "run.simulation",
-    "InputError": "inputs.validation",
-    "Parameters": "inputs.parameters",
-    "State": "inputs.state",
-    "Status": "status",
-    "SweepResult": "store.sweep_result",
-    "Trajectory": "run.simulation",
-    "WalkResult": "walks.walk_result",
+_NAMES = {
     "films": "films",
-    "load": "store.sweep_result",
-    "load_walk": "walks.walk_result",
-    "preset": "inputs.parameters",
-    "simulate": "run.simulation",
-    "sweep": "run.sweep_run",
-    "walk": "run.single_walk",
+    "inputs.parameters": "Parameters preset",
+    "inputs.state": "State",
+    "inputs.validation": "InputError",
+    "run.simulation": "Chains Trajectory simulate",
+    "run.single_walk": "walk",
+    "run.sweep_run": "sweep",
+    "status": "Status",
+    "store.sweep_result": "SweepResult load",
+    "walks.walk_result": "WalkResult load_walk",
 }
+_HOMES = {name: home for home, names in _NAMES.items() for name in names.split()}
 
 __all__ = [*_HOMES]
 

@@ -15,8 +15,9 @@ import stat
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final, Literal, NamedTuple
 
+AnyPath = str | os.PathLike[str]
 DISK_FAILURES: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
 """Numbers (errno) of an `OSError` that no other path or permission would have avoided."""
 
@@ -32,24 +33,17 @@ class Kind(NamedTuple):
     has: Callable[[Path], bool]
 
 
-def failure(number: int, text: str) -> OSError:
-    """An `OSError` that reads as the text and has the number of its cause, an errno."""
-    error = OSError(text)
-    error.errno = number
-    return error
-
-
-def given_path(path: str | os.PathLike[str]) -> Path:
+def given_path(path: AnyPath) -> Path:
     """A path as a user gave it; an `OSError` if it is none, or empty, which `Path` takes for the current folder."""
     text = os.fspath(path)
     if not text:
-        raise failure(errno.ENOENT, "a path is empty; name a file or folder")
+        raise OSError("a path is empty; name a file or folder")
     if re.search("[\0\ud800-\udc7f\udd00-\udfff]", text):
-        raise failure(errno.EINVAL, f"{ascii(text)[:100]}: has a NUL or a lone surrogate; leave it out")
+        raise OSError(f"{ascii(text)[:100]}: has a NUL or a lone surrogate; leave it out")
     return Path(path)
 
 
-def checked_output(path: str | os.PathLike[str], only: Kind | None = None) -> Path:
+def checked_output(path: AnyPath, only: Kind | None = None) -> Path:
     """The path, if a file may be written there; everything that writes files for a user asks here.
 
     Replaced may be any regular file, or `only` one of a kind; a `NotReplaceable` says that something else is there. An
@@ -71,7 +65,7 @@ def checked_output(path: str | os.PathLike[str], only: Kind | None = None) -> Pa
 
 
 @contextmanager
-def replacing(path: str | os.PathLike[str], only: Kind | None = None) -> Iterator[Path]:
+def replacing(path: AnyPath, only: Kind | None = None) -> Iterator[Path]:
     """Yield the path of an empty part beside `path`, which becomes `path` if the block ends without an error.
 
     The data reach the disk before the part is renamed. So `path` is at any moment, even after a power cut, either the
@@ -103,14 +97,14 @@ def replacing(path: str | os.PathLike[str], only: Kind | None = None) -> Iterato
         os.close(descriptor)
 
 
-def write_whole(path: str | os.PathLike[str], content: bytes | str, only: Kind | None = None) -> None:
+def write_whole(path: AnyPath, content: bytes | str, only: Kind | None = None) -> None:
     """Write a file, see `replacing`; text in UTF-8."""
     data = content.encode() if isinstance(content, str) else content
     with replacing(path, only) as part:
         part.write_bytes(data)
 
 
-def remove_output(path: str | os.PathLike[str]) -> None:
+def remove_output(path: AnyPath) -> None:
     """Delete a file that a new one would replace; nothing if there is none. Errors as of `checked_output`."""
     target = checked_output(path)
     with naming(target):
@@ -124,14 +118,17 @@ def make_folder(folder: Path) -> None:
 
 
 @contextmanager
-def naming(target: Path) -> Iterator[None]:
-    """Turn an `OSError` of the `with` block into one of one line that names a file and what to do."""
+def naming(target: AnyPath, verb: Literal["written", "read"] = "written") -> Iterator[None]:
+    """Turn an `OSError` of the `with` block into one of its class in one line, which names a file and what to do."""
     try:
         yield
     except OSError as error:
         number = error.errno or errno.EIO  # without a number: a library that writes a format failed
-        remedy = _REMEDIES.get(number, "see to the disk")
-        raise failure(number, f"{target}: cannot be written ({reason(error)}); {remedy}") from error
+        remedy = _REMEDIES.get(number, "see to the disk") if verb == "written" else "give the path of a readable file"
+        reason = os.strerror(error.errno) if error.errno else " ".join(str(error).split())  # HDF5 has a paragraph
+        problem = type(error)(f"{target}: cannot be {verb} ({reason}); {remedy}")
+        problem.errno = number
+        raise problem from error
 
 
 _REMEDIES: Final = {
@@ -141,15 +138,3 @@ _REMEDIES: Final = {
     errno.ENAMETOOLONG: "give a shorter path",
 }
 """Errno with which the system refuses to write → what to do."""
-
-
-def reason(error: OSError) -> str:
-    """The system's short text for an error; HDF5 hides it in a paragraph."""
-    return os.strerror(error.errno) if error.errno else " ".join(str(error).split())
-
-
-def unreadable(path: str | os.PathLike[str], error: OSError) -> OSError:
-    """One line for what the system refused to read, of the same class."""
-    problem = type(error)(f"{path}: cannot be read ({reason(error)}); give the path of a readable file")
-    problem.errno = error.errno
-    return problem

@@ -21,9 +21,9 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Final, get_args
 
 import numpy as np
 
-from warpchain.files import unreadable
+from warpchain.files import AnyPath, naming
 from warpchain.inputs.validation import DamagedFileError, InputError
-from warpchain.version import FORMAT_VERSION, version_refusal
+from warpchain.version import FORMAT_VERSION
 
 if TYPE_CHECKING:
     import h5py
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 _SIGNATURE: Final = b"\x89HDF\r\n\x1a\n"
 _LINE: Final = "\nwarpchain SHA-256: {}\n"
 _LINE_LENGTH: Final = len(_LINE.format("0" * 64))
-_PIECE: Final = 2**20
 _FIXED: Final[dict[str, Any]] = {"libver": ("v108", "v108"), "track_order": True}
 """Version bounds without which equal content would not give equal bytes; they also leave out times."""
 
@@ -58,10 +57,6 @@ class Stored:
         sizes = self.shape.split()
         shape = f"{self.meaning}, shape ({', '.join(sizes)}{',' * (len(sizes) == 1)})"
         return f"{shape}; none {self.empty}" if self.empty else shape
-
-    def sizes(self, named: Mapping[str, int]) -> tuple[int, ...]:
-        """The shape as numbers, given what its letters stand for."""
-        return tuple(named[size] if size in named else int(size) for size in self.shape.split())
 
     def path(self, name: str) -> str:
         """Where a file keeps the field of this name."""
@@ -101,6 +96,7 @@ def put(group: "h5py.Group", path: str, value: Any, unit: str, meaning: str) -> 
 def read_fields(group: "h5py.Group", kept: Mapping[str, Stored], links: int) -> dict[str, Any]:
     """What `write_fields` wrote; arrays of floats come back in double precision."""
     values: dict[str, Any] = {}
+    sizes = {"t": 0, "f": 0, "n": links, "2": 2, "3": 3}
     for name, stored in kept.items():
         path = stored.path(name)
         if stored.keys:
@@ -110,7 +106,7 @@ def read_fields(group: "h5py.Group", kept: Mapping[str, Stored], links: int) -> 
         elif path in group:
             values[name] = group[path][()].astype(np.float64)
         else:
-            values[name] = np.empty(stored.sizes({"t": 0, "f": 0, "n": links}))
+            values[name] = np.empty([sizes[size] for size in stored.shape.split()])
     return values
 
 
@@ -131,9 +127,7 @@ def hdf5_image(kind: str, fill: "Callable[[h5py.File], None]") -> bytes:
 
 
 @contextmanager
-def reading_hdf5(
-    path: str | os.PathLike[str], kind: str | None, remedy: str, wanted: str | None = None
-) -> "Iterator[h5py.File]":
+def reading_hdf5(path: AnyPath, kind: str | None, remedy: str, wanted: str | None = None) -> "Iterator[h5py.File]":
     """An HDF5 file that `hdf5_image` made, undamaged and of a kind, or of any if that is None.
 
     The remedy says what to do about a damaged or an older file; `wanted`, which file to give instead of one of another
@@ -146,56 +140,46 @@ def reading_hdf5(
     """
     import h5py
 
-    _compare(path, remedy, wanted)
+    with open_regular(path) as content, naming(path, "read"):
+        head = content.read(len(_SIGNATURE))
+        left = content.seek(0, os.SEEK_END) - _LINE_LENGTH
+        content.seek(max(0, left))
+        end = content.read()
+        content.seek(0)
+        digest = hashlib.sha256()
+        while left > 0 and (piece := content.read(min(left, 2**20))):
+            digest.update(piece)
+            left -= len(piece)
+    if end != _LINE.format(digest.hexdigest()).encode():
+        if wanted and head != _SIGNATURE and b"warpchain SHA-256: " not in end:
+            raise InputError(f"{path}: not an HDF5 file; {wanted}")
+        raise DamagedFileError(f"{path}: damaged, cut short or of an earlier warpchain; {remedy}")
     with h5py.File(path, "r", locking=False) as file:
-        if kind is not None and file.attrs["format"] != kind:
-            raise InputError(
-                f"{path}: a {file.attrs['format']}, not a {kind}; {wanted or 'move it out of this folder'}"
-            )
-        if refusal := version_refusal(int(file.attrs["format_version"]), remedy):
-            raise InputError(f"{path}: {refusal}")
+        if kind is not None and (found := file.attrs["format"]) != kind:
+            raise InputError(f"{path}: a {found}, not a {kind}; {wanted or 'move it out of this folder'}")
+        if (version := int(file.attrs["format_version"])) != FORMAT_VERSION:
+            later = f", but this warpchain reads {FORMAT_VERSION}; update warpchain"
+            earlier = f" of an earlier warpchain, which reads it; {remedy}"
+            raise InputError(f"{path}: format version {version}{later if version > FORMAT_VERSION else earlier}")
         yield file
 
 
-def kind_of_hdf5(path: str | os.PathLike[str], wanted: str) -> str:
+def kind_of_hdf5(path: AnyPath, wanted: str) -> str:
     """The kind of an HDF5 file that `hdf5_image` made; errors as of `reading_hdf5`."""
     with reading_hdf5(path, None, "fetch another copy of it", wanted) as file:
         return str(file.attrs["format"])
 
 
-def _compare(path: str | os.PathLike[str], remedy: str, wanted: str | None) -> None:
-    """Compare the checksum of a file; errors as of `reading_hdf5`."""
-    with open_regular(path) as file:
-        try:
-            head = file.read(len(_SIGNATURE))
-            left = file.seek(0, os.SEEK_END) - _LINE_LENGTH
-            file.seek(max(0, left))
-            end = file.read()
-            file.seek(0)
-            digest = hashlib.sha256()
-            while left > 0 and (piece := file.read(min(left, _PIECE))):
-                digest.update(piece)
-                left -= len(piece)
-        except OSError as error:
-            raise unreadable(path, error) from error
-    if end == _LINE.format(digest.hexdigest()).encode():
-        return
-    if wanted and head != _SIGNATURE and b"warpchain SHA-256: " not in end:
-        raise InputError(f"{path}: not an HDF5 file; {wanted}")
-    raise DamagedFileError(f"{path}: damaged, cut short or of an earlier warpchain; {remedy}")
-
-
-def open_regular(path: str | os.PathLike[str]) -> BinaryIO:
+def open_regular(path: AnyPath) -> BinaryIO:
     """A file, open for reading; an `OSError` of one line names one that cannot be read.
 
     Opening a pipe or a device does not wait: what is no regular file is refused by an `InputError`.
     """
     try:
-        file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK))
+        with naming(path, "read"):
+            file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK))
     except IsADirectoryError:
         raise InputError(f"{path}: is a folder, not a file; give another path") from None
-    except OSError as error:
-        raise unreadable(path, error) from error
     if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
         file.close()
         raise InputError(f"{path}: a pipe or a device, not a file; give another path")

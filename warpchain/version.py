@@ -15,12 +15,3 @@ def package_versions() -> dict[str, str]:
     from importlib.metadata import version  # takes longer to import than the package does
 
     return {"warpchain": VERSION, **{name: version(name) for name in ("warp-lang", "numpy")}}
-
-
-def version_refusal(found: int, remedy: str) -> str | None:
-    """Why a file of a format version is refused, with the remedy for an older one; None if it is this warpchain's."""
-    if found == FORMAT_VERSION:
-        return None
-    if found > FORMAT_VERSION:
-        return f"format version {found}, but this warpchain reads {FORMAT_VERSION}; update warpchain"
-    return f"format version {found} of an earlier warpchain, which reads it; {remedy}"

@@ -8,7 +8,7 @@ import pytest
 from tests.oracle_model import motion_equations
 from tests.support.command_line import Command
 from tests.support.presets import PAPER
-from warpchain.bench import measurements, numpy_model
+from warpchain.bench import measurements
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels.methods.method import method_names
 from warpchain.run.simulation import simulate
@@ -22,7 +22,7 @@ def test_the_model_is_that_of_the_tests(links: int) -> None:
     position += 1e-5 * generator.normal(size=position.shape)
     velocity += generator.normal(size=velocity.shape)
     expected = motion_equations.acceleration(position, velocity, PAPER)
-    found = numpy_model.acceleration(position, velocity, PAPER)
+    found = measurements.acceleration(position, velocity, PAPER)
     assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()
 
 

@@ -11,9 +11,9 @@ from tests.support.command_line import Command
 from tests.support.made_sweeps import make_sweep
 from tests.support.made_walks import make_walk
 from tests.support.sweep_content import content
-from warpchain.cli.terminal import print_sweep
+from warpchain.cli.output import print_sweep
 from warpchain.inputs.yaml_files import parse_yaml
-from warpchain.sweeps.shipped import shipped_sweeps
+from warpchain.sweeps.sweep_file import shipped_sweeps
 
 ESCAPE = "\x1b]0;owned\x07\x1b[2J"
 
@@ -25,7 +25,6 @@ REFUSED = {
     "walk -o new --device cuda:98": "options.device: there is no cuda:98 on this machine",
     "walk --config nowhere.yaml": "nowhere.yaml: No such file",
     "walk --frobnicate": "No such option: --frobnicate; see warpchain walk --help",
-    "walk --animate walk.gif": "No such option: --animate; give -o DIR, then run `warpchain animate DIR`",
     "walk extra": "Got unexpected extra argument(s) (extra); see warpchain walk --help",
     "walk -o walk.h5": "walk.h5: cannot be written (Not a directory); give a folder that is there",
     f"walk -o {'x' * 300}": "xxx",
@@ -44,13 +43,13 @@ REFUSED = {
     "sweep figure6": "--output: missing; give a folder for the results with -o DIR",
     "sweep x -o new": f"x: neither a file nor a shipped sweep; give one of {', '.join(shipped_sweeps())}",
     "sweep tiny.yaml -o new --device cuda:98": "options.device: there is no cuda:98 on this machine",  # started early
-    "sweep --new no/new.yaml": "--new: no/new.yaml: cannot be written (No such file or directory); give",
+    "sweep --new no/new.yaml": "no/new.yaml: cannot be written (No such file or directory); give",
     "sweep --new new.yaml -o new": "--new: given together with other arguments; leave them out",
     "sweep --new new.yaml --seed 0": "--new: given together with other arguments; leave them out",
     "sweep tiny.yaml -o new --gpus 2 --workers 3": "--workers: given together with --gpus; leave one out",
     "sweep tiny.yaml -o new --gpus 2 --device cpu": "--device: cpu is given together with --gpus; give cuda",
     "bench --links 61": "bench.links: 61 is odd",
-    "bench --device cuda:99 --links 2000": "bench.links: 2000 links are more than a GPU's block has threads",
+    "bench --device cuda:99 --links 2000": "bench.links: 2000 are too many for a GPU; give 1024 or less",
 }
 """Arguments → how the line of refusal begins."""
 HOSTILE = [

@@ -26,7 +26,8 @@ def test_without_a_terminal_lines_of_progress_are_printed(
         lines = [line for line in told.splitlines() if " of 80 walks" in line]
         assert bool(lines) == (every == 0.0)
     assert (
-        lines[-1].startswith("[##########] 80 of 80 walks   ") and " a second   0 s left   80 time_limit" in lines[-1]
+        lines[-1].startswith("[##########] 80 of 80 walks   ")
+        and " a second   0:00:00 left   80 time_limit" in lines[-1]
     )
 
 

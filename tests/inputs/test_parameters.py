@@ -75,7 +75,7 @@ def test_contact_and_pitch_radius() -> None:
     assert joint_radius(contact, parameters) == pytest.approx(5.98e-2, rel=1e-14)
     assert contact_radius(pitch, parameters) == pytest.approx(5.14e-2, rel=1e-14)
     small = parameters.with_values({"sprocket_radius": 4.2e-3})
-    with pytest.raises(InputError, match=r"^parameters\.sprocket_radius: 0\.0042 is not greater"):
+    with pytest.raises(InputError, match=r"^parameters\.sprocket_radius: 0\.0042 is too small"):
         check_scene(pitch, small)
     check_scene(contact, small)
     check_scene(Scene(sprocket_radius_is="pitch", start="ellipse"), small)

@@ -14,9 +14,8 @@ import pytest
 
 import warpchain
 from tests.support.setups import setup_walk
-from warpchain.inputs.sections import SECTION_OF, SECTIONS
-from warpchain.inputs.setup import resolve
-from warpchain.inputs.validation import LONGEST_LINE, InputError, field_limits
+from warpchain.inputs.setup import SECTIONS, resolve
+from warpchain.inputs.validation import LONGEST_LINE, SECTION_OF, InputError, field_limits
 from warpchain.inputs.yaml_files import LARGEST_FILE, read_yaml
 from warpchain.kernels.methods.method import find_method, method_names
 from warpchain.sweeps.plan import load_sweep
@@ -89,25 +88,25 @@ STILL = [0.1, 0, 0, 0]
         ({"slope": 5.0, "floor": STEP}, "scene.slope: 5.0 of a floor that is a profile; give slope: 0, or floor: flat"),
         ({"slope": 5.0, "plane": "tilting"}, "scene.plane: 'tilting' needs a flat floor; give plane: fixed, or "),
         ({"floor": STEP, "plane": "tilting"}, "scene.plane: 'tilting' needs a flat floor; give plane: fixed, or "),
-        ({"method": "hybrid", "plane": "tilting"}, "options.method: 'hybrid' keeps the plane of a chain fixed; give "),
+        ({"method": "hybrid", "plane": "tilting"}, "options.method: 'hybrid' keeps planes fixed; give "),
         ({"method": "hybird"}, "options.method: 'hybird' is unknown; did you mean hybrid?"),
         ({"device": "gpu"}, "options.device: 'gpu' is no device; give cpu, cuda or cuda:N"),
-        ({"contact_step": 1e-13}, "options.smallest_step: 1e-12 is not smaller than contact_step 1e-13 s; "),
+        ({"contact_step": 1e-13}, "options.smallest_step: 1e-12 s is not below contact_step; give less"),
         (
             {"circle_radius": 0.007},
-            "parameters.circle_radius: 0.007 is not smaller than half the link length 0.00634; ",
+            "parameters.circle_radius: 0.007 is not below half a link, 0.00634; give less",
         ),
-        ({"ell": 12.68, "r": 5e-3}, "parameters.link_length: 12.68 m is 1000 times Table 1's; give 0.01268"),
-        ({"m_inner": 3.7}, "parameters.inner_mass: 3.7 kg is 1000 times Table 1's; give 0.0037"),
+        ({"ell": 12.68, "r": 5e-3}, "parameters.link_length: 1000 times Table 1's; give 0.01268 m"),
+        ({"m_inner": 3.7}, "parameters.inner_mass: 1000 times Table 1's; give 0.0037 kg"),
         # links that are unlike
-        ({"links": 61}, "scene.links: 61 is odd; inner and outer links alternate: give "),
-        ({"links": 61, "start": "ellipse"}, "scene.links: 61 is odd; inner and outer links alternate: give "),
+        ({"links": 61}, "scene.links: 61 is odd; give an even number, or link_masses and "),
+        ({"links": 61, "start": "ellipse"}, "scene.links: 61 is odd; give an even number, or link_masses and "),
         ({"charm_link": 60}, "scene.charm_link: 60 is not among 60 links; give 0 to 59"),
         ({"stiff_joint": 60}, "scene.stiff_joint: 60 is not among 60 links; give 0 to 59"),
         ({"link_masses": [1.0, 2.0]}, "scene.link_masses: 2 numbers for 60 links; give one for each"),
         ({"link_masses": [0.0] * 60}, "scene.link_masses[0]: 0 is too little; give more"),
-        ({"link_radii": [4e-3] * 59 + [0.02]}, "scene.link_radii[59]: 0.02 is not smaller than half the link length "),
-        ({"charm_radius": 0.02, "start": "ellipse"}, "scene.charm_radius: 0.02 is not smaller than half the link "),
+        ({"link_radii": [4e-3] * 59 + [0.02]}, "scene.link_radii[59]: 0.02 is not below half a link, 0.00634; give "),
+        ({"charm_radius": 0.02, "start": "ellipse"}, "scene.charm_radius: 0.02 is not below half a link, 0.00634; "),
         ({"link_inertias": {7: 1e-7}}, "scene.link_inertias: Input should be a valid list, in kg m²; given "),
         ({"coulomb_frictions": [-1.0] * 60}, "scene.coulomb_frictions[0]: Input should be greater than or equal to 0"),
         ({"mass_gradient": 1.0}, "scene.mass_gradient: Input should be less than 1; given 1.0"),

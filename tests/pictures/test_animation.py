@@ -115,9 +115,9 @@ def test_a_film_that_was_not_written_to_its_end_is_not_kept(
     ("name", "settings", "message"),
     [
         ("walk.avi", {}, "unknown kind of picture"),
-        ("walk.gif", {"fps": 0}, "fps: 0 is not a positive number"),
-        ("walk.html", {"slow": math.inf}, "slow: inf is not a positive number"),
-        ("walk.gif", {"fps": 51}, "fps: 51 is too fast for a GIF"),
+        ("walk.gif", {"fps": 0}, "fps: Input should be greater than or equal to 1; given 0"),
+        ("walk.html", {"slow": math.inf}, "slow: Input should be a finite number; given inf"),
+        ("walk.gif", {"fps": 51}, "fps: Input should be less than or equal to 50; given 51"),
         ("walk.gif", {"slow": 1e4}, "pictures are too many for a GIF"),
         ("walk.gif", {"walk": make_unreleased()}, "no frames; it was not released"),
         ("walk.gif", {"walk": make_walk(frame_joints=np.full((41, 30, 2), math.nan))}, "not all finite numbers"),

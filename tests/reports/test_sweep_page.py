@@ -95,7 +95,7 @@ def with_walk(monkeypatch: pytest.MonkeyPatch, made: Callable[..., WalkResult], 
     """Let run_walk give a made-up walk; the setups it is asked for."""
     asked: list[Any] = []
 
-    def run_walk(setup: Any, *, frame_interval: float) -> WalkResult:
+    def run_walk(setup: Any, *, frame_interval: float, **more: Any) -> WalkResult:
         assert frame_interval > 0
         asked.append(setup)
         return made(**changes)

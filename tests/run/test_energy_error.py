@@ -10,14 +10,14 @@ import pytest
 
 from tests.support.command_line import Command
 from tests.support.made_walks import make_unreleased, make_walk
-from warpchain.cli.terminal import print_walk
+from warpchain.cli.output import print_walk
 from warpchain.engine.tallies import CONTACTS
 from warpchain.inputs.scene import link_values
 from warpchain.run.progress_bar import SweepProgress
 from warpchain.run.sweep_run import sweep
 from warpchain.store.sweep_result import load
 from warpchain.sweeps.plan import load_sweep
-from warpchain.walks.faults import ENERGY_REMEDY, FAULTS, LENGTHS
+from warpchain.walks.landmarks import ENERGY_REMEDY, FAULTS, LENGTHS
 from warpchain.walks.rows import faults_of_columns
 
 COARSE = {

@@ -13,8 +13,8 @@ import warpchain
 from tests.support.sweep_content import content
 from warpchain.inputs.validation import FIELDS, InputError
 from warpchain.run.sweep_run import sweep_of_keywords
-from warpchain.store.merged_file import merge
-from warpchain.sweeps.axes import is_axis
+from warpchain.store.sweep_result import merge
+from warpchain.sweeps.block import is_axis
 from warpchain.sweeps.plan import load_sweep
 
 STEP = [[-1, 0], [0.1, 0], [0.1, -0.05], [1, -0.05]]
@@ -98,7 +98,10 @@ def test_a_mapping_that_a_field_takes_is_its_value(monkeypatch: pytest.MonkeyPat
         ({"floor": {"back": [[0, 0], [-1, 0]]}}, r"floor\.back: point 1 lies behind the one before it; .*"),
         ({"floor": {"a step": STEP}}, r"floor\.'a step': String should match pattern .*"),
         ({"floor": NAMED, "slope": [0, 5]}, r"slope\[1\]: 5\.0 of a floor that is a profile; .*"),
-        ({"links": [4], "link_radii": {"wide": [4e-3, 7e-3] * 2}}, r"link_radii\.wide\[1\]: 0\.007 is not smaller .*"),
+        (
+            {"links": [4], "link_radii": {"wide": [4e-3, 7e-3] * 2}},
+            r"link_radii\.wide\[1\]: 0\.007 is not below half a link, .*",
+        ),
         (
             {"release": {"lift": [[0.1, 0, 0.02, 0]]}},
             r"release\.lift: a motion of the sprocket, which start: ellipse .*",

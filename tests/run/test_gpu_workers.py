@@ -13,10 +13,9 @@ import yaml
 
 from tests.run.test_sweep_run import TINY, data_of
 from tests.support.command_line import Command
-from warpchain.run.gpu_workers import gpu_workers
+from warpchain.run.gpu_workers import LostWorkersError, gpu_workers
 from warpchain.run.progress_bar import SweepProgress
 from warpchain.run.sweep_run import sweep
-from warpchain.run.workers import LostWorkersError
 
 GPU_OF_WORKER = "__import__('time').sleep(0.5) or __import__('os').environ['CUDA_VISIBLE_DEVICES']"
 """Takes a while, so that other workers have to take the next ones; text, for workers cannot import tests."""
@@ -86,8 +85,6 @@ def test_a_worker_that_is_killed_ends_the_sweep_in_one_line(tmp_path: Path) -> N
 
 PARENT = """
 import sys
-from warpchain.run.gpu_workers import gpu_workers
-from warpchain.run.sweep_run import sweep
 
 if __name__ == "__main__":
     with gpu_workers(2) as executor:

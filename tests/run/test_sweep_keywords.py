@@ -108,7 +108,7 @@ def test_parameter_sets(tmp_path):
     lines = refused(points={"mu_fc": [0.1, 0.2], "R": [0.05]}, mu_fc=0.2, samples=1, out=tmp_path)
     assert lines == ["sweep.points.floor_friction: also given in parameters; leave one out"]
     lines = refused(points={"mu_fc": [0.1, 0.2], "R": [0.05]}, samples=1, out=tmp_path)
-    assert lines[0].startswith("sweep.points.sprocket_radius: 1 values, but floor_friction has 2;")
+    assert lines[0].startswith("sweep.points.sprocket_radius: 1 values, not 2; give as many")
 
 
 def test_all_errors_are_told_at_once(tmp_path):
@@ -138,7 +138,7 @@ def test_all_errors_are_told_at_once(tmp_path):
     ("keywords", "begin"),
     [
         ({}, "sweep.samples: missing"),
-        ({"samples": 1, "grid": {"links": [28]}}, "sweep.grid.links[0]: 28 links of 0.01268 m do not reach round"),
+        ({"samples": 1, "grid": {"links": [28]}}, "sweep.grid.links[0]: 28 links do not reach round"),
         ({"samples": 1, "same_samples_along": ["links"]}, "sweep.same_samples_along: 'links' is no axis"),
         ({"preset": "soft", "links": 60, "source": {"version": 1}}, "preset, links: given together with a source"),
         ({"samples": 1, "start": ...}, "sweep.scene.start: Input should be"),

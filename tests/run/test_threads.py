@@ -14,7 +14,7 @@ import warpchain.run.sweep_run as runner
 from tests.run.test_sweep_run import TINY
 from warpchain.engine.devices import gpu_turn, has_gpu_turn
 from warpchain.run.sweep_run import run_shards, sweep
-from warpchain.store.manifest import Manifest
+from warpchain.store.shards import Manifest
 from warpchain.sweeps.plan import load_sweep
 
 
@@ -31,7 +31,7 @@ def test_threads_take_turns_on_a_gpu(monkeypatch: pytest.MonkeyPatch, device: st
         inside.pop()
         return []
 
-    shards = Manifest.of(planned, 8).wanted
+    shards = Manifest(planned, 8).wanted
     monkeypatch.setattr(runner, "compile_kernels", lambda setups: None)
     monkeypatch.setattr(runner, "run_setups", run_walks)
     with concurrent.futures.ThreadPoolExecutor(2) as pool:

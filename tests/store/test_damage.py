@@ -14,8 +14,7 @@ from tests.support.made_walks import make_walk
 from tests.support.synthetic_sweep import SWEEP, run
 from warpchain.inputs.validation import InputError
 from warpchain.store.folder import SweepFolder
-from warpchain.store.merged_file import merge
-from warpchain.store.sweep_result import load
+from warpchain.store.sweep_result import load, merge
 from warpchain.version import FORMAT_VERSION
 from warpchain.walks.walk_result import load_walk
 

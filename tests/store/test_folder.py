@@ -21,14 +21,13 @@ from tests.support.synthetic_sweep import LONG_SWEEP, SHARD_SIZE, SWEEP, content
 from warpchain.inputs.validation import InputError, InputWarning
 from warpchain.store import folder
 from warpchain.store.folder import SweepFolder
-from warpchain.store.manifest import Manifest
-from warpchain.store.shards import write_shard
+from warpchain.store.shards import Manifest, stamp, write_shard
 from warpchain.store.sweep_result import load
 from warpchain.sweeps.plan import Sweep
 from warpchain.version import NUMERICS_VERSION
 
 FIRST, SECOND = "000000.h5", "000001.h5"
-SHARDS = Manifest.of(SWEEP, SHARD_SIZE).wanted
+SHARDS = Manifest(SWEEP, SHARD_SIZE).wanted
 CHANGED = replace(SWEEP, seed=7, name="changed")
 
 
@@ -202,8 +201,8 @@ def test_a_sweep_that_is_refused_now_is_named(tmp_path: Path, monkeypatch: pytes
     content["blocks"][0]["options"]["method"] = "rodas5p"
     with monkeypatch.context() as patched:
         patched.setattr(Sweep, "canonical", lambda sweep: content)
-        path.write_bytes(Manifest.of(SWEEP, SHARD_SIZE).image())
-    with refused(InputError, tmp_path, f"{path}: sweep.blocks[0].options.method: 'rodas5p' was removed", "version"):
+        path.write_bytes(Manifest(SWEEP, SHARD_SIZE).image())
+    with refused(InputError, tmp_path, f"{path}: sweep.blocks[0].options.method: 'rodas5p' is unknown", "version"):
         load(tmp_path)
 
 
@@ -220,12 +219,12 @@ def test_workers_need_the_folder(tmp_path: Path) -> None:
     """A worker that does not see the folder, or finds another sweep in it, writes nothing."""
     rows, first = synthetic_rows(SWEEP, SHARDS[0]), SHARDS[0]
     with open_folder(tmp_path) as opened:
-        stamp = opened.stamp
+        seal = stamp(opened.directory)
     with refused(InputError, tmp_path, f"{tmp_path / 'elsewhere'}: no sweep", "every worker"):
-        write_shard(tmp_path / "elsewhere", stamp, first, rows, {})
+        write_shard(tmp_path / "elsewhere", seal, first, rows, {})
     open_folder(tmp_path, CHANGED, fresh=True).close()
     with refused(InputError, tmp_path, "belongs to another sweep now"):
-        write_shard(tmp_path, stamp, first, rows, {})
+        write_shard(tmp_path, seal, first, rows, {})
 
 
 # What the system refuses

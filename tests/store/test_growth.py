@@ -15,9 +15,8 @@ from tests.support.synthetic_sweep import run
 from warpchain.inputs.validation import InputError
 from warpchain.store import sweep_result
 from warpchain.store.folder import SweepFolder
-from warpchain.store.manifest import Manifest, read_manifest
-from warpchain.store.merged_file import merge
-from warpchain.store.sweep_result import SweepResult, load
+from warpchain.store.shards import Manifest, read_manifest
+from warpchain.store.sweep_result import SweepResult, load, merge
 from warpchain.sweeps.designs import EXTENSIBLE
 from warpchain.sweeps.plan import PlannedWalk, load_sweep
 
@@ -103,7 +102,7 @@ HYPERCUBE = content(samples=8, sampler="latin_hypercube")
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (HYPERCUBE, "but a latin_hypercube of 8 samples has other points; give samples: 4"),
+        (HYPERCUBE, "but a latin_hypercube does not grow; give samples: 4"),
         (
             content(samples=3),
             "holds 4 samples of each cell of block main, but 3 are asked for; give samples: 4 or more",

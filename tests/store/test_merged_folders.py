@@ -14,8 +14,7 @@ from tests.support.made_walks import assert_same
 from tests.support.sweep_content import blocks, content
 from warpchain.inputs.validation import InputError, InputWarning
 from warpchain.run.sweep_run import sweep
-from warpchain.store.merged_file import merge
-from warpchain.store.sweep_result import load
+from warpchain.store.sweep_result import load, merge
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import warpchain
 from tests.support.command_line import Command
 from warpchain import InputError, SweepResult, WalkResult
 from warpchain.inputs.validation import InputWarning
-from warpchain.store.merged_file import merge
+from warpchain.store.sweep_result import merge
 from warpchain.walks.rows import STORED_COLUMNS, fill_row, missing_rows, row_type
 
 SWEEP: dict[str, Any] = {
@@ -79,7 +79,7 @@ def test_a_walk_of_a_sweep_from_the_command_line(command: Command, folder: Path)
     [
         (["--like", "DIR"], "--like: DIR has many walks; give --index"),
         (["--like", "DIR", "--index", "9"], "index: the sweep has no walk 9"),
-        (["--like", "DIR", "--index", "one"], "index: 'one' is not the number of a walk"),
+        (["--like", "DIR", "--index", "one"], "index: Input should be a valid integer; given 'one'"),
         (["--index", "3"], "--index: names a walk of a sweep, but --like is missing"),
     ],
 )
@@ -102,7 +102,7 @@ def test_numbers_that_say_no_walk_are_refused(folder: Path) -> None:
         result.walk(0, frequency=3.0)
     with pytest.raises(InputError, match="sample: given together with index"):
         result.walk(0, sample=1)
-    with pytest.raises(InputError, match="index: True is not the number"):
+    with pytest.raises(InputError, match="index: Input should be a valid integer; given True"):
         result.walk(True)
 
 

@@ -13,9 +13,8 @@ from tests.support.synthetic_sweep import SHARD_SIZE, SWEEP, run, synthetic_rows
 from warpchain.inputs.validation import InputError, InputWarning
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
-from warpchain.store.manifest import Manifest
-from warpchain.store.merged_file import merge
-from warpchain.store.sweep_result import load
+from warpchain.store.shards import Manifest
+from warpchain.store.sweep_result import load, merge
 from warpchain.walks.rows import COLUMNS, STORED_COLUMNS, drawn_column
 from warpchain.walks.walk_result import load_walk
 
@@ -54,7 +53,7 @@ def test_arrays_have_named_axes(folder: Path) -> None:
     """Every walk is where block, cell and sample say, every column under its name and to the bit."""
     result = load(folder)
     assert result.name == "synthetic" and result.seed == SWEEP.seed and list(result.blocks) == ["rest", "ellipse"]
-    rows = np.concatenate([synthetic_rows(SWEEP, shard) for shard in Manifest.of(SWEEP, SHARD_SIZE).wanted])
+    rows = np.concatenate([synthetic_rows(SWEEP, shard) for shard in Manifest(SWEEP, SHARD_SIZE).wanted])
     rest, ellipse = result.blocks["rest"], result.blocks["ellipse"]
     assert rest.dims == ("links", "frequency", "sample") and rest.shape == rest.dx.shape == (3, 2, 20)
     assert ellipse.dims == ("gravity", "sample") and ellipse.shape == (5, 8)

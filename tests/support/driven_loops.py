@@ -42,11 +42,11 @@ def released_loop(preset: str = "soft", **settings: Any) -> Loop:
     run = WalkRun(batch, 0, setup)
     found: Loop | None = None
     for features in run.phases():
-        if run.phase == "walk":
+        if run.progress().phase == "walk":
             break
         batch.run([0], features)
         found = Loop(setup, batch.position(0), batch.velocity(0))
-    assert found is not None and run.phase == "walk", "it was not released"
+    assert found is not None and run.progress().phase == "walk", "it was not released"
     return found
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
-from warpchain.store.shards import write_shard
+from warpchain.store.shards import stamp, write_shard
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import PlannedWalk, load_sweep
 from warpchain.walks.rows import KEYS, Rows, missing_rows, quantity_of
@@ -108,5 +108,5 @@ def make_sweep(
                 if (given := outcomes[index]) is not None:
                     fill_row(walks[index], given, rows[row : row + 1], **columns(walks[index]))
             if outcomes[shard.walks[0]] is not None:
-                write_shard(store.directory, store.stamp, shard, rows, {})
+                write_shard(store.directory, stamp(store.directory), shard, rows, {})
     return load(folder)

@@ -70,7 +70,8 @@ def made_setup(**scene: Any) -> Setup:
 
 def _unset(links: int) -> dict[str, Any]:
     """Every number and array of a walk that has none of them."""
-    empty = {name: np.empty(stored.sizes({"t": 0, "f": 0, "n": links})) for name, stored in MOTION.items()}
+    sizes = {"t": 0, "f": 0, "n": links, "2": 2, "3": 3}
+    empty = {name: np.empty([sizes[size] for size in stored.shape.split()]) for name, stored in MOTION.items()}
     types = {item.name: get_args(item.type) for item in dataclasses.fields(WalkResult)}
     return empty | {name: -1 if types[name][0] is int else math.nan for name in NUMBERS}
 

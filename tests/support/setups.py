@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 
-from warpchain.inputs.sections import by_section
 from warpchain.inputs.setup import Setup, resolve
+from warpchain.inputs.validation import by_section
 
 
 def setup_walk(preset: str, settings: Mapping[str, object], seed: int | None = None) -> Setup:

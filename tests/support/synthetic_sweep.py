@@ -20,8 +20,7 @@ import numpy as np
 
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
-from warpchain.store.manifest import Shard
-from warpchain.store.shards import write_shard
+from warpchain.store.shards import Shard, stamp, write_shard
 from warpchain.store.sweep_result import load
 from warpchain.sweeps.plan import Sweep, load_sweep
 from warpchain.walks.rows import STORED_COLUMNS, Rows, missing_rows, quantity_of
@@ -77,7 +76,7 @@ def synthetic_rows(sweep: Sweep, shard: Shard) -> Rows:
 
 def write(store: SweepFolder, shard: Shard, rows: Rows) -> None:
     """Write a shard as a worker does."""
-    write_shard(store.directory, store.stamp, shard, rows, {})
+    write_shard(store.directory, stamp(store.directory), shard, rows, {})
 
 
 def run(directory: Path | str, sweep: Sweep = SWEEP, *, shard_size: int = SHARD_SIZE, **settings: Any) -> None:

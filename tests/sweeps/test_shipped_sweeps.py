@@ -9,8 +9,7 @@ import pytest
 from warpchain.inputs.validation import InputError
 from warpchain.inputs.yaml_files import parse_yaml, read_yaml
 from warpchain.sweeps.plan import load_sweep
-from warpchain.sweeps.shipped import shipped_sweeps, write_new_sweep
-from warpchain.sweeps.sweep_file import SweepFile
+from warpchain.sweeps.sweep_file import SweepFile, shipped_sweeps, write_new_sweep
 
 ROOT = Path(__file__).parents[2]
 SWEEPS = ROOT / "sweeps"

@@ -16,9 +16,6 @@ from typing import Final
 INTERRUPTED: Final = 130
 """Exit status of a command that Ctrl-C ended."""
 
-AGAIN: Final = 0.05
-"""Time [s] until an interrupt that was lost is raised once more."""
-
 
 @contextlib.contextmanager
 def interrupts_heard() -> Iterator[Callable[[], bool]]:
@@ -42,7 +39,7 @@ def interrupts_heard() -> Iterator[Callable[[], bool]]:
         if not issubclass(lost.exc_type, KeyboardInterrupt):
             usual_hook(lost)
             return
-        again = threading.Timer(AGAIN, _thread.interrupt_main)  # not in here, where it would be lost again
+        again = threading.Timer(0.05, _thread.interrupt_main)  # not in here, where it would be lost again
         again.daemon = True
         again.start()
 

@@ -15,8 +15,7 @@ from typing import Annotated, Any, Final, NoReturn
 
 import typer
 
-from warpchain.cli.bench_commands import bench
-from warpchain.cli.input_commands import parameters, schema
+from warpchain.cli.input_commands import bench, parameters, schema
 from warpchain.cli.interrupts import INTERRUPTED, interrupts_heard
 from warpchain.cli.sweep_commands import info, merge, plot, report, sweep
 from warpchain.cli.walk_commands import FAILED, animate, walk
@@ -25,9 +24,6 @@ from warpchain.version import VERSION
 
 REFUSED: Final = 2
 """Exit status beside `FAILED` and `INTERRUPTED`."""
-
-FORMER_OPTIONS: Final = {"--animate": "give -o DIR, then run `warpchain animate DIR`"}
-"""Options that were removed → what to do instead."""
 
 app = typer.Typer(pretty_exceptions_enable=False, rich_markup_mode=None)  # boxes of rich would double the time of help
 
@@ -55,14 +51,13 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 def _refuse_for(error: Exception) -> None:
     """Print what was refused or failed, and exit; return if the error is a defect of the program."""
     from warpchain.inputs.validation import DamagedFileError, InputError, one_line
-    from warpchain.run.workers import LostWorkersError
+    from warpchain.run.gpu_workers import LostWorkersError
 
     problems, status = [str(error)], REFUSED
     if isinstance(error, typer.TyperException):
         context = getattr(error, "ctx", None)
         command = context.command_path if context is not None else "warpchain"
-        remedy = FORMER_OPTIONS.get(getattr(error, "option_name", ""), f"see {command} --help")
-        problems, status = [f"{error.format_message().rstrip('.')}; {remedy}"], error.exit_code
+        problems, status = [f"{error.format_message().rstrip('.')}; see {command} --help"], error.exit_code
     elif isinstance(error, OSError):
         status = FAILED if error.errno in DISK_FAILURES else REFUSED
     elif isinstance(error, InputError):
@@ -94,20 +89,15 @@ def _warnings_on_one_line() -> Iterator[None]:
         yield
 
 
-def _print_version(wanted: bool) -> None:
-    if wanted:
-        print("warpchain", VERSION)
-        raise typer.Exit
-
-
 @app.callback(invoke_without_command=True)
 def _warpchain(
     context: typer.Context,
-    version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
-    ] = False,
+    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
 ) -> None:
     """Walking roller chains: a loop of chain, spun up on a sprocket, is dropped and walks away."""
+    if version:
+        print("warpchain", VERSION)
+        raise typer.Exit
     if context.invoked_subcommand is None:
         print(context.get_help())
 

@@ -1,18 +1,14 @@
 """The commands of the command line that are about sweeps: sweep, info, plot, report, merge."""
 
 import contextlib
-import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import Annotated, Final, Literal
 
 import typer
 
 from warpchain.cli.walk_commands import FAILED
 from warpchain.cli.words import JSON, argument, option, output, output_path
-
-if TYPE_CHECKING:
-    from warpchain.store.sweep_result import SweepResult
 
 _FILE: Final = "The sweep, or the bare name of one that comes with warpchain, such as figure6."
 _DEVICE: Final = "cpu, cuda (the first GPU) or cuda:N, instead of what the sweep says."
@@ -41,7 +37,7 @@ def sweep(
 ) -> None:
     """Run a sweep, or what is left of it: many walks over a grid."""
     from warpchain.inputs.validation import InputError, printable
-    from warpchain.sweeps.shipped import write_new_sweep
+    from warpchain.sweeps.sweep_file import write_new_sweep
 
     if new is not None:
         if any(value is not None and value is not False for name, value in context.params.items() if name != "new"):
@@ -57,17 +53,27 @@ def sweep(
         from warpchain.engine.devices import start_early
 
         start_early(device)
-    from warpchain.cli.terminal import print_sweep
+    from warpchain.cli.output import print_sweep
     from warpchain.run.gpu_workers import gpu_workers
     from warpchain.run.sweep_run import sweep as run
+    from warpchain.status import Status
 
     if gpus is not None:
+        from warpchain.engine.devices import gpu_count
+
         if workers is not None:
             raise InputError("--workers: given together with --gpus; leave one out")
         if device not in (None, "cuda"):
             raise InputError(f"--device: {device} is given together with --gpus; give cuda, or leave one out")
         device = "cuda"
-        _checked_gpus(gpus)
+        try:
+            there = gpu_count()
+        except InputError as error:
+            if not str(error).startswith("options.device"):
+                raise
+            raise InputError("--gpus: no GPU is found on this machine; leave it out to run on the CPU") from None
+        if gpus > there:
+            raise InputError(f"--gpus: {gpus} wanted, but this machine has {there}; give at most {there}")
     try:
         with contextlib.nullcontext() if gpus is None else gpu_workers(gpus) as executor:
             result = run(
@@ -85,7 +91,12 @@ def sweep(
         print(f"the same command{', without --fresh,' if fresh else ''} goes on with the sweep", file=sys.stderr)
         raise
     print_sweep(result, as_json)
-    _note_failures(result)
+    counts = result.summary()
+    failed = [status for status in Status if not status.ok and counts.get(status.label)]
+    for status in failed:
+        print(f"{counts[status.label]} {status.label}: {status.sentence}", file=sys.stderr)
+    if failed:
+        raise typer.Exit(FAILED)
 
 
 def info(
@@ -95,7 +106,7 @@ def info(
 
     Of a merged file the checksum is compared first.
     """
-    from warpchain.cli.terminal import print_sweep
+    from warpchain.cli.output import print_sweep
     from warpchain.store.sweep_result import load
 
     print_sweep(load(directory), as_json)
@@ -118,10 +129,10 @@ def plot(
     film_strip.png, height_and_speed.png, loop.png, energy.png and, if the plane tilts, tilt.png; a line says what is
     left out and why.
     """
-    from warpchain.cli.walk_files import draw_figures, saved
+    from warpchain.cli.output import draw_figures, saved
     from warpchain.files import make_folder
     from warpchain.inputs.validation import InputError, printable
-    from warpchain.pictures.walk_shape import kinds_of
+    from warpchain.pictures.labels import kinds_of
     from warpchain.reports.sweep_figures import figures
     from warpchain.walks.walk_result import WalkResult
 
@@ -131,7 +142,7 @@ def plot(
         raise InputError("--quantity: a saved walk has no columns; leave it out, or give the folder of a sweep")
     if kind is not None and not is_walk:
         raise InputError("--kind: a sweep has none; leave it out, or give the file of a saved walk")
-    folder = folder or (path.parent if os.path.isfile(path) else path)
+    folder = folder or (path.parent if path.is_file() else path)
     make_folder(folder)
     drawn = (
         draw_figures(found, folder, kinds_of(found) if kind is None else (kind,))
@@ -145,9 +156,7 @@ def plot(
         raise typer.Exit(FAILED)
     if not count:
         name = path if quantity is None else f"--quantity: {quantity}"
-        raise InputError(
-            f"{name}: no walk at rest has a value, or no axis has several values; give another --quantity, or see info"
-        )
+        raise InputError(f"{name}: no walk at rest has a value, or no axis has several; give another --quantity")
 
 
 def report(
@@ -170,7 +179,7 @@ def report(
 
     if device is not None and walk is None:
         raise InputError("--device: no walk is run for this page; add --walk INDEX, or leave it out")
-    path = path or (directory.parent if os.path.isfile(directory) else directory) / "report.html"
+    path = path or (directory.parent if directory.is_file() else directory) / "report.html"
     write_report(directory, path, animation_of=walk, device=device)
     print(printable(str(path)))
 
@@ -181,34 +190,7 @@ def merge(
 ) -> None:
     """Put the results of a folder, or of all parts of a sweep, into one file, which xarray opens."""
     from warpchain.inputs.validation import printable
-    from warpchain.store.merged_file import merge as merge_shards
+    from warpchain.store.sweep_result import merge as merge_shards
 
     merge_shards(directories, path)
     print(printable(str(path)))
-
-
-def _checked_gpus(wanted: int) -> None:
-    """Check that this machine has so many GPUs; else an `InputError`."""
-    from warpchain.engine.devices import gpu_count
-    from warpchain.inputs.validation import InputError
-
-    try:
-        there = gpu_count()
-    except InputError as error:
-        if not str(error).startswith("options.device"):
-            raise
-        raise InputError("--gpus: no GPU is found on this machine; leave it out to run on the CPU") from None
-    if wanted > there:
-        raise InputError(f"--gpus: {wanted} wanted, but this machine has {there}; give at most {there}")
-
-
-def _note_failures(result: "SweepResult") -> None:
-    """Say which walks failed and leave with exit status 1 if any did."""
-    from warpchain.status import Status
-
-    ended = {status.label: status for status in Status if not status.ok}
-    failed = {label: n for label, n in result.summary().items() if n and label in ended}
-    for label, count in failed.items():
-        print(f"{count} {label}: {ended[label].sentence}", file=sys.stderr)
-    if failed:
-        raise typer.Exit(FAILED)

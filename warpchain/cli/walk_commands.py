@@ -4,15 +4,12 @@ import json
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import Annotated, Any, Final
 
 import typer
 
 from warpchain.cli.words import JSON, argument, option, output
 from warpchain.inputs.methods import METHODS
-
-if TYPE_CHECKING:
-    from warpchain.inputs.setup import Setup
 
 FAILED: Final = 1
 """Exit status of a command whose walks failed."""
@@ -60,9 +57,7 @@ def walk(
     preset: Annotated[_Text, option("NAME", _PRESETS)] = None,
     method: Annotated[_Text, option("NAME", _METHODS)] = None,
     tolerance: Annotated[_Text, option("NUMBER", _TOLERANCE, "--tol")] = None,
-    device: Annotated[
-        _Text, option("NAME", "Where it runs: cpu, cuda (the first GPU) or cuda:N. Default: cpu.")
-    ] = None,
+    device: Annotated[_Text, option("NAME", "Where it runs: cpu, cuda (first GPU) or cuda:N. Default: cpu.")] = None,
     assignments: Annotated[list[str] | None, option("NAME=VALUE", _SET, "--set")] = None,
     seed: Annotated[_Text, option("S", _SEED)] = None,
     config: Annotated[Path | None, option("FILE.yaml", _CONFIG)] = None,
@@ -74,16 +69,15 @@ def walk(
     as_json: Annotated[bool, JSON] = False,
 ) -> None:
     """Spin up one chain, drop it, and follow it until it rests."""
-    from warpchain.cli.terminal import print_walk
-    from warpchain.cli.walk_files import try_walk_folder, write_walk
+    from warpchain.cli.output import print_walk, saved, try_walk_folder, write_walk
     from warpchain.inputs.distributions import Seed
     from warpchain.inputs.options import replaced_by
-    from warpchain.inputs.sections import SECTIONS
-    from warpchain.inputs.setup import DEFAULT_PRESET, continued, resolve
+    from warpchain.inputs.setup import DEFAULT_PRESET, SECTIONS, continued, resolve
     from warpchain.inputs.validation import InputError, checked, printable
     from warpchain.inputs.yaml_files import parse_yaml
     from warpchain.run.progress_bar import changing_line, walk_progress_text
     from warpchain.walks.one_walk import run_walk
+    from warpchain.walks.walk_result import WalkResult
 
     named = {"links": links, "frequency": frequency, "start": start}
     given = _given_values(named | {"method": method, "tolerance": tolerance, "device": device}, assignments or [])
@@ -93,7 +87,16 @@ def walk(
         for name, value in (("--config", config), ("--preset", preset), ("--seed", seed)):
             if value is not None:
                 raise InputError(f"{name}: given together with --like, and a saved walk has its own; leave one out")
-        base, number = _saved(like, index)
+        found = saved(like, "give a saved walk, or the folder or merged file of a sweep and --index")
+        if isinstance(found, WalkResult):
+            if index is not None:
+                raise InputError(f"--index: given, but {like} is a single walk; leave it out")
+            base, number = found.setup, found.seed
+        elif index is None:
+            raise InputError(f"--like: {like} has many walks; give --index, the number of one, as well")
+        else:
+            block, place = found.located(parse_yaml(index, "--index"))
+            base, number = block.setup_at(place), block.origin.seed
         replaced = replaced_by(given["options"])
         preset, own = base.preset, {name: getattr(base, name).model_dump(exclude=replaced) for name in SECTIONS}
     elif config is not None:
@@ -109,8 +112,12 @@ def walk(
         setup = continued(base.start, given)
     else:
         sections = {name: {**own.get(name, {}), **values} for name, values in given.items()}
-        setup = resolve(preset or DEFAULT_PRESET, **sections, seed=number, records_loads=record_loads)
-    interval = _frame_interval(folder, frame_interval, record_loads)
+        setup = resolve(preset or DEFAULT_PRESET, **sections, seed=number, loads=record_loads)
+    if folder is None and (frame_interval is not None or record_loads):
+        name = "--record-loads" if frame_interval is None else "--frame-interval"
+        raise InputError(f"{name}: there is no folder to write to; add -o DIR")
+    usual = None if folder is None else 1e-4 if record_loads else 2e-3
+    interval = usual if frame_interval is None else parse_yaml(frame_interval, "frame_interval")
     if folder is not None:
         try_walk_folder(folder)
     with changing_line() as show:
@@ -144,7 +151,7 @@ def animate(
     slow: Annotated[float, option("NUMBER", "Playing time per simulated time. Default: 4.")] = 4.0,
 ) -> None:
     """Write a film of a saved walk: GIF, MP4 or HTML with a player."""
-    from warpchain.cli.walk_files import RECORD
+    from warpchain.cli.output import RECORD
     from warpchain.inputs.validation import InputError, printable
     from warpchain.walks.walk_result import load_walk
 
@@ -159,8 +166,7 @@ def animate(
 
 def _given_values(named: Mapping[str, str | None], assignments: Sequence[str]) -> dict[str, dict[str, object]]:
     """Values of the command line by section; named options and `NAME=VALUE` are on a par."""
-    from warpchain.inputs.sections import SECTION_OF, by_section, dotted_name
-    from warpchain.inputs.validation import InputError, shown
+    from warpchain.inputs.validation import SECTION_OF, InputError, by_section, dotted_name, shown
     from warpchain.inputs.yaml_files import parse_yaml
 
     pairs = [(name, text) for name, text in named.items() if text is not None]
@@ -177,35 +183,3 @@ def _given_values(named: Mapping[str, str | None], assignments: Sequence[str]) -
             raise InputError(f"{path}: given twice on the command line; give it once")
         values[name] = parse_yaml(text, path)
     return by_section(values)
-
-
-def _saved(path: Path, index: str | None) -> tuple["Setup", int | None]:
-    """Setup and seed of a saved walk, or of the walk with a number of a sweep."""
-    from warpchain.cli.walk_files import saved
-    from warpchain.inputs.validation import InputError
-    from warpchain.inputs.yaml_files import parse_yaml
-    from warpchain.walks.walk_result import WalkResult
-
-    found = saved(path, "give a saved walk, or the folder or merged file of a sweep and --index")
-    if isinstance(found, WalkResult):
-        if index is not None:
-            raise InputError(f"--index: given, but {path} is a single walk; leave it out")
-        return found.setup, found.seed
-    if index is None:
-        raise InputError(f"--like: {path} has many walks; give --index, the number of one, as well")
-    block, place = found.located(parse_yaml(index, "--index"))
-    return block.setup_at(place), block.origin.seed
-
-
-def _frame_interval(folder: Path | None, text: str | None, records_loads: bool) -> Any:
-    """Time between two frames [s], which the walk checks; None without a folder to write them to."""
-    from warpchain.inputs.validation import InputError
-    from warpchain.inputs.yaml_files import parse_yaml
-
-    if folder is None:
-        for name, given in (("--frame-interval", text is not None), ("--record-loads", records_loads)):
-            if given:
-                raise InputError(f"{name}: there is no folder to write to; add -o DIR")
-        return None
-    usual = 1e-4 if records_loads else 2e-3
-    return usual if text is None else parse_yaml(text, "frame_interval")

@@ -15,7 +15,6 @@ from warpchain.inputs.validation import InputError, Whole, checked, shown
 
 UNITS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 _POSITIVE: Final = Annotated[float, Field(gt=0)]
-_EDGES: Final = Annotated[list[float], Field(min_length=4, max_length=4)]
 
 
 def read(
@@ -56,10 +55,14 @@ def read(
     checked(frequency, "frequency", _POSITIVE, "Hz")
     checked(fps, "fps", _POSITIVE | None)
     checked(speed, "speed", _POSITIVE | None, "m/s")
-    checked(outline, "outline", _EDGES | None)
+    checked(outline, "outline", Annotated[list[float], Field(min_length=4, max_length=4)] | None)
     if unit not in (None, *UNITS) or direction not in ("right", "left"):
         raise InputError(f"unit: {shown(unit)}, direction: {shown(direction)}; give m, cm or mm, and right or left")
-    lines = [_cells(line) for line in Path(path).read_text(encoding="utf-8-sig", errors="replace").splitlines()]
+    lines = []
+    for line in Path(path).read_text(encoding="utf-8-sig", errors="replace").splitlines():
+        mark = next((mark for mark in "\t;," if mark in line), None)
+        line = line if mark == "," else line.replace(",", ".")  # numbers with decimal points
+        lines.append([cell.strip(' "') for cell in line.split(mark)])
     heads = [[re.sub(r"[\s(\[].*", "", cell) for cell in cells] for cells in lines]  # without units
     first = next((number for number, names in enumerate(heads) if {"t", "x", "y"} <= set(names)), None)
     if first is None:
@@ -105,9 +108,3 @@ def _fitted_release(time: Array, y: Array) -> float:
     if misfit(release) > 4 * max(y[(time > release - BEFORE) & (time < release)].var(), 1e-8):
         raise InputError("release: nothing begins to fall freely; check unit and fps, or give it")
     return release
-
-
-def _cells(line: str) -> list[str]:
-    """Cells of a line, numbers with decimal points."""
-    mark = next((mark for mark in "\t;," if mark in line), None)
-    return [cell.strip(' "') for cell in (line if mark == "," else line.replace(",", ".")).split(mark)]

@@ -1,11 +1,14 @@
 """Arrays: their type in annotations, and the check of those that a user gives."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.inputs.validation import InputError
 
 Array = NDArray[np.float64]
+AnyArray = NDArray[Any]
 
 
 def checked_array(given: object, path: str, *shape: int | str) -> Array:

@@ -8,7 +8,7 @@ What is drawn is a mapping of names to distributions, in the order of drawing. A
 """
 
 import math
-from collections.abc import Container, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from statistics import NormalDist
 from typing import Annotated, Final
@@ -18,9 +18,8 @@ from pydantic import Field
 
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene, link_values
-from warpchain.inputs.sections import SECTION_OF
 from warpchain.inputs.state import Setup
-from warpchain.inputs.validation import FIELDS, InputError, Whole, checked, field_bounds
+from warpchain.inputs.validation import FIELDS, SECTION_OF, InputError, Whole, checked, field_bounds
 
 DRAW_LIMIT: Final = 1000
 """Draws of one quantity before giving up; a mean inside the bounds needs two on average at worst."""
@@ -61,10 +60,6 @@ class Uniform:
 
     def _physical_ends(self) -> tuple[float, float]:
         return max(self.lower, self.bounds[0]), min(self.upper, self.bounds[1])
-
-    def __str__(self) -> str:
-        """In words, for error messages."""
-        return f"between {self.lower} and {self.upper}"
 
     def canonical(self) -> dict[str, object]:
         """Its form in a sweep file."""
@@ -111,10 +106,6 @@ class Gaussian:
         least, most = self.bounds
         return (least - self._placed_mean) / self.sigma, (most - self._placed_mean) / self.sigma
 
-    def __str__(self) -> str:
-        """In words, for error messages."""
-        return f"about {self.mean} with standard deviation {self.sigma}"
-
     def canonical(self) -> dict[str, object]:
         """Its form in a sweep file."""
         mean = {} if self.mean is None else {"mean": self.mean}
@@ -131,9 +122,9 @@ def _below(end: float) -> float:
 
 TABLE: Final[Mapping[str, Distribution]] = {
     **{
-        name: Gaussian(None, quantity.sigma, field_bounds(FIELDS[name]))
-        for name, quantity in Parameters.quantities().items()
-        if quantity.sigma > 0
+        name: Gaussian(None, q.sigma, field_bounds(FIELDS[name]))
+        for name, q in Parameters.quantities().items()
+        if q.sigma
     },
     "phase": Uniform(0.0, 1.0, field_bounds(FIELDS["phase"])),
     "clearance": Uniform(0.005, 0.015, field_bounds(FIELDS["clearance"])),  # m
@@ -171,10 +162,8 @@ def draw(distributions: Mapping[str, Distribution], rng: np.random.Generator) ->
                 drawn[name] = value
                 break
         else:
-            raise InputError(
-                f"{SECTION_OF[name]}.{name}: {DRAW_LIMIT} draws {distribution} were all outside the physical bounds; "
-                "give a mean inside them"
-            )
+            path, law = f"{SECTION_OF[name]}.{name}", distribution.canonical()
+            raise InputError(f"{path}: {DRAW_LIMIT} draws of {law} were all out of bounds; give a mean inside them")
     return drawn
 
 
@@ -183,12 +172,3 @@ def random_generator(seed: int, cell: int = 0, sample: int = 0) -> np.random.Gen
     entropy = checked(seed, "seed", Seed)
     key = [checked(number, name, _Index) for name, number in (("cell", cell), ("sample", sample))]
     return np.random.default_rng(np.random.SeedSequence(entropy, spawn_key=key))
-
-
-def sampled(setup: Setup, rng: np.random.Generator, kept: Container[str] = ()) -> Setup:
-    """The setup with the quantities of `TABLE`, but those kept, drawn about its own values, in the order of the table.
-
-    An `InputError` says that no draw was physical, or that the drawn values together make no possible walk.
-    """
-    drawn = {name: distribution for name, distribution in TABLE.items() if name not in kept}
-    return setup.with_drawn(draw(placed(drawn, setup), rng))

@@ -134,10 +134,8 @@ class Floor:
         """Refuse links (n, 3) with the middle of a circle below the floor; an `InputError` that begins with `path`."""
         depth = -self.distances(circles_of(position, link_length))
         if depth.max() > 0:
-            raise InputError(
-                f"{path}: link {int(depth.argmax()) % len(position)} starts {depth.max():.3g} m inside the floor; "
-                "raise the chain, or lower the floor"
-            )
+            link = int(depth.argmax()) % len(position)
+            raise InputError(f"{path}: link {link} starts {depth.max():.3g} m inside the floor; raise the chain")
 
     def raised_by(self, circles: Array, radius: Array, clearance: float) -> float:
         """How far links must be raised for the nearest to have a clearance from the floor [m].

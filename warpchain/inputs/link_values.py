@@ -64,10 +64,5 @@ def alternating(parameters: Parameters, links: int) -> LinkValues:
     """A chain of inner links 0, 2, 4, … and outer links 1, 3, 5, …, whose joints are alike."""
     mass, inertia = np.full(links, parameters.inner_mass), np.full(links, parameters.inner_inertia)
     mass[1::2], inertia[1::2] = parameters.outer_mass, parameters.outer_inertia
-    return LinkValues(
-        mass=mass,
-        inertia=inertia,
-        viscous_friction=np.full(links, parameters.viscous_friction),
-        coulomb_friction=np.full(links, parameters.coulomb_friction),
-        radius=np.full(links, parameters.circle_radius),
-    )
+    others = parameters.viscous_friction, parameters.coulomb_friction, parameters.circle_radius
+    return LinkValues(mass, inertia, *(np.full(links, value) for value in others))

@@ -11,26 +11,17 @@ from warpchain.kernels.methods.method import find_method, method_names
 METHODS: Final[Mapping[str, str]] = {name: find_method(name).title for name in method_names()}
 """Integrators, each described in a few words."""
 
-FORMER_METHODS: Final[Mapping[str, str]] = {"rodas4p": "dp5", "rodas5p": "dp5"}
-"""Integrators that were removed → what to write instead."""
-
 BURST_TOLERANCE: Final = 1e-4
 """Default of `hybrid`: its bursts are of order 3, and at 1e-6 slower than `rkf78`.
 
 1e-3 is enough for ensembles of walks and takes half the time, but without any dissipation energy drifts.
 """
 
-_LOOSE: Final = {
-    "tolerance": 3e-3,
-    "soft_tolerance": 2e-2,
-    "skin": 3e-3,
-    "controller": "pi",
-    "soften_pile": True,
-    "soften_drive": True,
-}
+_LOOSE: Final = {"tolerance": 3e-3, "soft_tolerance": 2e-2, "skin": 3e-3, "controller": "pi"}
+_SOFTENED: Final = {"soften_pile": True, "soften_drive": True}
 METHODS_BY_NEED: Final[Mapping[str, Mapping[str, object]]] = {
-    "standard": {"method": "hybrid", **_LOOSE},
-    "explicit": {"method": "os32", **_LOOSE},
+    "standard": {"method": "hybrid", **_LOOSE, **_SOFTENED},
+    "explicit": {"method": "os32", **_LOOSE, **_SOFTENED},
     "reference": {"method": "rkf78", "tolerance": 1e-6},
 }
 """One word for an integrator and its settings.

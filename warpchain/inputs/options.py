@@ -6,7 +6,7 @@ from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from warpchain.inputs.methods import BURST_TOLERANCE, FORMER_METHODS, METHODS, METHODS_BY_NEED
+from warpchain.inputs.methods import BURST_TOLERANCE, METHODS, METHODS_BY_NEED
 from warpchain.inputs.validation import InputError, Section, Whole, number_field, shown, suggestion
 from warpchain.kernels.methods.explicit_tableaus import HYBRID
 from warpchain.kernels.methods.method import find_method, method_names
@@ -38,8 +38,6 @@ def replaced_by(options: Mapping[str, object]) -> set[str]:
 
 def _known_method(method: str) -> str:
     """The word or integrator, if there is one of this name."""
-    if method in FORMER_METHODS:
-        raise ValueError(f"{shown(method)} was removed; give {FORMER_METHODS[method]}")
     known = (*METHODS_BY_NEED, *method_names())
     if method not in known:
         raise ValueError(f"{shown(method)} is unknown; {suggestion(method, known)}")
@@ -128,13 +126,10 @@ class Options(Section):
         if on_gpu(self.device) and not find_method(self.method).runs_on_gpus:
             raise InputError(f"method: {shown(self.method)} runs on a CPU only; give explicit, or device: cpu")
         if self.smallest_step >= self.contact_step:
-            raise InputError(
-                f"smallest_step: {self.smallest_step} is not smaller than contact_step {self.contact_step} s; "
-                "give a smaller step"
-            )
+            raise InputError(f"smallest_step: {self.smallest_step} s is not below contact_step; give less")
         if self.soften_drive and self.record_interval > LONGEST_DRIVE_INTERVAL:
+            problem = f"joints stiffen at each record_interval, and {self.record_interval} s is too long for that"
             raise InputError(
-                f"soften_drive: joints stiffen at each record_interval, and {self.record_interval} s is too long for "
-                f"that; give a record_interval of at most {LONGEST_DRIVE_INTERVAL} s, or soften_drive: false"
+                f"soften_drive: {problem}; give at most {LONGEST_DRIVE_INTERVAL} s, or soften_drive: false"
             )
         return self

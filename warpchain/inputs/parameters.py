@@ -59,7 +59,9 @@ class Quantity:
     meaning: str
 
 
-def _row(symbol: str, unit: str, value: float, sigma: float, limits: Limits, source: Source, meaning: str) -> Any:
+def _row(
+    symbol: str, unit: str, value: float, sigma: float, limits: Limits, meaning: str, source: Source = "measured"
+) -> Any:
     """A required field that carries a row of the table, see `Parameters.quantities`."""
     return number_field(..., unit, meaning, symbol=symbol, value=value, sigma=sigma, source=source, **limits)
 
@@ -75,53 +77,42 @@ class Parameters(Section):
             `circle_radius` is not smaller than half of `link_length`.
     """
 
-    link_length: float = _row("ℓ", "m", 1.268e-2, 1e-5, LENGTH, "measured", "distance between the two joints of a link")
-    sprocket_radius: float = _row(
-        "R", "m", 5.56e-2, 5e-4, LENGTH, "measured", "sprocket radius, see sprocket_radius_is"
-    )
-    inner_mass: float = _row("m_inner", "kg", 3.700e-3, 2e-6, MASS, "measured", "mass of an inner link")
-    outer_mass: float = _row("m_outer", "kg", 3.147e-3, 2e-6, MASS, "measured", "mass of an outer link")
-    inner_inertia: float = _row(
-        "I_inner", "kg m²", 1.69e-7, 1e-9, INERTIA, "measured", "moment of inertia of an inner link"
-    )
-    outer_inertia: float = _row(
-        "I_outer", "kg m²", 1.292e-7, 9e-10, INERTIA, "measured", "moment of inertia of an outer link"
-    )
-    viscous_friction: float = _row("β", "N m s", 9e-5, 1e-5, TORQUE, "measured", "joint torque per angular velocity")
-    coulomb_friction: float = _row("τ_c", "N m", 1.10e-4, 9e-6, TORQUE, "measured", "joint torque at speeds above ω_c")
-    floor_restitution: float = _row(
-        "e_fc", "1", 0.018, 0.004, FRACTION, "measured", "normal restitution, floor and chain"
-    )
-    floor_friction: float = _row("μ_fc", "1", 0.27, 0.02, FRICTION, "measured", "friction coefficient, floor and chain")
-    gravity: float = _row("g", "m/s²", 9.809, 0.0, GRAVITY, "looked up", "gravitational acceleration, along −y")
-    chain_restitution: float = _row("e_cc", "1", 0.80, 0.0, FRACTION, "looked up", "normal restitution, two links")
-    chain_friction: float = _row("μ_cc", "1", 0.62, 0.0, FRACTION, "looked up", "friction coefficient, two links")
+    link_length: float = _row("ℓ", "m", 1.268e-2, 1e-5, LENGTH, "distance between the two joints of a link")
+    sprocket_radius: float = _row("R", "m", 5.56e-2, 5e-4, LENGTH, "sprocket radius, see sprocket_radius_is")
+    inner_mass: float = _row("m_inner", "kg", 3.700e-3, 2e-6, MASS, "mass of an inner link")
+    outer_mass: float = _row("m_outer", "kg", 3.147e-3, 2e-6, MASS, "mass of an outer link")
+    inner_inertia: float = _row("I_inner", "kg m²", 1.69e-7, 1e-9, INERTIA, "moment of inertia of an inner link")
+    outer_inertia: float = _row("I_outer", "kg m²", 1.292e-7, 9e-10, INERTIA, "moment of inertia of an outer link")
+    viscous_friction: float = _row("β", "N m s", 9e-5, 1e-5, TORQUE, "joint torque per angular velocity")
+    coulomb_friction: float = _row("τ_c", "N m", 1.10e-4, 9e-6, TORQUE, "joint torque at speeds above ω_c")
+    floor_restitution: float = _row("e_fc", "1", 0.018, 0.004, FRACTION, "normal restitution, floor and chain")
+    floor_friction: float = _row("μ_fc", "1", 0.27, 0.02, FRICTION, "friction coefficient, floor and chain")
+    gravity: float = _row("g", "m/s²", 9.809, 0.0, GRAVITY, "gravitational acceleration, along −y", "looked up")
+    chain_restitution: float = _row("e_cc", "1", 0.80, 0.0, FRACTION, "normal restitution, two links", "looked up")
+    chain_friction: float = _row("μ_cc", "1", 0.62, 0.0, FRACTION, "friction coefficient, two links", "looked up")
     sprocket_restitution: float = _row(
-        "e_sc", "1", 0.01, 0.0, FRACTION, "adjusted", "normal restitution, sprocket and chain"
+        "e_sc", "1", 0.01, 0.0, FRACTION, "normal restitution, sprocket and chain", "adjusted"
     )
     sprocket_friction: float = _row(
-        "μ_sc", "1", 0.99, 0.0, FRACTION, "adjusted", "friction coefficient, sprocket and chain"
+        "μ_sc", "1", 0.99, 0.0, FRACTION, "friction coefficient, sprocket and chain", "adjusted"
     )
-    joint_stiffness: float = _row("k", "N/m", 1e9, 0.0, STIFFNESS, "adjusted", "stiffness of a joint's spring")
-    joint_damping: float = _row("b", "N s/m", 1e3, 0.0, DAMPING, "adjusted", "damping of a joint's spring")
+    joint_stiffness: float = _row("k", "N/m", 1e9, 0.0, STIFFNESS, "stiffness of a joint's spring", "adjusted")
+    joint_damping: float = _row("b", "N s/m", 1e3, 0.0, DAMPING, "damping of a joint's spring", "adjusted")
     friction_smoothing: float = _row(
-        "ω_c", "rad/s", 1e-3, 0.0, TURNING, "adjusted", "width of Coulomb friction's sign change, tanh(ω/ω_c)"
+        "ω_c", "rad/s", 1e-3, 0.0, TURNING, "width of Coulomb friction's sign change, tanh(ω/ω_c)", "adjusted"
     )
     tangential_restitution: float = _row(
-        "e_t", "1", 0.0, 0.0, SIGNED_FRACTION, "adjusted", "tangential restitution, all pairs"
+        "e_t", "1", 0.0, 0.0, SIGNED_FRACTION, "tangential restitution, all pairs", "adjusted"
     )
-    circle_radius: float = _row("r", "m", 4.2e-3, 0.0, LENGTH, "chosen here", "radius of the circle at a link end")
+    circle_radius: float = _row("r", "m", 4.2e-3, 0.0, LENGTH, "radius of the circle at a link end", "chosen here")
     """Not in the paper: between the roller (3.9 mm) and the plates (about 5 mm) of a half-inch chain."""
-    half_width: float = _row("h", "m", 4e-3, 0.0, WIDTH, "chosen here", "half width of a link, of a plane that tilts")
+    half_width: float = _row("h", "m", 4e-3, 0.0, WIDTH, "half width of a link, of a plane that tilts", "chosen here")
     """Not in the paper: a half-inch chain is about 8 mm wide over its pins."""
 
     @model_validator(mode="after")
     def _circles_apart(self) -> Self:
-        if not self.circle_radius < self.link_length / 2:
-            raise InputError(
-                f"circle_radius: {self.circle_radius} is not smaller than half the link length "
-                f"{self.link_length / 2}; give a smaller radius"
-            )
+        if not self.circle_radius < (half := self.link_length / 2):
+            raise InputError(f"circle_radius: {self.circle_radius} is not below half a link, {half}; give less")
         return self
 
     @classmethod
@@ -146,9 +137,7 @@ class Parameters(Section):
         changed = validated(type(self), {**vars(self), **named}, "parameters")
         for name, (usual, unit) in _SLIPS.items():
             if name in named and math.isclose(getattr(changed, name), 1000 * usual, rel_tol=1e-9):
-                raise InputError(
-                    f"parameters.{name}: {short(1000 * usual)} {unit} is 1000 times Table 1's; give {short(usual)}"
-                )
+                raise InputError(f"parameters.{name}: 1000 times Table 1's; give {short(usual)} {unit}")
         return changed
 
 

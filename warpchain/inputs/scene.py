@@ -17,14 +17,10 @@ MOST_LINKS: Final = 100_000
 """A chain of so many links takes 0.4 GB, and kernels of its own."""
 MOST_LINKS_ON_GPU: Final = 1024
 """A chain is a block of threads there, one for each link, and CUDA has no larger blocks."""
-HIGHEST_FREQUENCY: Final = 300.0
-"""Greatest frequency of a sprocket, far above what any loop holds [Hz]; a greater one is in turns a minute."""
 LEAST_SPROCKET: Final = 1e-3
 """Least distance of the joints from the sprocket's centre, in link lengths; far smaller ones are lost in rounding."""
 HIGHEST: Final = 1e6
 """Greatest height, where numbers still tell a nanometre [m]."""
-HIGHEST_LOAD: Final = 1e4
-"""Greatest factor by which loads are multiplied; more than some hundred make joints stretch and steps short."""
 FASTEST_TAP: Final = 1e3
 """Greatest speed [m/s] and rate [rad/s] of the plane at the release, far beyond that of any loop."""
 LONGEST: Final = 1e6
@@ -49,7 +45,7 @@ class Scene(Section):
 
     links: Whole = number_field(60, "1", symbol="n", ge=4, le=MOST_LINKS)
     """number of links around the loop, even where inner and outer links alternate"""
-    frequency: float = number_field(15.0, "Hz", symbol="ν", ge=0, le=HIGHEST_FREQUENCY)
+    frequency: float = number_field(15.0, "Hz", symbol="ν", ge=0, le=300.0)  # more is in turns a minute
     """turns of the sprocket per second at the release"""
     start: Literal["rest", "spinning", "ellipse"] = "rest"
     """at rest on the sprocket, circulating on it, or a circulating ellipse without sprocket"""
@@ -68,7 +64,7 @@ class Scene(Section):
     chain"""
     spin_up_time: float = number_field(0.3, "s", gt=0, le=LONGEST)
     """time in which the sprocket reaches its frequency"""
-    load_factor: float | None = number_field(None, "1", ge=1, le=HIGHEST_LOAD)
+    load_factor: float | None = number_field(None, "1", ge=1, le=1e4)  # some hundred make joints stretch
     """by which gravity, joint friction and rotary inertia are multiplied while the loop becomes stationary; null: as
     many times as suits the chain, at most 50; 1: not at all"""
     steady_time: float | None = number_field(None, "s", ge=0, le=LONGEST)
@@ -137,10 +133,8 @@ class Scene(Section):
     @model_validator(mode="after")
     def _goes_together(self) -> Self:
         for name in ("charm_link", "stiff_joint"):
-            if getattr(self, name) >= self.links:
-                raise InputError(
-                    f"{name}: {getattr(self, name)} is not among {self.links} links; give 0 to {self.links - 1}"
-                )
+            if (given := getattr(self, name)) >= self.links:
+                raise InputError(f"{name}: {given} is not among {self.links} links; give 0 to {self.links - 1}")
         for name in OF_LINKS:
             values = getattr(self, name)
             if values is not None and len(values) != self.links:
@@ -152,17 +146,12 @@ class Scene(Section):
         if self.plane == "tilting" and not self.is_level:
             raise InputError("plane: 'tilting' needs a flat floor; give plane: fixed, or floor: flat and slope: 0")
         if self.plane == "fixed" and (name := next((name for name in TAP if getattr(self, name) != 0), "")):
-            raise InputError(
-                f"{name}: {getattr(self, name)} moves the plane of the chain, which is fixed; give plane: tilting"
-            )
+            raise InputError(f"{name}: moves the plane of the chain, which is fixed; give plane: tilting, or 0")
         if self.release is not None and (self.start == "ellipse" or self.plane == "tilting"):
             word = "start: ellipse" if self.start == "ellipse" else "plane: tilting"
             raise InputError(f"release: a motion of the sprocket, which {word} does not go with; leave one out")
         if self.clearance_of == "hanging" and self.start != "rest":
-            raise InputError(
-                f"clearance_of: 'hanging' needs a chain that hangs, but start is {self.start!r}; "
-                "give 'spinning' here, or start: rest"
-            )
+            raise InputError(f"clearance_of: 'hanging' needs start: rest, not {self.start}; give that, or 'spinning'")
         return self
 
 
@@ -194,22 +183,16 @@ def check_links(scene: Scene, parameters: Parameters) -> None:
     if scene.link_radii is None and scene.charm_radius is None:
         return
     radii = link_values(scene, parameters).radius
-    if not radii.max() < parameters.link_length / 2:
+    if not radii.max() < (half := parameters.link_length / 2):
         field = "charm_radius" if scene.charm_radius == radii.max() else f"link_radii[{radii.argmax()}]"
-        raise InputError(
-            f"scene.{field}: {radii.max()} is not smaller than half the link length {parameters.link_length / 2}; "
-            "give less"
-        )
+        raise InputError(f"scene.{field}: {radii.max()} is not below half a link, {half}; give less")
 
 
 def check_parity(scene: Scene, parameters: Parameters, path: str = "scene.links") -> None:
     """Check that links of two kinds are even in number; else an `InputError` that begins with `path`."""
     is_one_kind = (parameters.inner_mass, parameters.inner_inertia) == (parameters.outer_mass, parameters.outer_inertia)
     if scene.links % 2 and not is_one_kind and (scene.link_masses is None or scene.link_inertias is None):
-        raise InputError(
-            f"{path}: {scene.links} is odd; inner and outer links alternate: give an even number, "
-            "equal inner and outer links, or a scene with link_masses and link_inertias"
-        )
+        raise InputError(f"{path}: {scene.links} is odd; give an even number, or link_masses and link_inertias")
 
 
 def settling_time(scene: Scene) -> float:
@@ -266,10 +249,7 @@ def fewest_links(scene: Scene, parameters: Parameters) -> int:
 def check_links_on_gpu(links: int, device: str, field: str) -> None:
     """Check that a device can carry a chain of this many links; else an `InputError` that begins with `field`."""
     if on_gpu(device) and links > MOST_LINKS_ON_GPU:
-        raise InputError(
-            f"{field}: {links} links are more than a GPU's block has threads; "
-            f"give {MOST_LINKS_ON_GPU} or less, or device: cpu"
-        )
+        raise InputError(f"{field}: {links} are too many for a GPU; give {MOST_LINKS_ON_GPU} or less, or device: cpu")
 
 
 def check_scene(scene: Scene, parameters: Parameters) -> None:
@@ -278,32 +258,19 @@ def check_scene(scene: Scene, parameters: Parameters) -> None:
     check_parity(scene, parameters)
     if scene.start == "ellipse":
         return
+    radius = parameters.sprocket_radius
     if contact_radius(scene, parameters) <= 0:
-        raise InputError(
-            f"parameters.sprocket_radius: {parameters.sprocket_radius} is not greater than the circle radius "
-            f"{riding_radius(scene, parameters)}, as sprocket_radius_is: pitch needs; give a larger radius"
-        )
+        raise InputError(f"parameters.sprocket_radius: {radius} is too small for sprocket_radius_is: pitch; give more")
     highest = scene.clearance + scene.links * parameters.link_length / 2  # of the sprocket's lowest point
     if scene.release and scene.is_level and (lowest := min(row[2] for row in scene.release)) < -highest:
-        raise InputError(
-            f"scene.release: y = {lowest:g} m takes the sprocket through the floor, at most {highest:g} m "
-            "below it; give a higher place"
-        )
+        raise InputError(f"scene.release: y = {lowest:g} m is through the floor; give {-highest:g} m or more")
     if joint_radius(scene, parameters) < LEAST_SPROCKET * parameters.link_length:
-        raise InputError(
-            f"parameters.sprocket_radius: {parameters.sprocket_radius} m is nothing beside links of "
-            f"{parameters.link_length} m; give a larger radius, or start: ellipse, which needs none"
-        )
+        raise InputError(f"parameters.sprocket_radius: {radius} is nothing beside a link; give more, or start: ellipse")
     if scene.load_factor is not None:
         greatest = link_values(scene, parameters).greatest_load(parameters.link_length)
         if scene.load_factor > greatest:
-            raise InputError(
-                f"scene.load_factor: {scene.load_factor:g} is too much for links of so little rotary inertia; "
-                f"give at most {greatest:.6g}, or null"
-            )
+            problem = f"{scene.load_factor:g} is too much for links of so little rotary inertia"
+            raise InputError(f"scene.load_factor: {problem}; give at most {greatest:.6g}, or null")
     fewest = fewest_links(scene, parameters)
     if scene.links < fewest:
-        raise InputError(
-            f"scene.links: {scene.links} links of {parameters.link_length} m do not reach round the sprocket "
-            f"whose joints ride at {joint_radius(scene, parameters):g} m; give at least {fewest}"
-        )
+        raise InputError(f"scene.links: {scene.links} links do not reach round the sprocket; give at least {fewest}")

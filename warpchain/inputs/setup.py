@@ -3,21 +3,26 @@
 Keyword arguments, the command line and YAML files all go through `resolve`, which raises only `InputError`.
 """
 
-from collections.abc import Mapping
+import inspect
+from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final, TypeVar
 
-from warpchain.inputs.distributions import random_generator, sampled
+from warpchain.inputs.distributions import TABLE, draw, placed, random_generator
 from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL, Options, replaced_by
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.parameters import preset as parameter_preset
 from warpchain.inputs.scene import OF_LINKS, Scene, check_links, check_links_on_gpu, check_parity, check_scene
 from warpchain.inputs.state import DEFAULT_PRESET, Setup, State
-from warpchain.inputs.validation import InputError, shown, validated
+from warpchain.inputs.validation import InputError, Section, shown, validated
 from warpchain.kernels.methods.method import find_method
 
-__all__ = ["DEFAULT_PRESET", "Setup", "combined", "continued", "options_beside", "resolve"]
+__all__ = ["DEFAULT_PRESET", "Setup", "Values", "combined", "continued", "options_beside", "resolve"]
 
+Values = Mapping[str, object]
+F = TypeVar("F", bound=Callable[..., object])
+SECTIONS: Final[Mapping[str, type[Section]]] = {"scene": Scene, "options": Options, "parameters": Parameters}
+"""Sections of a user's values, and the models that hold their fields."""
 OF_THE_WALK: Final = (
     *("walk_limit", "walk_until", "distance_limit", "floor", "slope"),
     *("charm_mass", "charm_inertia", "charm_radius", "charm_link", "stiff_joint", "stiff_joint_factor"),
@@ -27,13 +32,7 @@ OF_THE_WALK: Final = (
 
 
 def resolve(
-    preset: str,
-    *,
-    scene: Mapping[str, object],
-    options: Mapping[str, object],
-    parameters: Mapping[str, object],
-    seed: int | None = None,
-    records_loads: bool = False,
+    preset: str, *, scene: Values, options: Values, parameters: Values, seed: int | None = None, loads: bool = False
 ) -> Setup:
     """Check a user's values, complete them, and draw the sample of a seed, if there is one.
 
@@ -43,13 +42,16 @@ def resolve(
     """
     checked = validated(Scene, scene, "scene")
     changed = parameter_preset(preset).with_values(parameters)
-    setup = combined(preset, changed, checked, options_beside(checked.plane, options, records_loads))
-    return setup if seed is None else sampled(setup, random_generator(seed), kept={*scene, *parameters})
+    setup = combined(preset, changed, checked, options_beside(checked.plane, options, loads))
+    if seed is None:
+        return setup
+    drawn = {name: distribution for name, distribution in TABLE.items() if name not in {*scene, *parameters}}
+    return setup.with_drawn(draw(placed(drawn, setup), random_generator(seed)))
 
 
-def options_beside(plane: str, options: Mapping[str, object], records_loads: bool = False) -> Options:
+def options_beside(plane: str, options: Values, loads: bool = False) -> Options:
     """The checked options; `Scene.plane`, and whether joint forces are recorded, may decide what `standard` is."""
-    if (plane == "tilting" or records_loads) and options.get("method", "standard") == "standard":
+    if (plane == "tilting" or loads) and options.get("method", "standard") == "standard":
         options = {**options, "method": "explicit"}
     return validated(Options, options, "options")
 
@@ -71,27 +73,19 @@ def combined(preset: str, parameters: Parameters, scene: Scene, options: Options
 def _check_can_tilt(scene: Scene, options: Options) -> None:
     """Check that the method carries chains whose plane tilts, if that of the scene does; else an `InputError`."""
     if scene.plane == "tilting" and not find_method(options.method).can_tilt:
-        raise InputError(
-            f"options.method: {shown(options.method)} keeps the plane of a chain fixed; "
-            "give explicit or an explicit method, or scene.plane: fixed"
-        )
+        raise InputError(f"options.method: {shown(options.method)} keeps planes fixed; give explicit, or plane: fixed")
 
 
 def check_has_joint_forces(options: Options) -> None:
     """Check that the method has forces in the joints that can be recorded; else an `InputError`."""
     if not find_method(options.method).has_joint_forces:
-        raise InputError(
-            f"options.method: {shown(options.method)} makes joints rigid between impulses, without forces that "
-            "record_loads could keep; give explicit or an integrator other than hybrid"
-        )
+        raise InputError(f"options.method: {shown(options.method)} has rigid joints, without forces; give explicit")
 
 
-def continued(state: State, sections: Mapping[str, Mapping[str, object]]) -> Setup:
+def continued(state: State, sections: Mapping[str, Values]) -> Setup:
     """The setup of a walk from a state, with other values of what comes behind the release; else an `InputError`."""
     if early := [name for name in sections["scene"] if name not in OF_THE_WALK]:
-        raise InputError(
-            f"{', '.join(early)}: given together with a state, whose chain is formed and released; leave it out"
-        )
+        raise InputError(f"{', '.join(early)}: given together with a state, whose chain is released; leave it out")
     before, given = state.setup, sections["options"]
     options = validated(Options, {**before.options.model_dump(exclude=replaced_by(given)), **given}, "options")
     scene = validated(Scene, {**vars(before.scene), **sections["scene"]}, "scene")
@@ -107,3 +101,26 @@ def continued(state: State, sections: Mapping[str, Mapping[str, object]]) -> Set
     if scene.plane == "fixed" and not state.is_placed_as_in(setup):  # a moving sprocket may have left it in the floor
         setup.floor.check_above(state.position, state.parameters.link_length, "start")
     return replace(setup, start=replace(state, setup=setup))
+
+
+def takes_fields(*sections: str, without: Container[str] = (), beside: Iterable[str] = ()) -> Callable[[F], F]:
+    """Let the signature of a function name the fields that its ``**settings`` take, for notebooks to complete.
+
+    These are the fields of some `SECTIONS`, `without` those that it does not take, and what it takes `beside` them.
+    """
+
+    def named(function: F) -> F:
+        signature = inspect.signature(function)
+        *own, settings = signature.parameters.values()
+        types: dict[str, Any] = dict.fromkeys(beside, Any)
+        for section in sections:
+            types |= {name: field.annotation for name, field in SECTIONS[section].model_fields.items()}
+        fields = [
+            inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=..., annotation=kind)
+            for name, kind in types.items()
+            if name not in signature.parameters and name not in without
+        ]
+        function.__signature__ = signature.replace(parameters=[*own, *fields, settings])  # type: ignore[attr-defined]
+        return function
+
+    return named

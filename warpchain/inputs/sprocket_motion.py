@@ -9,7 +9,6 @@ from pydantic import AfterValidator, Field, Strict
 
 Motion = tuple[tuple[float, float, float, float], ...]
 
-MOST_ROWS: Final = 16
 LARGEST: Final = 1e4
 """Greatest size of a time, a place and a frequency."""
 
@@ -27,7 +26,7 @@ _Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Rows = Annotated[
     tuple[Annotated[tuple[_Number, _Number, _Number, _Number], Strict(False)], ...],
     Strict(False),
-    Field(max_length=MOST_ROWS),
+    Field(max_length=16),
     AfterValidator(_in_order),
 ]
 """A motion: rows [time, x, y, frequency]."""

@@ -89,7 +89,10 @@ def lay_chain(
     size = curve.first_size(links * link_length)
     s = curve.period(size)[0] * (phase + np.arange(links) / links)
     if curve.period(size)[1] == 0.0:  # s is no arc length: even the chords out first
-        s = _spread_evenly(curve, size, s)
+        fine = s[0] + np.linspace(0.0, curve.period(size)[0], 1024)
+        pace = np.sqrt(np.sum(curve.points(fine, size)[1] ** 2, axis=0))
+        arc = np.concatenate([[0.0], np.cumsum((pace[1:] + pace[:-1]) / 2 * np.diff(fine))])
+        s = np.interp(arc[-1] * np.arange(links) / links, arc, fine)
     worst = np.inf
     for _ in range(50):
         period, period_growth = curve.period(size)
@@ -152,11 +155,3 @@ def links_between(joints: Array, joint_rate: Array) -> tuple[Array, Array]:
     position = np.column_stack([(joints + before) / 2, angle])
     velocity = np.column_stack([(joint_rate + before_rate) / 2, spin])
     return position, velocity
-
-
-def _spread_evenly(curve: Curve, size: float, s: Array) -> Array:
-    """Parameters at equal arc lengths, starting at s[0]."""
-    fine = s[0] + np.linspace(0.0, curve.period(size)[0], 1024)
-    speed = np.sqrt(np.sum(curve.points(fine, size)[1] ** 2, axis=0))
-    arc = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(fine))])
-    return np.asarray(np.interp(arc[-1] * np.arange(len(s)) / len(s), arc, fine))

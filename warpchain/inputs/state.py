@@ -13,9 +13,8 @@ from warpchain.inputs.floor import Floor, circles_of, floor_from
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import Scene, check_parity, check_scene
-from warpchain.inputs.sections import SECTION_OF
 from warpchain.inputs.start_shapes import links_between
-from warpchain.inputs.validation import InputError, validated
+from warpchain.inputs.validation import SECTION_OF, InputError, validated
 
 DEFAULT_PRESET: Final = "paper"
 """Preset of a walk or a sweep that names none."""

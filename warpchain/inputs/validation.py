@@ -11,7 +11,7 @@ import reprlib
 import textwrap
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Final, TypeVar, get_args
+from typing import Annotated, Any, Final, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationError
@@ -34,8 +34,6 @@ _LONGEST_PATH: Final = 120
 """Most characters of a path with which a line begins that is too long; one can go to a path only if it is whole."""
 _LONGEST_VALUE: Final = 60
 """Most characters of a value in a message."""
-_LONGEST_CHOICE: Final = 125
-"""Most characters of a list of possible words in a message."""
 MOST_PROBLEMS: Final = 20
 """Most problems that are described, each in a line; the others are counted."""
 
@@ -79,7 +77,7 @@ def number_field(default: Any, unit: str, description: str | None = None, **more
     return Field(default, description=description, json_schema_extra={"unit": unit, **more}, **limits)
 
 
-WHOLE: Final = BeforeValidator(lambda given: int(given) if isinstance(given, float) and given.is_integer() else given)
+WHOLE: Final = BeforeValidator(lambda x: int(x) if isinstance(x, float) and x.is_integer() else x)
 """Of whole numbers: 60.0 is sixty."""
 Whole = Annotated[int, WHOLE]
 
@@ -93,13 +91,6 @@ def field_unit(field: FieldInfo) -> str:
 def field_limits(field: FieldInfo) -> dict[str, float]:
     """The limits `ge`, `gt`, `le`, `lt` that a field has."""
     return {name: float(getattr(limit, name)) for limit in field.metadata for name in _LIMITS if hasattr(limit, name)}
-
-
-def field_choices(field: FieldInfo) -> tuple[Any, ...]:
-    """The words or truth values that a field may have; none for numbers and other texts."""
-    extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
-    words: Any = extra.get("enum", [word for word in get_args(field.annotation) if isinstance(word, str)])
-    return (True, False) if field.annotation is bool else tuple(words)
 
 
 def field_bounds(field: FieldInfo) -> tuple[float, float]:
@@ -169,6 +160,23 @@ def suggested_name(written: object, keys: Iterable[str] = ()) -> str:
     fields = {name: f"{section}.{name}" for name, section in SECTION_OF.items()}
     symbols = {symbol: f"{SECTION_OF[name]}.{symbol}" for symbol, name in NAME_OF_SYMBOL.items()}
     return suggestion(written, {key: key for key in keys} | fields | symbols)
+
+
+def by_section(settings: Mapping[str, object]) -> dict[str, dict[str, object]]:
+    """Values by name or symbol, sorted into sections, unchecked; an `InputError` if there is no such field."""
+    sections: dict[str, dict[str, object]] = {"scene": {}, "options": {}, "parameters": {}}
+    for name, value in by_name(settings).items():
+        sections[SECTION_OF[dotted_name(name, shown(name))]][name] = value
+    return sections
+
+
+def dotted_name(written: str, path: str) -> str:
+    """Name of the field written as name or symbol, with or without its section; `path` is for the `InputError`."""
+    section, _, last = written.rpartition(".")
+    name: str = full_name(last)
+    if name not in SECTION_OF or section not in ("", SECTION_OF[name]):
+        raise InputError(f"{path}: unknown name; {suggested_name(last)}")
+    return name
 
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
@@ -246,7 +254,8 @@ def plain(value: object, path: str = "value") -> Any:
         if isinstance(value, np.ndarray) and value.ndim == 0:
             value = value[()]
         if isinstance(value, np.generic):
-            return float(value) if isinstance(value, np.floating) else _OF_KIND.get(value.dtype.kind, str)(value)
+            kind = value.dtype.kind
+            return float(value) if kind == "f" else value.item() if kind in "biucSU" else str(value)
         if not isinstance(value, Mapping | np.ndarray | list | tuple | range) or value is np.ma.masked:
             return value
         if depth == DEEPEST:
@@ -258,13 +267,7 @@ def plain(value: object, path: str = "value") -> Any:
     return converted(value, 0)
 
 
-_OF_KIND: Final[Mapping[str, Any]] = {"b": bool, "i": int, "u": int, "c": complex, "S": bytes}
-"""Kind of NumPy's types → Python's; what is in none of them becomes a text."""
-
-
-@functools.lru_cache
-def _adapter(kind: Any) -> TypeAdapter[Any]:
-    return TypeAdapter(kind, config=ConfigDict(strict=True, allow_inf_nan=False))
+_adapter = functools.lru_cache(lambda kind: TypeAdapter(kind, config=ConfigDict(strict=True, allow_inf_nan=False)))
 
 
 def checked(value: object, path: str, kind: Any, unit: str = DIMENSIONLESS) -> Any:
@@ -293,7 +296,7 @@ def suggestion(given: object, known: Mapping[str, str] | Iterable[str]) -> str:
     close = difflib.get_close_matches(str(given)[:_LONGEST_VALUE], names, n=1) if isinstance(given, str) else []
     if close:
         return f"did you mean {names[close[0]]}?"
-    return f"give one of {textwrap.shorten(', '.join(names.values()), _LONGEST_CHOICE, placeholder=' ...')}"
+    return f"give one of {textwrap.shorten(', '.join(names.values()), 125, placeholder=' ...')}"
 
 
 def path_of(path: str, key: object) -> str:
@@ -306,9 +309,7 @@ def path_of(path: str, key: object) -> str:
 
 def printable(text: str) -> str:
     """A text fit for any terminal: every character that is not printable, such as ESC, is written as its escape."""
-    return "".join(
-        each if each.isprintable() else each.encode("unicode_escape", "surrogatepass").decode("ascii") for each in text
-    )
+    return "".join(c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in text)
 
 
 def one_line(text: str, kind: str = "") -> str:

@@ -145,13 +145,11 @@ def average_loop(setup: Setup, before: BeforeRelease | None, center: Array | Non
 
     A `ValueError` says that the walk has no sprocket, or has kept nothing of that time or too little.
     """
-    if before is None or center is None:
-        if not setup.has_drive:
-            raise ValueError(
-                "walk: it began without a sprocket, so it has no loop on one; take a walk from its drive on"
-            )
-        if center is None:
-            raise ValueError("walk: it ended before its release; see its status, which says what to try")
+    if not setup.has_drive:
+        raise ValueError("walk: it began without a sprocket, so it has no loop on one; take one from its drive on")
+    if center is None:
+        raise ValueError("walk: it ended before its release; see its status, which says what to try")
+    if before is None:
         raise ValueError("walk: nothing was kept of the time before its release; run it again with record_before")
     scene, parameters = setup.scene, setup.parameters
     if setup.options.soften_drive:
@@ -172,7 +170,10 @@ def average_frames(
     frames, links = joints.shape[:2]
     if frames < FEWEST_FRAMES:
         raise ValueError(f"before_release: {frames} frames are too few for an average; keep {FEWEST_FRAMES} or more")
-    moved = _moved(joints)
+    # With X = x + i y = Σ c_m e^{2πi m q/n}, the harmonic m = −1 runs round clockwise; its phase in a frame is −2π o/n.
+    turning = np.exp(2j * np.pi * np.arange(links) / links)
+    turned = np.angle(np.mean((joints[..., 0] + 1j * joints[..., 1]) * turning, axis=1))
+    moved = -np.unwrap(turned) * links / (2 * np.pi)  # o(t), until each frame [links]
     rate = float(np.polyfit(before.frame_time, moved, 1)[0])  # links a second
     if moved[-1] - moved[0] < LEAST_WAY:
         raise ValueError("before_release: the loop does not run clockwise, or hardly moves; give one that runs")
@@ -197,8 +198,10 @@ def average_frames(
     def on_grid(values: Array) -> Array:
         return np.interp(grid, s - lowest, values, period=length)
 
+    off, along = joints - curve.at_joints(0, moved), curve.at_joints(1, moved)
+    across = (off[..., 0] * along[..., 1] - off[..., 1] * along[..., 0]) / np.linalg.norm(along, axis=-1)
     functions = {
-        "spread": _spread(joints, moved, curve),
+        "spread": np.sqrt(np.maximum(0.0, _Harmonics(across[..., None] ** 2, moved).at(0)[:, 0])),
         "curvature": curvature,
         "bending": (np.sum(third * normal, axis=1) - 3 * curvature * np.sum(first * second, axis=1)) / per_q**3,
         "tension": np.sum(force * tangent, axis=1),
@@ -222,17 +225,6 @@ def average_frames(
         free=_free_part(grid, np.hypot(*position.T), radius + OFF_SPROCKET),
         **{name: on_grid(values) for name, values in functions.items()},
     )
-
-
-def _moved(joints: Array) -> Array:
-    """Distance o(t) that the loop has moved until each frame [links], shape (f,).
-
-    With X = x + i y = Σ c_m e^{2πi m q/n}, the harmonic m = −1 runs round clockwise; its phase in a frame is −2π o/n.
-    """
-    links = joints.shape[1]
-    turning = np.exp(2j * np.pi * np.arange(links) / links)
-    first = np.mean((joints[..., 0] + 1j * joints[..., 1]) * turning, axis=1)
-    return np.asarray(-np.unwrap(np.angle(first)) * links / (2 * np.pi))
 
 
 class _Harmonics:
@@ -260,13 +252,6 @@ class _Harmonics:
         """The same where the joints are in frames, until which the loop has moved (f,) [links], shape (f, n, c)."""
         factor = (2j * np.pi * self._waves) ** order * np.exp(2j * np.pi * self._waves * moved[:, None])
         return np.asarray(np.fft.irfft(self._spectrum * factor[..., None], self._links, axis=1))
-
-
-def _spread(joints: Array, moved: Array, curve: _Harmonics) -> Array:
-    """Standard deviation of joints across the mean curve [m], at its points, (POINTS_PER_LINK n,)."""
-    off, along = joints - curve.at_joints(0, moved), curve.at_joints(1, moved)
-    across = (off[..., 0] * along[..., 1] - off[..., 1] * along[..., 0]) / np.linalg.norm(along, axis=-1)
-    return np.sqrt(np.maximum(0.0, _Harmonics(across[..., None] ** 2, moved).at(0)[:, 0]))
 
 
 def _free_part(s: Array, distance: Array, least: float) -> tuple[float, float]:

@@ -11,23 +11,23 @@ import math
 import os
 import subprocess
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import Annotated, Any, Final, cast
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
+from pydantic import Field
 from scipy.spatial.transform import Rotation
 
 from warpchain.files import checked_output, replacing, write_whole
 from warpchain.inputs.arrays import Array
+from warpchain.inputs.validation import checked
 from warpchain.pictures import chain
+from warpchain.pictures.chain import center_in_room, checked_joints
+from warpchain.pictures.labels import Walk, headline
 from warpchain.pictures.style import BLUE, GROUND, INK, tidy
-from warpchain.pictures.walk_shape import center_in_room, checked_joints, headline
-
-if TYPE_CHECKING:
-    from warpchain.walks.walk_result import WalkResult
 
 WIDTH, TALLEST = 960, 560
 """Greatest width and height of a picture [pixels]."""
@@ -45,16 +45,13 @@ _PLAYER: Final = Path(__file__).with_name("player.html")
 """The page with a player, which says what its data are."""
 _HOLD: Final = 1.5
 """Time for which GIF and MP4 show their last picture [s]."""
-_GIF_PICTURES: Final = 1200
-"""Most pictures of a GIF: all are in memory at once, up to 0.5 MB each."""
-_PLAYER_FRAMES: Final = 2000
-"""Most frames of a page, which then has about 1 MB with 60 links."""
 
-_SLOWEST_GIF, _FASTEST_GIF = 1, 50
+_POSITIVE: Final = Annotated[float, Field(gt=0)]
+_GIF_RATE: Final = Annotated[float, Field(ge=1, le=50)]
 """Pictures per second of a GIF."""
 
 
-def animate(walk: "WalkResult", path: str | os.PathLike[str], *, fps: float = 30.0, slow: float = 4.0) -> None:
+def animate(walk: Walk, path: str | os.PathLike[str], *, fps: float = 30.0, slow: float = 4.0) -> None:
     """Write a moving picture of a walk; the suffix of `path` gives the format: .gif, .mp4 or .html.
 
     If there are more pictures than frames, each frame is shown until the next one. A chain whose plane tilts is seen
@@ -64,12 +61,8 @@ def animate(walk: "WalkResult", path: str | os.PathLike[str], *, fps: float = 30
     suffix = Path(path).suffix.lower()
     if suffix not in (".gif", ".mp4", ".html"):
         raise ValueError(f"{path}: unknown kind of picture; give a name that ends in .gif, .mp4 or .html")
-    for name, value in (("fps", fps), ("slow", slow)):
-        if not (math.isfinite(value) and value > 0):
-            raise ValueError(f"{name}: {value} is not a positive number; give one such as 30")
-    if suffix == ".gif" and not _SLOWEST_GIF <= fps <= _FASTEST_GIF:
-        problem = "fast" if fps > _FASTEST_GIF else "slow"
-        raise ValueError(f"fps: {fps} is too {problem} for a GIF; give {_SLOWEST_GIF} to {_FASTEST_GIF}")
+    checked(slow, "slow", _POSITIVE)
+    checked(fps, "fps", _GIF_RATE if suffix == ".gif" else _POSITIVE)
     checked_joints(walk)
     target = checked_output(path)
     if suffix == ".html":
@@ -80,7 +73,7 @@ def animate(walk: "WalkResult", path: str | os.PathLike[str], *, fps: float = 30
         _write_mp4(walk, target, fps, slow)
 
 
-def _chosen_frames(walk: "WalkResult", fps: float, slow: float) -> list[int]:
+def _chosen_frames(walk: Walk, fps: float, slow: float) -> list[int]:
     """Number of the frame that each picture shows: the last one recorded by then. Pictures come at a constant rate."""
     start, end = walk.frame_time[0], walk.frame_time[-1]
     marks = start + np.arange(math.floor((end - start) * fps * slow + 1e-6) + 1) / (fps * slow)
@@ -88,7 +81,7 @@ def _chosen_frames(walk: "WalkResult", fps: float, slow: float) -> list[int]:
     return chosen if chosen[-1] == len(walk.frame_time) - 1 else [*chosen, len(walk.frame_time) - 1]
 
 
-def _write_gif(walk: "WalkResult", path: Path, fps: float, slow: float) -> None:
+def _write_gif(walk: Walk, path: Path, fps: float, slow: float) -> None:
     """Write pictures with equal delays in whole hundredths of a second; Pillow writes equal ones once.
 
     matplotlib's writer of GIFs cuts its delays off: at 30 pictures a second they would be 10 % too short.
@@ -97,7 +90,7 @@ def _write_gif(walk: "WalkResult", path: Path, fps: float, slow: float) -> None:
 
     delay = round(100 / fps)
     chosen = _chosen_frames(walk, 100 / delay, slow)
-    if len(chosen) > _GIF_PICTURES:
+    if len(chosen) > 1200:  # all are in memory at once, up to 0.5 MB each
         raise ValueError(f"{path}: {len(chosen)} pictures are too many for a GIF; lower fps or slow, or give .mp4")
     film = Film(walk)
     palette = Image.fromarray(film.picture(len(walk.frame_time) // 2)).quantize(64)
@@ -112,7 +105,7 @@ def _write_gif(walk: "WalkResult", path: Path, fps: float, slow: float) -> None:
         next(pictures).save(part, format="GIF", save_all=True, append_images=pictures, duration=10 * delay, loop=0)
 
 
-def _write_mp4(walk: "WalkResult", path: Path, fps: float, slow: float) -> None:
+def _write_mp4(walk: Walk, path: Path, fps: float, slow: float) -> None:
     """Let ffmpeg code the pictures; `imageio_ffmpeg` brings it."""
     import matplotlib as mpl
     from matplotlib.animation import FFMpegWriter
@@ -125,9 +118,7 @@ def _write_mp4(walk: "WalkResult", path: Path, fps: float, slow: float) -> None:
     chosen += chosen[-1:] * round(_HOLD * fps)
     film = Film(walk)
     # What ffmpeg says would be lines on the terminal.
-    writer = FFMpegWriter(
-        fps=cast(Any, fps), codec="h264", extra_args=["-crf", "20", "-loglevel", "quiet", "-f", "mp4"]
-    )
+    writer = FFMpegWriter(fps=cast(Any, fps), codec="h264", extra_args="-crf 20 -loglevel quiet -f mp4".split())
     with replacing(path) as part, mpl.rc_context({"animation.ffmpeg_path": ffmpeg}):
         try:
             with writer.saving(film.figure, str(part), DPI):
@@ -139,13 +130,13 @@ def _write_mp4(walk: "WalkResult", path: Path, fps: float, slow: float) -> None:
             raise OSError("ffmpeg ended early") from error
 
 
-def player(walk: "WalkResult", slow: float = 4.0) -> str:
+def player(walk: Walk, slow: float = 4.0) -> str:
     """A page with a player of the frames from the side: lengths in tenths of a millimetre, times in microseconds.
 
     It starts `slow` times slower than the walk. A `ValueError` says that the walk has no frames or broken ones.
     """
     joints, sprocket = checked_joints(walk), walk.sprocket_center
-    count = min(len(walk.frame_time), _PLAYER_FRAMES)
+    count = min(len(walk.frame_time), 2000)  # with 60 links the page has about 1 MB then
     frames = np.rint(np.linspace(0, len(walk.frame_time) - 1, count)).astype(int)
     times, box = walk.frame_time[frames], side_box(walk, joints)
     marks = floor_marks(*box[0])
@@ -183,7 +174,7 @@ def floor_marks(low: float, high: float, most: int = 9) -> list[float]:
     return [round(float(mark), 6) for mark in marks if low <= mark <= high]
 
 
-def side_box(walk: "WalkResult", joints: Array) -> Array:
+def side_box(walk: Walk, joints: Array) -> Array:
     """Left and right, bottom and top of what is shown from the side [m], shape (2, 2), with some of the floor.
 
     It is at least as broad as high, so that titles and marks have room.
@@ -197,7 +188,7 @@ def side_box(walk: "WalkResult", joints: Array) -> Array:
 class Film:
     """Draws frames of a walk, dashed where the sprocket was at the release; even pixels wide and high, for video."""
 
-    def __init__(self, walk: "WalkResult") -> None:
+    def __init__(self, walk: Walk) -> None:
         """Fit the walk and the floor below it into the picture; a `ValueError` if frames are none or broken."""
         self._walk, self._joints, self._center = walk, checked_joints(walk), center_in_room(walk)
         self._radii = chain.circle_radii(walk)

@@ -1,10 +1,11 @@
 """A chain in the room and what is around it, as a viewer far away sees them.
 
 A view is a matrix of three orthogonal unit vectors, shape (3, 3): what points to the right in the picture, what points
-up, and what points towards the viewer.
+up, and what points towards the viewer. Room axes are X forward, Y up and Z = X × Y, to the right of the way the chain
+walks.
 """
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib import colormaps
@@ -16,17 +17,36 @@ from matplotlib.patches import Circle, Patch, Polygon
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.scene import link_values
 from warpchain.inputs.sprocket_motion import sprocket_places
+from warpchain.pictures.labels import Walk
 from warpchain.pictures.style import DASHES, FAINT, GROUND, INK
-
-if TYPE_CHECKING:
-    from warpchain.walks.walk_result import WalkResult
 
 SIDE: Final = np.eye(3)
 ABOVE: Final = np.eye(3)[[0, 2, 1]]
 """Its upper axis is z, which such a viewer sees grow downwards: invert it."""
 
 
-def circle_radii(walk: "WalkResult") -> Array:
+def checked_joints(walk: Walk) -> Array:
+    """The joints of a walk in the room [m], shape (f, n, 3); z = 0 if its plane is fixed.
+
+    A `ValueError` says that the walk has no frames or broken ones.
+    """
+    if len(walk.frame_time) == 0:
+        never = f"it was not released. {walk.status.sentence}"
+        remedy = "run it again with a frame_interval" if len(walk.time) else never
+        raise ValueError(f"walk: it has no frames; {remedy}")
+    in_room = walk.joints_in_room
+    joints = np.insert(walk.frame_joints, 2, 0.0, axis=2) if in_room is None else np.asarray(in_room)
+    if not np.all(np.isfinite(joints)):
+        raise ValueError(f"walk: its frames are not all finite numbers. {walk.status.sentence}")
+    return joints
+
+
+def center_in_room(walk: Walk) -> Array:
+    """Centre of mass x, y, z [m], shape (t, 3); z = 0 if the plane is fixed."""
+    return np.column_stack([walk.center, np.zeros(len(walk.time)) if walk.joints_in_room is None else walk.center_z])
+
+
+def circle_radii(walk: Walk) -> Array:
     """Radius of the circles of each link [m], shape (n,)."""
     return link_values(walk.setup.scene, walk.setup.parameters).radius
 
@@ -78,7 +98,7 @@ def draw_chain(
     return links
 
 
-def sprocket_circle(walk: "WalkResult") -> Array | None:
+def sprocket_circle(walk: Walk) -> Array | None:
     """Points of the sprocket's circle at the release x, y, z [m], shape (100, 3); None without one."""
     if walk.sprocket_center is None:
         return None
@@ -87,7 +107,7 @@ def sprocket_circle(walk: "WalkResult") -> Array | None:
     return np.asarray(circle + np.array([*walk.sprocket_center, 0.0]))
 
 
-def draw_release(axes: Axes, walk: "WalkResult", view: Array) -> None:
+def draw_release(axes: Axes, walk: Walk, view: Array) -> None:
     """Dashed, where the sprocket was at the release, if there was one, and how high above the floor."""
     circle = sprocket_circle(walk)
     if circle is None:
@@ -101,13 +121,13 @@ def draw_release(axes: Axes, walk: "WalkResult", view: Array) -> None:
         axes.plot(*(view @ part.T)[:2], color=FAINT, linewidth=1.0, linestyle=DASHES, zorder=1.5, label=label)
 
 
-def sprocket_centers(walk: "WalkResult", times: Array) -> Array:
+def sprocket_centers(walk: Walk, times: Array) -> Array:
     """The sprocket's centre x, y at times since the release [m], shape (t, 2); NaN where it has vanished."""
     center = (np.nan, np.nan) if walk.sprocket_center is None else walk.sprocket_center
     return sprocket_places(walk.setup.scene.release, times) + center
 
 
-def draw_sprocket(axes: Axes, walk: "WalkResult", time: float, **style: Any) -> list[Patch]:
+def draw_sprocket(axes: Axes, walk: Walk, time: float, **style: Any) -> list[Patch]:
     """The sprocket at a time since the release [s], if it has not vanished."""
     (center,) = sprocket_centers(walk, np.array([time]))
     if np.isnan(center[0]):
@@ -116,7 +136,7 @@ def draw_sprocket(axes: Axes, walk: "WalkResult", time: float, **style: Any) -> 
     return [axes.add_patch(Circle(tuple(center), walk.sprocket_radius, **style))]
 
 
-def walk_box(walk: "WalkResult", joints: Array) -> tuple[Array, Array]:
+def walk_box(walk: Walk, joints: Array) -> tuple[Array, Array]:
     """Least and greatest x, y, z of a walk and its sprocket, with a margin; from the floor on [m], each shape (3,)."""
     widest = circle_radii(walk).max()
     margin = widest + 2 * max(widest, walk.setup.parameters.half_width)
@@ -131,7 +151,7 @@ def walk_box(walk: "WalkResult", joints: Array) -> tuple[Array, Array]:
     return low, high
 
 
-def stretches(walk: "WalkResult", left: float, right: float) -> list[tuple[str, str, Array]]:
+def stretches(walk: Walk, left: float, right: float) -> list[tuple[str, str, Array]]:
     """What of the floor has coefficients of its own, between two x [m].
 
     For each pair of coefficients a colour, a label, and ends of the straight faces that have it [m], (f, 2, 2).
@@ -151,7 +171,7 @@ def stretches(walk: "WalkResult", left: float, right: float) -> list[tuple[str, 
     return [(to_hex(color), "e = {:g}, μ = {:g}".format(*law), its) for color, law, its in found if len(its)]
 
 
-def draw_ground(axes: Axes, walk: "WalkResult", line: Array, bottom: float) -> None:
+def draw_ground(axes: Axes, walk: Walk, line: Array, bottom: float) -> None:
     """The floor along its `Floor.line`, from the side, down to `bottom` [m], with labelled `stretches`."""
     axes.add_patch(Polygon([(line[0, 0], bottom), *line, (line[-1, 0], bottom)], facecolor=GROUND, zorder=3))
     axes.plot(*line.T, color=INK, linewidth=1.0, zorder=3)

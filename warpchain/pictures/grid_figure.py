@@ -6,39 +6,30 @@ the lines, or the rows of a map if both have many values; all other axes give pa
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
-from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import NullLocator
-from numpy.typing import NDArray
 
+from warpchain.inputs.arrays import AnyArray
 from warpchain.inputs.validation import InputError, shown
-from warpchain.pictures import labels
-from warpchain.pictures.inline import InlineFigure
+from warpchain.pictures import labels, style
 from warpchain.pictures.labels import math_symbol, short_texts, unit_text, with_unit
-from warpchain.pictures.style import BLUE, FAINT, GROUND, LINE_COLORS, RED, NothingToShow, panel_grid, tidy
+from warpchain.pictures.style import BLUE, FAINT, GROUND, LINE_COLORS, RED, AnyFigure, NothingToShow, panel_grid, tidy
 
 if TYPE_CHECKING:
     from warpchain.store.cell_statistics import CellStatistics
-
-Array = NDArray[Any]
-Kind = Literal["lines", "map"]
 
 MOST_LINES: Final = len(LINE_COLORS)
 """Greatest number of lines in a panel, unless lines are asked for."""
 MOST_PANELS: Final = 24
 """Greatest number of panels of a block; of more, the first are shown."""
-_MOST_TICKS: Final = 8
-"""Up to so many numbers have a tick each, if they are not too close."""
-_MOST_ROWS: Final = 16
-"""Greatest number of labelled rows or columns of a map."""
 _DEEP, _LIGHT = 0.45, 0.15
 """Opacity of the bars of one standard error and one standard deviation."""
 _PANEL_SIZES: Final = {1: (5.2, 3.6), 2: (3.6, 2.9), 3: (3.0, 2.6), 4: (2.6, 2.4)}
@@ -53,15 +44,14 @@ class Axis(NamedTuple):
     is_numeric: bool
 
 
-@dataclass(frozen=True)
-class Panel:
-    """One panel: its x axis, the axis of its lines or the y axis of a map, and its cells.
+class Panel(NamedTuple):
+    """One panel: whether it is a map, its x axis, the axis of its lines or the y axis of a map, and its cells.
 
     Arrays of the cells have shape (values of `along`, values of `across`), of one row if there is just one line; the
     title says what else they have in common.
     """
 
-    kind: Kind
+    is_map: bool
     across: Axis
     along: Axis | None
     title: str
@@ -69,12 +59,8 @@ class Panel:
 
 
 def draw_grid(
-    blocks: "Mapping[str, CellStatistics]",
-    quantity: str = "dx",
-    *,
-    x: str | None = None,
-    figure: Figure | SubFigure | None = None,
-) -> Figure | SubFigure:
+    blocks: "Mapping[str, CellStatistics]", quantity: str, x: str | None = None, figure: AnyFigure | None = None
+) -> AnyFigure:
     """Draw a quantity over the grids of one block or several.
 
     Lines have bars of one standard error; a single line has lighter ones of one standard deviation, too. A red cross on
@@ -84,31 +70,34 @@ def draw_grid(
     """
     panels, left_out = _all_panels(blocks, x)
     label = with_unit(labels.quantity_text(quantity), next(iter(blocks.values())).unit)
-    are_lines = all(panel.kind == "lines" for panel in panels)
-    alike = len({(panel.kind, panel.across, panel.along) for panel in panels}) == 1
+    are_lines = not any(panel.is_map for panel in panels)
+    alike = len({panel[:3] for panel in panels}) == 1
     columns = len(panels) if len(panels) <= 3 else min(4, math.ceil(len(panels) ** 0.5))
-    owner = InlineFigure(figsize=_size(panels, columns), layout="constrained") if figure is None else figure
+    width, height = _PANEL_SIZES[columns]
+    beside = 1.3 if any(panel.along for panel in panels) else 0.0
+    size = max(4.2, beside + width * columns), (0.3 if beside else 0.6) + height * -(-len(panels) // columns)
+    owner = style.InlineFigure(figsize=size, layout="constrained") if figure is None else figure
     areas, _ = panel_grid(owner, len(panels), columns, sharex=alike, sharey=alike or are_lines)
     palettes = _palettes(panels)
-    image = None
+    lines, maps = list[Axes](), list[Axes]()
     for axes, panel in zip(areas, panels, strict=True):
         axes.set_title(panel.title, fontsize="medium", loc="left")
-        if panel.kind == "lines":
-            _draw_lines(axes, panel, palettes[panel.along.name] if panel.along else {})
-        else:
-            means = np.concatenate([each.cells.mean.ravel() for each in panels if each.kind == "map"])
+        if panel.is_map:
+            means = np.concatenate([each.cells.mean.ravel() for each in panels if each.is_map])
             image = _draw_map(axes, panel, (np.nanmin(means), np.nanmax(means)))
+            maps.append(axes)
+        else:
+            _draw_lines(axes, panel, palettes[panel.along.name] if panel.along else {})
+            lines.append(axes)
         note = labels.lost_note([vars(panel.cells)])
         name = labels.quantity_label(panel.across.name) if not alike or axes in areas[-columns:] else ""
         axes.set_xlabel(f"{name}\n{note}".strip())
         if not (alike or are_lines) or axes in areas[::columns]:
-            axes.set_ylabel(labels.quantity_label(panel.along.name) if panel.kind == "map" and panel.along else label)
+            axes.set_ylabel(labels.quantity_label(panel.along.name) if panel.is_map and panel.along else label)
     if left_out:
         owner.suptitle(f"{len(panels)} of {len(panels) + left_out} panels", fontsize="medium", color=RED)
-    if image is not None:
-        maps = [axes for axes, panel in zip(areas, panels, strict=True) if panel.kind == "map"]
+    if maps:
         owner.colorbar(image, ax=maps, label=label).outline.set_visible(False)
-    lines = [axes for axes, panel in zip(areas, panels, strict=True) if panel.kind == "lines"]
     low = min((axes.dataLim.y0 for axes in lines), default=0.0)
     high = max((axes.dataLim.y1 for axes in lines), default=0.0)
     if 0 <= low < 0.5 * high:
@@ -148,10 +137,22 @@ def _panels(cells: "CellStatistics", x: str | None, block: str) -> Iterator[Pane
     given = zip(cells.axes.items(), rising, strict=True)
     axes = [Axis(name, tuple(values[order].tolist()), numeric[name]) for (name, values), order in given]
     several = [axis for axis in axes if len(axis.values) > 1]
-    kind, across, along, others = _roles(several, x)
+
+    def fit(axis: Axis) -> tuple[bool, bool, bool, int]:
+        is_frequency = axis.name == "frequency" and len(axis.values) > 2
+        return axis.name == x, axis.is_numeric, is_frequency, len(axis.values)
+
+    across = max(reversed(several), key=fit)
+    rest = [axis for axis in several if axis is not across]
+    rest.sort(key=lambda axis: len(axis.values))
+    along = rest.pop() if rest else None
+    is_map = along is not None and min(len(along.values), len(across.values)) > MOST_LINES
+    if along is not None and len(along.values) > MOST_LINES and not is_map and x is None:  # beside a short axis
+        across, along = along, across
+    others = [axis for axis in several if axis in rest]
     order = [several.index(axis) for axis in (*others, along, across) if axis is not None]
 
-    def arranged(table: Array) -> Array:
+    def arranged(table: AnyArray) -> AnyArray:
         table = table[np.ix_(*rising)].reshape([len(axis.values) for axis in several]).transpose(order)
         return table[..., np.newaxis, :] if along is None else table
 
@@ -163,42 +164,17 @@ def _panels(cells: "CellStatistics", x: str | None, block: str) -> Iterator[Pane
     for place in np.ndindex(*(len(axis.values) for axis in others)):
         title = ", ".join([*[block] * bool(block), *(own[number] for own, number in zip(texts, place, strict=True))])
         here: dict[str, Any] = {name: table[place] for name, table in tables.items()}
-        yield Panel(kind, across, along, title, replace(cells, **here))
-
-
-def _roles(axes: Sequence[Axis], x: str | None) -> tuple[Kind, Axis, Axis | None, list[Axis]]:
-    """What the axes of a grid become: kind, x axis, lines or rows, panels."""
-
-    def fit(axis: Axis) -> tuple[bool, bool, bool, int]:
-        is_frequency = axis.name == "frequency" and len(axis.values) > 2
-        return axis.name == x, axis.is_numeric, is_frequency, len(axis.values)
-
-    across = max(reversed(axes), key=fit)
-    others = [axis for axis in axes if axis is not across]
-    others.sort(key=lambda axis: len(axis.values))
-    along = others.pop() if others else None
-    kind: Kind = "lines"
-    if along is not None and len(along.values) > MOST_LINES:
-        if len(across.values) > MOST_LINES:
-            kind = "map"
-        elif x is None:  # a long axis beside a short one
-            across, along = along, across
-    return kind, across, along, [axis for axis in axes if axis in others]
-
-
-def _size(panels: Sequence[Panel], columns: int) -> tuple[float, float]:
-    """Width and height of a figure [inches]."""
-    width, height = _PANEL_SIZES[columns]
-    beside = 1.3 if any(panel.along for panel in panels) else 0.0
-    return max(4.2, beside + width * columns), (0.3 if beside else 0.6) + height * -(-len(panels) // columns)
+        yield Panel(is_map, across, along, title, replace(cells, **here))
 
 
 def _palettes(panels: Sequence[Panel]) -> dict[str, dict[Any, str]]:
     """Each axis that gives lines → its values in all panels → their colours, from dark to light if they are many."""
-    found = dict.fromkeys(panel.along for panel in panels if panel.along and panel.kind == "lines")
+    found: dict[str, list[Axis]] = {}
+    for panel in panels:
+        if panel.along and not panel.is_map:
+            found.setdefault(panel.along.name, []).append(panel.along)
     palettes = {}
-    for name in dict.fromkeys(axis.name for axis in found):
-        axes = [axis for axis in found if axis.name == name]
+    for name, axes in found.items():
         values = list(dict.fromkeys(value for axis in axes for value in axis.values))
         values = sorted(values) if all(axis.is_numeric for axis in axes) else values
         colors = list(LINE_COLORS)
@@ -220,8 +196,8 @@ def _draw_lines(axes: Axes, panel: Panel, palette: Mapping[Any, str]) -> None:
         if panel.along is None:
             axes.errorbar(places, mean, cells.sd[number], fmt="none", ecolor=(color, _LIGHT), elinewidth=8.0)
         error, line = cells.standard_error[number], "o-" if is_numeric else "o"
-        style: dict[str, Any] = {"markersize": 3.5, "linewidth": 1.2, "color": color, "ecolor": (color, _DEEP)}
-        axes.errorbar(places + shift, mean, error, fmt=line, elinewidth=3.5, **style)
+        look: dict[str, Any] = {"markersize": 3.5, "linewidth": 1.2, "color": color, "ecolor": (color, _DEEP)}
+        axes.errorbar(places + shift, mean, error, fmt=line, elinewidth=3.5, **look)
     failed = np.flatnonzero(cells.failed.any(axis=0))
     if failed.size:
         floor: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "clip_on": False, "in_layout": False}
@@ -236,13 +212,13 @@ def _draw_lines(axes: Axes, panel: Panel, palette: Mapping[Any, str]) -> None:
         if 0 < 10 * values[0] <= values[-1] and _unevenness(np.log(placed)) < _unevenness(placed):
             axes.set_xscale("log")
             placed = np.log(placed)
-        if len(values) <= _MOST_TICKS and np.diff(placed).min() > 0.08 * np.ptp(placed):
-            axes.set_xticks(values, texts)
+        if len(values) <= 8 and np.diff(placed).min() > 0.08 * np.ptp(placed):
+            axes.set_xticks(values, texts)  # one for each number, if they are few and not too close
             axes.xaxis.set_minor_locator(NullLocator())
     tidy(axes, grid="y")
 
 
-def _unevenness(places: Array) -> float:
+def _unevenness(places: AnyArray) -> float:
     """Coefficient of variation of the gaps."""
     gaps = np.diff(places)
     return float(gaps.std() / gaps.mean())
@@ -255,7 +231,7 @@ def _draw_map(axes: Axes, panel: Panel, limits: tuple[float, float]) -> Any:
     image = axes.imshow(cells.mean, origin="lower", aspect="auto", cmap="viridis", vmin=limits[0], vmax=limits[1])
     for axis, values in ((axes.xaxis, panel.across.values), (axes.yaxis, panel.along.values)):
         texts = short_texts(values)
-        most = _MOST_ROWS if axis is axes.yaxis else max(2, 32 // max(map(len, texts)))
+        most = 16 if axis is axes.yaxis else max(2, 32 // max(map(len, texts)))  # labels
         every = slice(None, None, math.ceil(len(texts) / most))
         axis.set_ticks(range(len(texts))[every], texts[every])
     axes.set_facecolor(GROUND)
@@ -268,31 +244,29 @@ def _draw_map(axes: Axes, panel: Panel, limits: tuple[float, float]) -> Any:
 
 
 def _draw_legends(
-    owner: Figure | SubFigure, areas: Sequence[Axes], panels: Sequence[Panel], palettes: Mapping[str, Mapping[Any, str]]
+    owner: AnyFigure, areas: Sequence[Axes], panels: Sequence[Panel], palettes: Mapping[str, Mapping[Any, str]]
 ) -> None:
     """One legend of all panels; if their lines are of several axes, each panel has one of its own, too."""
-    style: dict[str, Any] = {"frameon": False, "fontsize": "small"}
+    look: dict[str, Any] = {"frameon": False, "fontsize": "small"}
     dot: dict[str, Any] = {"marker": "o", "markersize": 3.5}
     handles: list[Line2D | Patch] = []
     title = None
     for name, palette in palettes.items():
-        texts = short_texts(list(palette))
-        lines = [
-            Line2D([], [], color=color, label=text, **dot) for color, text in zip(palette.values(), texts, strict=True)
-        ]
+        texts = zip(palette.values(), short_texts(list(palette)), strict=True)
+        lines = [Line2D([], [], color=color, label=text, **dot) for color, text in texts]
         if len(palettes) == 1:
             handles, title = [*lines], with_unit(math_symbol(name), unit_text(name))
         for axes, panel in zip(areas, panels, strict=True):
-            if len(palettes) > 1 and panel.kind == "lines" and panel.along and panel.along.name == name:
-                axes.legend(handles=lines, title=with_unit(math_symbol(name), unit_text(name)), **style)
-    if any(panel.kind == "lines" for panel in panels):
+            if len(palettes) > 1 and not panel.is_map and panel.along and panel.along.name == name:
+                axes.legend(handles=lines, title=with_unit(math_symbol(name), unit_text(name)), **look)
+    if not all(panel.is_map for panel in panels):
         handles.append(Patch(color=(FAINT, _DEEP), linewidth=0, label="± standard error"))
     if any(panel.along is None for panel in panels):
         handles.append(Patch(color=(FAINT, _LIGHT), linewidth=0, label="± standard deviation"))
     if any(panel.cells.failed.any() for panel in panels):
-        marker = "x" if panels[0].kind == "lines" else "o"
+        marker = "o" if panels[0].is_map else "x"
         handles.append(Line2D([], [], color=RED, marker=marker, linestyle="", label="walks failed"))
-    beside = any(panel.along for panel in panels if panel.kind == "lines")
+    beside = any(panel.along for panel in panels if not panel.is_map)
     place: Any = {"loc": "outside right upper", "ncols": 1} if beside else {"loc": "outside upper right", "ncols": 2}
     if handles:
-        owner.legend(handles=handles, title=title, **style, **place)
+        owner.legend(handles=handles, title=title, **look, **place)

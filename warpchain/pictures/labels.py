@@ -1,17 +1,25 @@
-"""Texts on figures and in tables: numbers, units, quantities, cells, and walks that are in no mean."""
+"""Texts on figures and in tables: numbers, units, quantities, cells, walks that are in no mean; kinds and titles."""
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.sections import SECTION_OF
-from warpchain.inputs.validation import DIMENSIONLESS, FIELDS, field_unit, short
+from warpchain.inputs.validation import DIMENSIONLESS, FIELDS, SECTION_OF, field_unit, short
 
 if TYPE_CHECKING:
     from warpchain.store.cell_statistics import CellStatistics
+    from warpchain.walks.walk_result import WalkResult
+
+    Walk = WalkResult
+else:
+    Walk = object
+
+Kind = Literal["film_strip", "height_and_speed", "loop", "energy", "tilt"]
+"""Figures of a walk; `tilt` only of one whose plane tilts."""
 
 _SYMBOLS: Final = {"dx": "Δx", "links": "n", "frequency": "ν"}
 """The paper's symbols of what is not in Table 1."""
@@ -27,9 +35,6 @@ _NAMES: Final = {
 COUNTS: Final = ("count", "absent", "failed", "missing")
 """Numbers of walks of a cell: at rest with the quantity, at rest without it, ended otherwise, not computed yet."""
 
-_EXACT: Final = 17
-"""Significant digits that tell any two numbers apart."""
-
 
 def value_text(value: Any) -> str:
     """A value of an axis: a number, a name, whether something is on, or null."""
@@ -43,8 +48,8 @@ def short_texts(values: Sequence[Any] | NDArray[Any]) -> list[str]:
     texts = [value_text(value) for value in values]
     if any(value is None or isinstance(value, str | bool | np.bool_) for value in values):
         return texts
-    digits = 2
-    while any(float(text) != value for text, value in zip(texts, values, strict=True)) and digits < _EXACT:
+    digits = 2  # 17 tell any two numbers apart
+    while any(float(text) != value for text, value in zip(texts, values, strict=True)) and digits < 17:
         digits += 1
         texts = [short(value, digits) for value in values]
         if len(set(texts)) == len(texts):
@@ -128,9 +133,21 @@ def lost_note(cells: Sequence[Mapping[str, Any]]) -> str:
     """Number of walks that are not in the means of some cells, each with numbers of `COUNTS`; empty if all are."""
     counts = {name: sum(int(np.sum(cell[name])) for cell in cells) for name in COUNTS}
     walks = sum(counts.values())
-    texts = {
-        "failed": f"of {walks} walks failed",
-        "absent": f"of {walks} have none",
-        "missing": f"of {walks} not run yet",
-    }
-    return ", ".join(f"{counts[name]} {text}" for name, text in texts.items() if counts[name])
+    texts = {"failed": "walks failed", "absent": "have none", "missing": "not run yet"}
+    return ", ".join(f"{counts[name]} of {walks} {text}" for name, text in texts.items() if counts[name])
+
+
+def kinds_of(walk: Walk) -> tuple[Kind, ...]:
+    """The figures that a walk has, if it was recorded."""
+    kinds: tuple[Kind, ...] = get_args(Kind)
+    return tuple(kind for kind in kinds if kind != "tilt" or walk.joints_in_room is not None)
+
+
+def setting(walk: Walk) -> str:
+    """Links and frequency, as a title."""
+    return walk.setup.described.replace(" at ", ", ", 1)
+
+
+def headline(walk: Walk) -> str:
+    """Links, frequency and, if it came to rest, how far it walked."""
+    return setting(walk) + (f": Δx = {walk.dx:.3f} m" if math.isfinite(walk.dx) else "")

@@ -1,27 +1,29 @@
-"""Figures of a walk: height and speed, as in the paper's Figure 5, energies, loop, angles of a plane that tilts.
+"""Figures of a walk: film strip, height and speed, as in the paper's Figure 5, energies, loop, angles of a plane.
 
 Figures are made without pyplot: nothing is global, no display is needed, the caller owns what is returned.
+
+Sizes of a film strip on paper are in inches: constrained layout clips labels of axes with a fixed aspect. Its texts are
+plain: formulas would take a third of the time that this figure takes, and every walk has one.
 """
 
-from typing import TYPE_CHECKING, Any, Final, get_args
+from typing import Any, Final, get_args
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.patches import Circle
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from warpchain.inputs.arrays import Array
 from warpchain.loop.stationary_loop import StationaryLoop
-from warpchain.pictures.chain import stretches
-from warpchain.pictures.film_strip import film_strip
-from warpchain.pictures.inline import InlineFigure
-from warpchain.pictures.style import BLUE, DASHES, DOTS, FAINT, GREEN, GROUND, INK, RED, tidy
-from warpchain.pictures.walk_shape import Kind, setting
-
-if TYPE_CHECKING:
-    from warpchain.walks.walk_result import WalkResult
+from warpchain.pictures import chain
+from warpchain.pictures.chain import center_in_room, checked_joints
+from warpchain.pictures.labels import Kind, Walk, setting
+from warpchain.pictures.style import BLUE, DASHES, DOTS, FAINT, GREEN, GROUND, INK, RED, InlineFigure, tidy
+from warpchain.status import Status
 
 FALLEN: Final = 45.0
 """Tilt beyond which a chain has fallen over [degrees]."""
@@ -30,9 +32,21 @@ BOTTOM: Final = 0.25
 """The curvature is shown this far [m] from the lowest point, or as far as the loop is free."""
 IN_LINKS: Final = 2.0
 """The tension is shown this many links away from the sprocket: averages near it include links that touch it."""
+_WIDTH: Final = 10.0
+_HIGHEST: Final = 4.6
+_DEEPEST: Final = 8.0
+"""Width of the paper, greatest height of the side view, and of it and the view from above together."""
+_LEFT, _RIGHT, _TOP, _BELOW, _FOOT = 0.9, 0.25, 0.6, 0.85, 0.1
+"""Room for labels: beside the views, for legend and titles above them, below each row, at the foot."""
+_CLOCK: Final = 0.2
+"""Room for the times above the chains."""
+_FLOOR: Final = 0.4
+"""Height of the floor in the side view."""
+_CLOSE_UP_LINKS, _CLOSE_UP_ASPECT = 9, 1.5
+"""Width of a close-up [links], and its width over its height."""
 
 
-def draw(walk: "WalkResult", kind: Kind, *, figure: Figure | None = None, ax: Axes | None = None) -> Figure:
+def draw(walk: Walk, kind: Kind, *, figure: Figure | None = None, ax: Axes | None = None) -> Figure:
     """Draw a walk; arguments and errors as of `WalkResult.plot`."""
     if kind not in get_args(Kind):
         raise ValueError(f"kind: {kind!r} is unknown; give {', '.join(map(repr, get_args(Kind)))}")
@@ -47,17 +61,16 @@ def draw(walk: "WalkResult", kind: Kind, *, figure: Figure | None = None, ax: Ax
     if ax is not None:
         _energy(walk, ax)
         return ax.figure.figure if isinstance(ax.figure, SubFigure) else ax.figure
-    sizes = {"height_and_speed": (6.4, 5.0), "loop": (10.0, 6.4), "energy": (6.4, 4.0), "tilt": (6.4, 5.0)}
-    figure = InlineFigure(figsize=sizes[kind], layout="constrained") if figure is None else figure
-    draws = {"height_and_speed": _height_and_speed, "loop": _loop, "tilt": _tilt}
+    size = {"loop": (10.0, 6.4), "energy": (6.4, 4.0)}.get(kind, (6.4, 5.0))
+    figure = InlineFigure(figsize=size, layout="constrained") if figure is None else figure
     if kind == "energy":
         _energy(walk, figure.subplots())
     else:
-        draws[kind](walk, figure)
+        {"height_and_speed": _height_and_speed, "loop": _loop, "tilt": _tilt}[kind](walk, figure)
     return figure
 
 
-def _height_and_speed(walk: "WalkResult", figure: Figure) -> None:
+def _height_and_speed(walk: Walk, figure: Figure) -> None:
     """Height and horizontal speed of the centre of mass against time since the release, as in Figure 5.
 
     A thin line is the height of a floor that is not flat, below the centre of mass; it is thick and has a label where
@@ -73,14 +86,14 @@ def _height_and_speed(walk: "WalkResult", figure: Figure) -> None:
     else:
         x, floor = walk.center[:, 0], walk.setup.floor.heights(walk.center[:, 0])
         height.plot(walk.time, floor, color=FAINT, linewidth=0.8)
-        for color, label, faces in stretches(walk, x.min(), x.max()):
+        for color, label, faces in chain.stretches(walk, x.min(), x.max()):
             is_above = ((faces[:, 0, 0, None] <= x) & (x < faces[:, 1, 0, None])).any(axis=0)
             height.plot(walk.time, np.where(is_above, floor, np.nan), color=color, linewidth=3.5, label=label)
             height.legend(frameon=False)
     _finish(walk, height, speed)
 
 
-def _energy(walk: "WalkResult", ax: Axes) -> None:
+def _energy(walk: Walk, ax: Axes) -> None:
     """Energies of a walk against time, and what was lost by then.
 
     Lost is the energy at the release less that of the moment. The dot at the end is the sum of the ledger's losses,
@@ -102,7 +115,7 @@ def _energy(walk: "WalkResult", ax: Axes) -> None:
     _finish(walk, ax)
 
 
-def _tilt(walk: "WalkResult", figure: Figure) -> None:
+def _tilt(walk: Walk, figure: Figure) -> None:
     """Tilt and yaw of the plane, and lateral drift of the centre of mass, against time.
 
     Marked are the moments at which the chain was first tilted by 45°, beyond which it has fallen over, and at which
@@ -130,7 +143,7 @@ def _tilt(walk: "WalkResult", figure: Figure) -> None:
     _finish(walk, angles, drift)
 
 
-def _finish(walk: "WalkResult", *panels: Axes) -> None:
+def _finish(walk: Walk, *panels: Axes) -> None:
     """Title, grids, and the common axis of time up to the end of the walk."""
     for axes in panels:
         tidy(axes, grid="both")
@@ -138,7 +151,7 @@ def _finish(walk: "WalkResult", *panels: Axes) -> None:
     panels[-1].set(xlabel="time since release $t$ / s", xlim=(0.0, float(walk.time[-1]) or None))
 
 
-def _loop(walk: "WalkResult", figure: Figure) -> None:
+def _loop(walk: Walk, figure: Figure) -> None:
     """The mean loop of a walk before its release, to scale, and its curvature and tension along the arc.
 
     A `ValueError` says that the time before the release was not kept, or is not enough for a mean loop.
@@ -206,3 +219,160 @@ def _mark(axes: Axes, x: float, y: float, text: str) -> None:
     """A small circle with a text to the right of it and below."""
     axes.plot([x], [y], marker="o", markersize=7.0, markerfacecolor="none", markeredgecolor=INK, zorder=5)
     axes.annotate(text, (x, y), (8, -4), textcoords="offset points", va="top", color=INK, fontsize="small")
+
+
+def film_strip(walk: Walk, figure: Figure | None = None) -> Figure:
+    """The chain along a walk with frames, drawn to scale, and close-ups of up to four moments.
+
+    In the strip the centre of mass moves equally far from each instant to the next. Above each chain stands its time;
+    outer links are darker than inner ones. The close-ups show the first touch of the floor, the first self-contact, the
+    collapse and the end, if they happen. A sprocket that goes on after the release is a circle in the chain's colour;
+    stretches of the floor with coefficients of their own are thick and have labels. A chain whose plane tilts is seen
+    from above instead, to the same scale: z grows downwards. A figure to draw into is empty; by default a new one suits
+    the walk. A `ValueError` says that the walk has no frames or broken ones.
+    """
+    joints = checked_joints(walk)
+    tilts = walk.joints_in_room is not None
+    low, high = chain.walk_box(walk, joints)
+    moments = [] if tilts else _moments(walk)
+    size = high - low
+    broad = max(size[2], 0.15 * size[0]) if tilts else 0.0
+    across = _WIDTH - _LEFT - _RIGHT
+    scale = min(across / size[0], _HIGHEST / size[1], (_DEEPEST - _FLOOR) / (size[1] + broad))
+    close_up_width = min((across + 0.1) / max(1, len(moments)), _WIDTH / 3)
+    lower = 0.5 + (scale * broad if tilts else (close_up_width - 0.1) / _CLOSE_UP_ASPECT)
+    width, height, depth, top = scale * size[0], scale * size[1] + _FLOOR + _CLOCK, _FLOOR / scale, _CLOCK / scale
+    paper = np.array([_WIDTH, _TOP + height + _BELOW + lower + _FOOT])
+    figure = InlineFigure(tuple(paper)) if figure is None else figure
+
+    def panel(left: float, bottom: float, width: float, height: float) -> Axes:
+        return figure.add_axes((left / paper[0], bottom / paper[1], width / paper[0], height / paper[1]))
+
+    left = _LEFT + (across - width) / 2
+    bottom = _FOOT + lower + _BELOW
+    side = panel(left, bottom, width, height)
+    side.set(xlim=(low[0], high[0]), ylim=(low[1] - depth, high[1] + top), xlabel="x / m", ylabel="y / m")
+    views = [(setting(walk), side, chain.SIDE)]
+    chain.draw_ground(side, walk, walk.setup.floor.line(low[0], high[0]), low[1] - depth)
+    _draw_distance(side, walk, low[1], 0.5 * depth)
+    if tilts:
+        z = (low[2] + high[2]) / 2 + np.array([0.5, -0.5]) * broad
+        above = panel(left, _FOOT + 0.5, width, scale * broad)
+        above.set(xlim=(low[0], high[0]), ylim=z, xlabel="x / m", ylabel="z / m", facecolor=GROUND)
+        above.yaxis.set_major_locator(MaxNLocator(5))
+        views.append(("from above", above, chain.ABOVE))
+    # viridis without its palest end, which can hardly be seen on white paper
+    colors = colormaps["viridis"](0.9 * walk.frame_time / (walk.frame_time[-1] or 1.0))[:, :3]
+    center = center_in_room(walk)
+    path = np.stack([np.interp(walk.frame_time, walk.time, row) for row in center.T], axis=1)
+    radius = chain.circle_radii(walk)
+    shown = _instants(path, float(np.ptp(joints[0, :, 0])))
+    for title, axes, view in views:
+        for frame in shown:
+            chain.draw_chain(axes, joints[frame], radius, view, _link_colors(colors[frame]), edge=0.25)
+            chain.draw_sprocket(axes, walk, walk.frame_time[frame], facecolor="none", edgecolor=colors[frame])
+        chain.draw_release(axes, walk, view)
+        axes.plot(*(view @ center.T)[:2], color=INK, linewidth=1.4, linestyle=DOTS, label="centre of mass", zorder=4)
+        tidy(axes)
+        axes.set_title(title, fontsize="medium", loc="left")
+    for number, (frame, title, spot) in enumerate(moments):
+        axes = panel(_LEFT + number * close_up_width, _FOOT + 0.5, close_up_width - 0.1, lower - 0.5)
+        half = 0.5 * _CLOSE_UP_LINKS * walk.setup.parameters.link_length
+        line = walk.setup.floor.line(spot[0] - half, spot[0] + half)
+        half_height = half / _CLOSE_UP_ASPECT
+        bottom = max(spot[1] - half_height, line[:, 1].min() - 0.2 * half_height)
+        chain.draw_chain(axes, joints[frame], radius, chain.SIDE, _link_colors(colors[frame]), edge=0.6)
+        chain.draw_sprocket(axes, walk, walk.frame_time[frame], facecolor="none", edgecolor=colors[frame])
+        chain.draw_ground(axes, walk, line, min(bottom, line[:, 1].min()))
+        axes.set(xlim=line[[0, -1], 0], ylim=(bottom, bottom + 2 * half_height), yticks=[], xlabel="x / m")
+        axes.set_xticks([x for x in MaxNLocator(4).tick_values(*line[[0, -1], 0]) if abs(x - spot[0]) < 0.8 * half])
+        axes.set_title(f"{title}, {walk.frame_time[frame]:.3f} s", fontsize="medium", loc="left")
+    _write_times(side, walk.frame_time[shown], joints[shown, :, :2], colors[shown], 1.2 * radius.max(), 1 / scale)
+    style: dict[str, Any] = {"frameon": False, "ncols": 2, "borderaxespad": 0.0, "fontsize": "small"}
+    place = (1 - _RIGHT / paper[0], 1 - 0.08 / paper[1])
+    figure.legend(*side.get_legend_handles_labels(), loc="upper right", bbox_to_anchor=place, **style)
+    return figure
+
+
+def _link_colors(color: Array) -> tuple[Array, Array, Array]:
+    """Colours of inner links, of outer links and of edges, shape (3,) each."""
+    return 1 - 0.45 * (1 - color), color, 0.6 * color
+
+
+def _instants(path: Array, width: float) -> list[int]:
+    """6 to 12 frames between which the centre of mass moves equally far along its path, the first and last among them.
+
+    They are as many as stay legible with chains of this width [m] in the first frame.
+    """
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    marks = np.linspace(0.0, way[-1], int(np.clip(1 + way[-1] / (0.6 * width), 6, 12)))[1:-1]
+    return sorted({0, *(int(np.argmin(np.abs(way - mark))) for mark in marks), len(way) - 1})
+
+
+def _write_times(axes: Axes, times: Array, joints: Array, colors: Array, gap: float, inch: float) -> None:
+    """Write times [s] above the highest joints of k chains, (k, n, 2), by a gap [m], higher where texts would touch."""
+    taken = np.array([text.get_position() for text in axes.texts]).reshape(-1, 2)
+    for moment, its_joints, color in zip(times, joints, colors, strict=True):
+        place = its_joints[np.argmax(its_joints[:, 1])] + (0.0, gap)
+        while np.any(np.all(np.abs(taken - place) < np.array([0.38, 0.13]) * inch, axis=1)):
+            place[1] += 0.02 * inch
+        taken = np.append(taken, [place], axis=0)
+        halo = [withStroke(linewidth=2.5, foreground="white")]
+        style: dict[str, Any] = {"color": 0.7 * color, "fontsize": "small", "path_effects": halo}
+        axes.text(place[0], place[1], f"{moment:.2f} s", ha="center", va="bottom", zorder=6, **style)
+
+
+def _draw_distance(axes: Axes, walk: Walk, low: float, depth: float) -> None:
+    """The distance walked, if there is one, so far [m] below a slope, or below the lowest place of another floor."""
+    if not np.isfinite(walk.dx):
+        return
+    slope = walk.setup.scene.slope
+    x = walk.center[-1, 0] - np.array([walk.dx * np.cos(np.radians(slope)), 0.0])
+    floor = walk.setup.floor.heights(x)
+    y = (floor if slope != 0 else low) - depth + 0 * x
+    arrow = {"arrowstyle": "<|-|>", "color": INK, "shrinkA": 0, "shrinkB": 0}
+    axes.annotate("", (x[1], y[1]), (x[0], y[0]), arrowprops=arrow, zorder=4)
+    axes.plot([x, x], [floor, y - 0.6 * depth], color=INK, linewidth=0.8, zorder=4)
+    box = {"facecolor": GROUND, "edgecolor": "none", "pad": 2.0}
+    text = f"Δx = {walk.dx:.3f} m"
+    axes.text(x.mean(), y.mean(), text, rotation=-slope, ha="center", va="center", bbox=box, zorder=6)
+
+
+def _moments(walk: Walk) -> list[tuple[int, str, Array]]:
+    """At most four frames in order of time, no frame twice, with what happens there and where, (2,)."""
+    joints, radius = walk.frame_joints, chain.circle_radii(walk).max()
+    above = walk.setup.floor.distances(joints.reshape(-1, 2)).reshape(joints.shape[:-1])
+    last = len(joints) - 1
+    found: dict[int, tuple[str, Array]] = {}
+    touching = np.flatnonzero(above.min(axis=1) < 1.02 * radius)
+    if touching.size:
+        frame = int(touching[0])
+        found[frame] = "first touch", joints[frame, np.argmin(above[frame])]
+    for title, moment, spot_of in (
+        ("first self-contact", walk.self_contact_at, _meeting),
+        ("collapse", walk.collapsed_at, _sharpest_bend),
+    ):
+        if not np.isnan(moment):
+            frame = min(int(np.searchsorted(walk.frame_time, moment)), last)
+            found[frame] = title, spot_of(joints[frame])
+    middle = np.median(joints[last, :, 0])
+    title = "rest" if walk.status is Status.AT_REST else "end"
+    found[last] = title, np.array([middle, walk.setup.floor.heights(middle)])
+    return [(frame, *found[frame]) for frame in sorted(found)]
+
+
+def _meeting(joints: Array) -> Array:
+    """Where two joints at least 3 links apart are closest, (2,)."""
+    count = len(joints)
+    apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
+    distances = np.linalg.norm(joints[:, None] - joints, axis=-1)
+    distances[np.minimum(apart, count - apart) < 3] = np.inf
+    return np.asarray(joints[[*np.unravel_index(np.argmin(distances), distances.shape)]].mean(axis=0))
+
+
+def _sharpest_bend(joints: Array) -> Array:
+    """The joint at which the chain turns most over three links, (2,)."""
+    step = joints - np.roll(joints, 1, axis=0)
+    direction = np.arctan2(step[:, 1], step[:, 0])
+    turn = np.angle(np.exp(1j * (np.roll(direction, -2) - np.roll(direction, 1))))
+    return np.asarray(joints[np.argmax(np.abs(turn))])

@@ -7,19 +7,23 @@ been run yet, is on the figure.
 from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import suppress
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from warpchain.inputs.arrays import Array
+from warpchain.inputs.distributions import random_generator
+from warpchain.pictures import labels
 from warpchain.pictures.grid_figure import draw_grid
-from warpchain.pictures.labels import COUNTS, cell_values, lost_note, quantity_label, quantity_name, quantity_text
+from warpchain.pictures.labels import cell_values, quantity_name, quantity_text
 from warpchain.pictures.style import BLUE, FAINT, GREEN, INK, LINE_COLORS, RED, NothingToShow, Picture, panel_grid, tidy
-from warpchain.reports.sensitivity import sensitivity
+from warpchain.status import Status
 from warpchain.store.block_result import BlockResult
 from warpchain.store.sweep_result import SweepResult
+from warpchain.sweeps.designs import sobol_indices, walks_per_sample
 from warpchain.walks.rows import quantity_of
 
 _STARTS: Final = {
@@ -30,8 +34,6 @@ _STARTS: Final = {
 """How the chain started → legend, colour, marker."""
 _OTHERS: Final = (*zip((BLUE, *LINE_COLORS[3:6]), "^vP*", strict=True), *[(INK, "X")] * 100)
 """Colour and marker of further blocks of the same start."""
-_MOST_PANELS: Final = 6
-"""Up to so many numbers of links, each with a panel, Figure 6 shows; beyond, a figure of the grid does."""
 
 
 def figures(result: SweepResult, quantity: str = "dx") -> Iterator[Picture]:
@@ -72,7 +74,7 @@ def _varied(block: BlockResult) -> list[str]:
 
 def _is_series(block: BlockResult) -> bool:
     """Whether Figure 6 can show a block: nothing but links, frequency and start varies in it."""
-    few = len(block.axes.get("links", ())) <= _MOST_PANELS
+    few = len(block.axes.get("links", ())) <= 6  # each has a panel; beyond, a figure of the grid is clearer
     return few and set(_varied(block)) <= {"links", "frequency", "start"} and "frequency" not in block.drawn
 
 
@@ -99,14 +101,11 @@ def figure6(result: SweepResult) -> Picture:
                 own[values["start"]], looks[label] = label, {"color": color, "marker": marker}
             row = values["frequency"], float(found.mean[place]), float(found.sd[place])
             cells[values["links"]][own[values["start"]]].append(row)
-            lost[values["links"]].append({name: getattr(found, name)[place] for name in COUNTS})
+            lost[values["links"]].append({name: getattr(found, name)[place] for name in labels.COUNTS})
     rows = np.array([row for series in cells.values() for each in series.values() for row in each]).reshape(-1, 3)
     frequencies = np.unique(rows[:, 0])
     if not np.isfinite(rows[:, 1]).any() or len(cells) == len(frequencies) == 1:
-        raise NothingToShow(
-            "Figure 6 takes walks at rest in a block with nothing but links and frequency as axes; let the sweep go "
-            "on, or give such a block"
-        )
+        raise NothingToShow("Figure 6 takes walks at rest over links and frequency; let the sweep go on, or give such")
     gap = float(np.diff(frequencies).min()) if len(frequencies) > 1 else 1.0
     columns = {1: 1, 2: 2, 4: 2}.get(len(cells), 3)
     size = max(4.2, 3.1 * columns), 1.0 + 2.6 * -(-len(cells) // columns)
@@ -123,13 +122,13 @@ def figure6(result: SweepResult) -> Picture:
             axes.bar(x, 2 * sd, width, mean - sd, facecolor=(color, 0.2), edgecolor=color, zorder=2.2)
             axes.plot(x, mean, linestyle="", markersize=4.5, zorder=3, **looks[label])
         axes.set_title(f"$n$ = {links}", fontsize="medium", loc="left")
-        axes.set_xlabel(lost_note(lost[links]), color=RED, fontsize="small")
+        axes.set_xlabel(labels.lost_note(lost[links]), color=RED, fontsize="small")
         tidy(axes, grid="y")
     if len(frequencies) <= 8:
         used[0].set_xticks(frequencies, [f"{frequency:g}" for frequency in frequencies])
     used[0].set_xlim(frequencies[0] - 0.6 * gap, frequencies[-1] + 0.6 * gap)
     used[0].set_ylim(bottom=min(0.0, 1.05 * float(np.nanmin(rows[:, 1] - 2 * np.nan_to_num(rows[:, 2])))))
-    figure.supxlabel(quantity_label("frequency"), fontsize="medium")
+    figure.supxlabel(labels.quantity_label("frequency"), fontsize="medium")
     figure.supylabel(f"{quantity_text('dx')} / m", fontsize="medium")
     handles: list[Any] = [Line2D([], [], linestyle="", label=label, **look) for label, look in looks.items()]
     handles += [
@@ -143,3 +142,95 @@ def figure6(result: SweepResult) -> Picture:
         figure.legend(handles=handles, loc="outside upper center", ncols=columns, frameon=False, fontsize="small")
     caption = "Distance walked against the frequency of the sprocket, as in the paper's Figure 6: mean, box of one and "
     return Picture("distance", caption + "bar of two standard deviations.", figure)
+
+
+CONFIDENCE: Final = 0.95
+"""Confidence level of bootstrap intervals."""
+
+
+class Sensitivity(NamedTuple):
+    """Sobol' indices of the distance in one cell, which a text describes, for d drawn quantities of some names.
+
+    Indices are the share of the variance that each causes by itself, and together with others, (2, d); intervals are
+    bootstrap intervals of these, (2, d, 2). Samples have d + 2 walks each; lost are those that are not complete.
+    """
+
+    cell: str
+    names: tuple[str, ...]
+    indices: Array
+    intervals: Array
+    samples: int
+    lost: int
+
+
+def sensitivities(result: SweepResult) -> list[Sensitivity]:
+    """Sobol' indices of the distance in each cell that was sampled by ``saltelli``.
+
+    The intervals are percentiles of 1000 bootstrap resamples of the samples, from a fixed stream of random numbers.
+    `NothingToShow`: no block is sampled so, or none has a cell with two complete samples yet.
+    """
+    named = [given["name"] for given in result.sweep["blocks"] if given["sampler"] == "saltelli"]
+    if not named:
+        raise NothingToShow("no block is sampled for Sobol indices; give sampler: saltelli")
+    found = []
+    for name in named:
+        block = result.blocks[name]
+        for place in np.ndindex(*block.shape[:-1]):
+            rested = block.columns["status"][place] == Status.AT_REST
+            walks = np.where(rested, block.columns["dx"][place], np.nan)
+            whole = walks.reshape(-1, walks_per_sample("saltelli", len(block.drawn)))
+            complete = whole[np.isfinite(whole).all(axis=1)]
+            samples, indices = len(complete), np.array(sobol_indices(complete))
+            if samples < 2 or not np.isfinite(indices).all():
+                continue
+            rng = random_generator(0)
+            draws = (rng.integers(0, samples, samples) for _ in range(1000))
+            resampled = [sobol_indices(complete[draw]) for draw in draws]
+            # The indices are NaN for a resample without variance, which repeats a single sample.
+            intervals = np.nanpercentile(resampled, (50 * (1 - CONFIDENCE), 50 * (1 + CONFIDENCE)), axis=0)
+            cell = labels.cell_text(cell_values(block.axes, place))
+            text = ": ".join([*[name] * (len(named) > 1), *[cell] * bool(cell)]) or block.name
+            lost = len(whole) - samples
+            found.append(Sensitivity(text, block.drawn, indices, intervals.transpose(1, 2, 0), samples, lost))
+    if not found:
+        raise NothingToShow("no cell has two complete samples for Sobol indices yet; let the sweep go on")
+    return found
+
+
+def sensitivity(result: SweepResult) -> Picture:
+    """Sobol' indices of the distance with a panel for each cell; errors as of `sensitivities`.
+
+    All panels have the quantities in the same order, by the mean of their total indices, the greatest at the top.
+    """
+    cells = sensitivities(result)
+    totals: dict[str, list[float]] = {}
+    for cell in cells:
+        for name, total in zip(cell.names, cell.indices[1].tolist(), strict=True):
+            totals.setdefault(name, []).append(total)
+    names = sorted(totals, key=lambda name: -float(np.mean(totals[name])))
+    columns = min(len(cells), 3)
+    size = max(4.2, 2.4 + 3.2 * columns), 0.9 + (0.6 + 0.36 * len(names)) * -(-len(cells) // columns)
+    figure = Figure(figsize=size, layout="constrained")
+    used, _ = panel_grid(figure, len(cells), columns, sharex=True)
+    for axes, cell in zip(used, cells, strict=True):
+        places = np.array([names.index(name) for name in cell.names])
+        for order, shift, color, label in ((1, -0.2, BLUE, "total"), (0, 0.2, LINE_COLORS[5], "first order")):
+            axes.barh(places + shift, cell.indices[order], height=0.38, color=color, label=label)
+            axes.hlines(places + shift, *cell.intervals[order].T, color=INK, linewidth=1.2)
+        axes.axvline(0.0, color=INK, linewidth=0.8)
+        axes.set_title(cell.cell, fontsize="medium", loc="left")
+        if cell.lost:
+            note = f"{cell.lost} of {cell.samples + cell.lost} samples are not complete"
+            axes.set_xlabel(note, color=RED, fontsize="small")
+        tidy(axes, grid="x")
+    used[0].set_yticks(range(len(names)), [quantity_text(name) for name in names])
+    used[0].set_ylim(len(names) - 0.4, -0.6)
+    figure.supxlabel(f"share of the variance of $Δx$, with {CONFIDENCE:.0%} intervals", fontsize="medium")
+    figure.legend(*used[0].get_legend_handles_labels(), loc="outside upper right", frameon=False, ncols=2)
+    caption = (
+        "Sobol indices: the share of the variance of the distance walked that a quantity causes by itself (first "
+        f"order) and takes part in (total); lines are {CONFIDENCE:.0%} bootstrap intervals. Walks are chaotic: "
+        "changing anything a little scatters them, which all total indices contain alike. "
+        f"Samples: {', '.join(f'{cell.samples}' for cell in cells)}."
+    )
+    return Picture("sensitivity", caption, figure)

@@ -5,46 +5,36 @@ the software; on demand also one walk in motion. The same folder always gives th
 """
 
 import math
-import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from html import escape
 from itertools import chain, repeat
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Final
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
+from matplotlib.figure import Figure
 
-from warpchain.files import Kind, checked_output, write_whole
+from warpchain.files import AnyPath, Kind, checked_output, write_whole
+from warpchain.inputs.arrays import AnyArray
 from warpchain.inputs.validation import short
-from warpchain.pictures.inline import image, png
 from warpchain.pictures.labels import cell_table, cell_text, cell_values, unit_text
+from warpchain.pictures.style import image, png
 from warpchain.reports.sweep_figures import figures
 from warpchain.status import Status
 from warpchain.store.block_result import BlockResult
-from warpchain.store.manifest import Folder
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.version import VERSION
-from warpchain.walks.faults import FAULTS
+from warpchain.walks.landmarks import FAULTS
 from warpchain.walks.walk_result import WalkResult
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-Array = NDArray[Any]
-
-FRAME_INTERVAL: Final = 2e-3
-"""Time between two frames of the walk in motion [s]."""
 
 _MOST_LISTED: Final = 100
 """Greatest number of walks with the same status or fault that are listed one by one."""
 
-_DPI: Final = 160
-
 _PAGE: Final = Path(__file__).with_name("sweep_page.html").read_text(encoding="utf-8")
-"""The page, whose policy makes the browser refuse to load anything; `_page` fills in what stands in double braces."""
+"""The page, whose policy makes the browser refuse to load anything; `write_report` fills in the double braces."""
 _HEAD: Final = _PAGE[: _PAGE.index('<meta name="viewport"')].encode()
 """What a report begins with."""
 
@@ -58,9 +48,7 @@ REPORTS: Final = Kind("page that warpchain report has written", _is_report)
 """All that a report replaces."""
 
 
-def write_report(
-    directory: Folder, path: str | os.PathLike[str], *, animation_of: int | None = None, device: str | None = None
-) -> None:
+def write_report(folder: AnyPath, path: AnyPath, *, animation_of: int | None = None, device: str | None = None) -> None:
     """Write the report of a sweep, which may still be running, as one HTML page, whole or not at all.
 
     An older report is replaced. The walk of a number is shown in motion, from its frames in the sweep or else run again
@@ -71,33 +59,41 @@ def write_report(
         InputError: there is no sweep in the folder, a shard is damaged or foreign, there is no such walk, or the file
             is one of the sweep's own.
     """
-    result = load(directory)
+    result = load(folder)
     checked_output(path, REPORTS)
     columns = [block.columns["status"] for block in result.blocks.values()]
     failed = [(each.label, each.sentence, [own == each for own in columns]) for each in Status if not each.ok]
     faults = [block.faults for block in result.blocks.values()]
     inaccurate = [(name, remedy, [own[name] for own in faults]) for name, remedy in FAULTS.items()]
+    resolved = yaml.safe_dump(result.sweep, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
+    note = "Values are in SI units; gaussian and uniform are what samples draw. <code>warpchain parameters</code> "
+    origin = [[name, f"{value}"] for name, value in result.notes().items() if name != "sweep"]
+    again = "<p>With the text under Sweep in a file: <code>warpchain sweep FILE.yaml -o DIR</code></p>"
     sections = {
         "Figures": "\n".join(_picture(each.figure, each.caption) for each in figures(result)),
         "Cells": _cells(result),
         "Failed walks": _listed(result, failed) or "<p>None.</p>",
         "Inaccurate walks": _listed(result, inaccurate),
         "One walk": "" if animation_of is None else _walk(result, animation_of, device),
-        "Sweep": _sweep(result),
-        "Provenance": _provenance(result),
+        "Sweep": f"<p>{note}says what each quantity is.</p><pre>{escape(resolved)}</pre>",
+        "Provenance": _table(["", ""], [*origin, ["this page", f"warpchain {VERSION}"]]) + again,
     }
-    text = _page(result.name, _tiles(result), {title: text for title, text in sections.items() if text})
-    write_whole(path, text, REPORTS)
-
-
-def _tiles(result: SweepResult) -> dict[str, tuple[int, str]]:
-    """The numbers at the top of the page, see `_page`."""
-    ends = {status.label: status.ok for status in Status} | {"missing": True}
-    tiles = {"walks": (result.walk_count, "")}
-    for label, count in result.summary().items():
-        tiles |= {label.replace("_", " "): (count, "" if ends[label] else "bad")} if count else {}
-    inaccurate = result.inaccurate_count
-    return tiles | ({"inaccurate": (inaccurate, "bad")} if inaccurate else {})
+    links, parts = [], []
+    for heading, text in sections.items():
+        if text:
+            anchor = heading.lower().replace(" ", "-")
+            links.append(f'<a href="#{anchor}">{heading}</a>')
+            parts.append(f'<section id="{anchor}"><h2>{heading}</h2>\n{text}\n</section>')
+    good = {status.label for status in Status if status.ok} | {"walks", "missing"}  # the others stand out
+    counts = {"walks": result.walk_count, **result.summary(), "inaccurate": result.inaccurate_count}
+    boxes = [
+        f'<div class="{"" if label in good else "bad"}"><dt>{label.replace("_", " ")}</dt><dd>{count:,}</dd></div>'
+        for label, count in counts.items()
+        if count or label == "walks"
+    ]
+    content = {"title": escape(result.name), "numbers": "".join(boxes)}
+    content |= {"links": " ".join(links), "sections": "\n".join(parts)}
+    write_whole(path, re.sub(r"{{(\w+)}}", lambda found: content[found[1]], _PAGE), REPORTS)
 
 
 def _cells(result: SweepResult) -> str:
@@ -110,11 +106,11 @@ def _cells(result: SweepResult) -> str:
         found = block.statistics("dx")
         head, rows = cell_table(found)
         parts += [f"<h3>{escape(block.name)}</h3>"] * (len(result.blocks) > 1)
-        parts.append(_table(head, rows, numeric=True, marked=found.failed.ravel() > 0))
+        parts.append(_table(head, rows, right=True, bad=found.failed.ravel() > 0))
     return "\n".join(parts)
 
 
-def _listed(result: SweepResult, found: Iterable[tuple[str, str, Sequence[Array]]]) -> str:
+def _listed(result: SweepResult, found: Iterable[tuple[str, str, Sequence[AnyArray]]]) -> str:
     """Walks with their block, cell and sample, of many only the first.
 
     Each item of `found` is a heading, what it means and what to try, and which walks of each block it is said of.
@@ -136,23 +132,21 @@ def _listed(result: SweepResult, found: Iterable[tuple[str, str, Sequence[Array]
 def _walk(result: SweepResult, index: int, device: str | None) -> str:
     """One walk, as kept or else run again: its numbers, a player, and its pictures."""
     from warpchain.run.sweep_run import on_device
-    from warpchain.walks.one_walk import run_walk
 
     block, place = result.located(index)
-    sweep = result.origin
-    planned = (sweep if device is None else on_device(sweep, device)).planned(index)
+    if device is not None:
+        block = replace(block, origin=on_device(block.origin, device))
+    planned, frames = block.origin.planned(index), block.origin.recording.frames
     cell = cell_values(block.axes, place[:-1])
     names = [f"block {block.name}"] * (len(result.blocks) > 1) + [cell_text(cell)] * bool(cell)
-    names += [f"sample {place[-1]}"]
-    frames = sweep.recording.frames
     if frames is not None and frames.includes(planned.sample) and block.kept[place]:
         walk, again, source = block.walk_motion(place), "", "Its frames were kept by the sweep."
     else:
-        walk = run_walk(planned.setup, frame_interval=FRAME_INTERVAL)
+        walk = block.walk(index)
         again, source = ", run again for this page", _compared(walk, block, place)
     distance = f"Δx = {walk.dx:.4f} m in {walk.walk_time:.2f} s with {walk.bounces} bounce{'s' * (walk.bounces != 1)}"
     end = distance if math.isfinite(walk.dx) else walk.status.label
-    text = f"Walk {index} ({', '.join(names)}){again}: {end}. {source}"
+    text = f"Walk {index} ({', '.join([*names, f'sample {place[-1]}'])}){again}: {end}. {source}"
     parts = [f"<p>{escape(text)}</p>", _player(walk)]
     if len(walk.frame_time) and np.isfinite(walk.frame_joints).all():
         caption = "Height and speed of the centre of mass, as in the paper's Figure 5."
@@ -191,52 +185,20 @@ def _compared(walk: WalkResult, block: BlockResult, place: tuple[int, ...]) -> s
     return f"The sweep has another result, {stored}: it was computed by other software or on another machine."
 
 
-def _sweep(result: SweepResult) -> str:
-    """The resolved sweep as a YAML file, in which every parameter has its value."""
-    text = yaml.safe_dump(result.sweep, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
-    note = "Values are in SI units; gaussian and uniform are what samples draw. <code>warpchain parameters</code> "
-    return f"<p>{note}says what each quantity is.</p><pre>{escape(text)}</pre>"
-
-
-def _provenance(result: SweepResult) -> str:
-    """Seed, digest and versions of the software, and how to run the sweep again."""
-    rows = [[name, f"{value}"] for name, value in result.notes().items() if name != "sweep"]
-    rows.append(["this page", f"warpchain {VERSION}"])
-    again = "<p>With the text under Sweep in a file: <code>warpchain sweep FILE.yaml -o DIR</code></p>"
-    return _table(["", ""], rows) + again
-
-
-def _page(title: str, tiles: Mapping[str, tuple[int, str]], sections: Mapping[str, str]) -> str:
-    """A whole page: title, numbers by label, "bad" if they need attention or else "", content in HTML by heading."""
-    numbers = (
-        f'<div class="{kind}"><dt>{label}</dt><dd>{count:,}</dd></div>' for label, (count, kind) in tiles.items()
-    )
-    links, parts = [], []
-    for heading, text in sections.items():
-        anchor = heading.lower().replace(" ", "-")
-        links.append(f'<a href="#{anchor}">{heading}</a>')
-        parts.append(f'<section id="{anchor}"><h2>{heading}</h2>\n{text}\n</section>')
-    content = {"numbers": "".join(numbers), "links": " ".join(links), "sections": "\n".join(parts)}
-    content["title"] = escape(title)
-    return re.sub(r"{{(\w+)}}", lambda found: content[found[1]], _PAGE)
-
-
-def _picture(figure: "Figure", caption: str) -> str:
+def _picture(figure: Figure, caption: str) -> str:
     """A figure with its caption; the image is part of the HTML."""
-    shown = image(png(figure, _DPI), caption, f"{round(96 * figure.get_figwidth())}px")
+    shown = image(png(figure, 160), caption, f"{round(96 * figure.get_figwidth())}px")
     return f"<figure>{shown}<figcaption>{escape(caption)}</figcaption></figure>"
 
 
-def _table(
-    head: Sequence[str], rows: Iterable[Sequence[str]], *, numeric: bool = False, marked: Iterable[bool] = ()
-) -> str:
-    """A table of texts in HTML, of numbers if `numeric`; without a head if that is empty; marked rows stand out."""
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]], *, right: bool = False, bad: Iterable[bool] = ()) -> str:
+    """A table of texts in HTML, to the right or left; without a head if that is empty; bad rows stand out."""
 
     def cells(tag: str, texts: Sequence[str]) -> str:
         return "".join(f'<{tag} style="text-align:{side}">{escape(text)}</{tag}>' for text in texts)
 
-    side = "right" if numeric else "left"
+    side = "right" if right else "left"
     top = f"<thead><tr>{cells('th', head)}</tr></thead>" if any(head) else ""
-    kinds = chain((" class=bad" if bad else "" for bad in marked), repeat(""))
+    kinds = chain((" class=bad" if is_bad else "" for is_bad in bad), repeat(""))
     body = "\n".join(f"<tr{kind}>{cells('td', row)}</tr>" for row, kind in zip(rows, kinds, strict=False))
     return f'<div class="wide"><table>{top}<tbody>\n{body}\n</tbody></table></div>'

@@ -8,8 +8,9 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from datetime import timedelta
 
-from warpchain.walks.one_walk import Progress
+from warpchain.walks.walk_phases import Progress
 
 LINE_EVERY = 60.0
 """Time [s] between two lines of progress where there is neither a terminal nor a notebook."""
@@ -27,7 +28,7 @@ class SweepProgress:
         before: Walks that were on disk when this run began.
         seconds: Wall time [s] of this run so far.
         statuses: Number of walks of this run by status label.
-        inaccurate: Walks of this run that are inaccurate, see `warpchain.walks.faults`.
+        inaccurate: Walks of this run that are inaccurate, see `warpchain.walks.landmarks`.
         compiling: Kernels are being compiled, which takes seconds to minutes the first time on a machine.
     """
 
@@ -43,11 +44,6 @@ class SweepProgress:
     def rate(self) -> float:
         """Walks per second of this run."""
         return (self.done - self.before) / self.seconds if self.seconds > 0 else 0.0
-
-    @property
-    def time_left(self) -> float | None:
-        """Seconds to go at this rate; None before the first walk is over."""
-        return (self.walks - self.done) / self.rate if self.rate > 0 else None
 
 
 OnProgress = Callable[[SweepProgress], None]
@@ -86,19 +82,13 @@ def changing_line(in_terminals: bool = True, every: float = math.inf) -> Iterato
             print(file=stream)
 
 
-@contextlib.contextmanager
-def progress_bar() -> Iterator[OnProgress]:
-    """Yield a function that shows progress as a bar, without a terminal and a notebook once a minute."""
-    with changing_line(every=LINE_EVERY) as show:
-        yield lambda progress: show(progress_text(progress))
-
-
 def progress_text(progress: SweepProgress) -> str:
     """How far a sweep is, in one line."""
     if progress.compiling:
         return COMPILING
-    left = "" if progress.time_left is None else f"   {duration_text(progress.time_left)} left"
-    rate = f"{progress.rate:.2f} a second{left}"
+    rate = f"{progress.rate:.2f} a second"
+    if progress.rate > 0:  # else no walk is over yet
+        rate += f"   {timedelta(seconds=round((progress.walks - progress.done) / progress.rate))} left"
     bar = f"[{'#' * (10 * progress.done // progress.walks):10}]"
     return f"{bar} {progress.done:,} of {progress.walks:,} walks   {rate}   {counts_text(progress)}"
 
@@ -109,10 +99,3 @@ def walk_progress_text(progress: Progress) -> str:
         return COMPILING
     where, speed = f"{progress.phase:8}{progress.time:8.3f} s", f"{progress.speed:9.3f} m/s"
     return f"{where}{speed}{progress.attempts:14,} steps"
-
-
-def duration_text(seconds: float) -> str:
-    """Hours, minutes and seconds, as far as needed."""
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours} h {minutes:02} min" if hours else f"{minutes} min {rest:02} s" if minutes else f"{rest} s"

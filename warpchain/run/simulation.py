@@ -15,7 +15,7 @@ from warpchain.inputs.arrays import Array, checked_array
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene, check_links_on_gpu
-from warpchain.inputs.sections import takes_fields
+from warpchain.inputs.setup import takes_fields
 from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError, checked, plain, shown, validated
 from warpchain.status import Status
@@ -24,6 +24,7 @@ LONGEST = 1e9
 """Durations [s] from here on are refused."""
 MOST_PLACES = 10_000_000
 """Most links × instants of a trajectory, which take 0.5 GB."""
+_Numbers = Sequence[int] | NDArray[np.integer[Any]]
 _UNSOFTENED = {"soften_pile": False, "soften_drive": False}
 """A given chain has no phases in which joints soften."""
 
@@ -111,7 +112,16 @@ def simulate(
     for name in _UNSOFTENED:
         if getattr(options, name):
             raise InputError(f"options.{name}: only a walk has phases in which joints soften; leave it out")
-    state = _checked_state(parameters, position, velocity)
+    if not isinstance(parameters, State):
+        state = State.of_links(position, velocity, parameters)
+    elif position is not None or velocity is not None:
+        raise InputError("position: given together with a state, which has positions and velocities; leave them out")
+    elif parameters.axes is not None:
+        raise InputError("parameters: the plane of this state tilts, which simulate does not do; give walk(start=…) it")
+    elif parameters.memory and parameters.memory["state/softness"] > 0:
+        raise InputError("parameters: joints of this state are softened, as only a walk goes on; give walk(start=…) it")
+    else:
+        state = parameters
     scene = state.setup.scene
     if floor is not None:
         given = {"floor": "flat" if isinstance(floor, bool) else floor, "slope": 0.0}
@@ -119,12 +129,12 @@ def simulate(
     chain = state.parameters if gravity else state.parameters.with_values({"gravity": 0.0})
     setup = replace(state.setup, scene=scene, parameters=chain)
     check_links_on_gpu(state.links, options.device, "position")
-    instants = _checked_times(end, times)
+    instants = np.linspace(0.0, end, 101) if times is None else checked_array(times, "times", "t")
+    is_rising = times is None or bool(np.all(np.diff(instants) > 0))
+    if not len(instants) or instants[0] < 0 or instants[-1] > end or not is_rising:
+        raise InputError(f"times: give rising instants between 0 and the duration of {end} s")
     if len(instants) * state.links > MOST_PLACES:
-        raise InputError(
-            f"times: {len(instants)} instants of {state.links} links are too many; "
-            f"give at most {MOST_PLACES // state.links}"
-        )
+        raise InputError(f"times: {len(instants)} instants are too many; give at most {MOST_PLACES // state.links}")
     if floor is not False and not (floor is None and state.is_placed_as_in(state.setup)):
         setup.floor.check_above(state.position, chain.link_length, "position")
     with gpu_turn([options.device]):
@@ -132,23 +142,6 @@ def simulate(
         batch.set_up(0, setup)
         batch.load(0, state.position, state.velocity, stop_time=instants[0], stop_status=Status.FINISHED)
         return _follow(batch, "none" if floor is False else setup.floor.body, instants, end)
-
-
-def _checked_state(given: State | Parameters | str, position: Array | None, velocity: Array | None) -> State:
-    """The state of the chain, or an `InputError`."""
-    if not isinstance(given, State):
-        return State.of_links(position, velocity, given)
-    if position is not None or velocity is not None:
-        raise InputError("position: given together with a state, which has positions and velocities; leave them out")
-    if given.axes is not None:
-        raise InputError(
-            "parameters: the plane of this state tilts, and simulate keeps it fixed; give walk(start=…) it"
-        )
-    if given.memory and given.memory["state/softness"] > 0:
-        raise InputError(
-            "parameters: joints of this state are softened, which only a walk goes on with; give walk(start=…) it"
-        )
-    return given
 
 
 class Chains:
@@ -193,9 +186,7 @@ class Chains:
         position = checked_array(position, "position", "W", "n", 3)
         velocity, (worlds, links, _) = checked_array(velocity, "velocity", *position.shape), position.shape
         if len(parameters) != worlds or not all(isinstance(each, Parameters) for each in parameters):
-            raise InputError(
-                f"parameters: {shown(parameters)} are not Parameters of {worlds} chains; give those of each"
-            )
+            raise InputError(f"parameters: {shown(parameters)} are not of {worlds} chains; give Parameters of each")
         if worlds < 1 or links < 4 or links % 2:
             raise InputError(f"position: {worlds} chains of {links} links; give chains of an even number of at least 4")
         check_links_on_gpu(links, options.device, "position")
@@ -213,20 +204,18 @@ class Chains:
         """Codes of `Status`, (W,): FINISHED of a chain that can go on."""
         return self._batch.statuses().copy()
 
-    def motions(self, chains: Sequence[int] | NDArray[np.integer[Any]] | None = None) -> tuple[Array, Array]:
+    def motions(self, chains: _Numbers | None = None) -> tuple[Array, Array]:
         """Place and angle of the links of all chains, or of some numbers, (W, n, 3); and their rates."""
         return self._batch.motions(self._numbers(chains), self._links)
 
-    def set_velocity(self, chains: Sequence[int] | NDArray[np.integer[Any]], velocity: Array) -> None:
+    def set_velocity(self, chains: _Numbers, velocity: Array) -> None:
         """Give some chains, by their numbers, other velocities, (chains, n, 3); an `InputError` if they do not fit."""
         numbers = self._numbers(chains)
         rates = checked_array(velocity, "velocity", len(numbers), self._links, 3)
         if numbers:
             self._batch.place(numbers, self.motions(numbers)[0], rates)
 
-    def run(
-        self, until: float, chains: Sequence[int] | NDArray[np.integer[Any]] | None = None, *, to_rest: bool = False
-    ) -> None:
+    def run(self, until: float, chains: _Numbers | None = None, *, to_rest: bool = False) -> None:
         """Carry on all chains that can go on, or those of some numbers.
 
         Args:
@@ -247,7 +236,7 @@ class Chains:
                 self._batch.run(going, self._features)
         self.time = until
 
-    def _numbers(self, chains: Sequence[int] | NDArray[np.integer[Any]] | None) -> list[int]:
+    def _numbers(self, chains: _Numbers | None) -> list[int]:
         """Numbers of chains, by default all, or an `InputError`."""
         count = len(self.status)
         numbers: list[int] = checked(chains, "chains", list[Annotated[int, Field(ge=0, lt=count)]] | None)
@@ -283,13 +272,3 @@ def _follow(batch: Batch, body: str, instants: Array, end: float) -> Trajectory:
         greatest_opening=extremes["opening"],
         greatest_penetration={kind: extremes[kind] for kind in kinds},
     )
-
-
-def _checked_times(duration: float, times: Sequence[float] | Array | None) -> Array:
-    """Instants of a trajectory, which rise within the duration, or an `InputError`."""
-    if times is None:
-        return np.linspace(0.0, duration, 101)
-    instants = checked_array(times, "times", "t")
-    if not len(instants) or instants[0] < 0 or instants[-1] > duration or np.any(np.diff(instants) <= 0):
-        raise InputError(f"times: give rising instants between 0 and the duration of {duration} s")
-    return instants

@@ -1,13 +1,11 @@
 """One walk, from a user's few words to its result."""
 
-from collections.abc import Mapping
 from typing import Any, Literal
 
 from warpchain.inputs.distributions import Seed
-from warpchain.inputs.sections import by_section, takes_fields
-from warpchain.inputs.setup import DEFAULT_PRESET, Setup, continued, resolve
+from warpchain.inputs.setup import DEFAULT_PRESET, Setup, continued, resolve, takes_fields
 from warpchain.inputs.state import State
-from warpchain.inputs.validation import InputError, by_name, checked, shown
+from warpchain.inputs.validation import InputError, by_name, by_section, checked, shown
 from warpchain.run.progress_bar import changing_line, walk_progress_text
 from warpchain.walks.one_walk import OnProgress, run_walk
 from warpchain.walks.walk_result import WalkResult
@@ -74,19 +72,20 @@ def walk(
     given = by_name({**{name: value for name, value in named.items() if value is not None}, **settings})
     loads = checked(record_loads, "record_loads", bool)
     if isinstance(start, State) and setup is None:
-        for name, value, reason in (
-            ("preset", preset, "which has its parameters; give single ones instead"),
-            ("seed", seed, "for which nothing is drawn; leave it out"),
-        ):
+        for name, value in {"preset": preset, "seed": seed}.items():
             if value is not None:
-                raise InputError(f"{name}: given together with a state, {reason}")
+                raise InputError(f"{name}: given together with a state, which has its chain; leave it out")
         del given["start"]
         setup = continued(start, by_section(given))
     elif setup is None:
         preset = DEFAULT_PRESET if preset is None else preset
-        setup = resolve(preset, **by_section(given), seed=seed, records_loads=loads)
+        setup = resolve(preset, **by_section(given), seed=seed, loads=loads)
     else:
-        _check_repeated(setup, given if preset is None else {"preset": preset, **given}, seed)
+        if not isinstance(setup, Setup):
+            raise InputError(f"setup: {shown(setup)} is none; give that of a WalkResult, such as load_walk(…).setup")
+        if others := [*["preset"] * (preset is not None), *given]:
+            raise InputError(f"{', '.join(others)}: given together with setup, which is complete; leave one out")
+        checked(seed, "seed", Seed | None)
     with changing_line(in_terminals=False) as show:
         return run_walk(
             setup,
@@ -96,14 +95,3 @@ def walk(
             record_loads=loads,
             on_progress=on_progress or (lambda progress: show(walk_progress_text(progress))),
         )
-
-
-def _check_repeated(setup: object, others: Mapping[str, object], seed: int | None) -> None:
-    """Refuse what is no complete setup, settings beside one, and what is no seed, by an `InputError`."""
-    if not isinstance(setup, Setup):
-        raise InputError(
-            f"setup: {shown(setup)} is none of a walk; give setup of a WalkResult, such as load_walk(…).setup"
-        )
-    if others:
-        raise InputError(f"{', '.join(others)}: given together with setup, which is complete; leave one out")
-    checked(seed, "seed", Seed | None)

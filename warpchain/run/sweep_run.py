@@ -4,12 +4,13 @@ A worker runs the walks of shards, writes each shard to an immutable file and re
 any executor in the style of ``concurrent.futures`` will do, on this machine or another that sees the same folder.
 """
 
-import concurrent.futures
 import itertools
+import math
 import os
 import re
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -20,25 +21,37 @@ from pydantic import Field
 
 from warpchain.engine.devices import gpu_turn, has_gpu_turn, start_device
 from warpchain.engine.processors import processors
+from warpchain.files import AnyPath
 from warpchain.inputs.options import Options, on_gpu
-from warpchain.inputs.sections import SECTION_OF, by_section, takes_fields
-from warpchain.inputs.setup import DEFAULT_PRESET, Setup
-from warpchain.inputs.validation import InputError, Whole, by_name, checked, checked_path, plain, shown, validated
-from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text, progress_bar
-from warpchain.run.workers import Pulse, losses_named, pulsing_threads
+from warpchain.inputs.setup import DEFAULT_PRESET, Setup, Values, takes_fields
+from warpchain.inputs.validation import (
+    SECTION_OF,
+    InputError,
+    Whole,
+    by_name,
+    by_section,
+    checked,
+    checked_path,
+    plain,
+    shown,
+    validated,
+)
+from warpchain.run import progress_bar
+from warpchain.run.gpu_workers import Pulse, losses_named, pulsing_threads
+from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
-from warpchain.store.manifest import Shard
-from warpchain.store.shards import read_shard, write_shard
+from warpchain.store.shards import Part, Shard, opened_shard, rows_of, stamp, write_shard
 from warpchain.store.sweep_result import SweepResult, load
-from warpchain.sweeps.axes import is_axis
-from warpchain.sweeps.plan import PlannedWalk, Sweep, load_sweep
+from warpchain.sweeps.block import is_axis
+from warpchain.sweeps.plan import PlannedWalk, Source, Sweep, load_sweep
 from warpchain.sweeps.sweep_file import VERSION, BlockKeys
-from warpchain.walks.faults import LENGTHS
+from warpchain.walks.landmarks import LENGTHS
 from warpchain.walks.rows import MISSING, derived_columns, faults_of_columns, fill_row, missing_rows
 from warpchain.walks.scheduler import compile_kernels, run_setups
 
 T = TypeVar("T")
+Task = Future[None]
 
 KEYS: Final = (*BlockKeys.model_fields, "same_samples_along", "record", "name", "seed")
 """Keys of a sweep file that are keywords."""
@@ -46,8 +59,6 @@ SHARD_WALKS = 256
 """Most walks in a shard."""
 GPU_TASK_WALKS = 262144
 """Upper bound on the walks of a GPU's task, about; the GPU idles while the last walks finish."""
-POLL = 1.0
-"""Time [s] between two checks for shards that tasks under way have written."""
 PASSES = 8
 """Times that a sweep on a CPU is gone through."""
 SHARDS = 32
@@ -119,21 +130,15 @@ def sweep(
     if hasattr(executor, "get_executor"):
         count = count or sum(executor.nthreads().values())
         executor = executor.get_executor(pure=False)  # pure: a task that failed would fail again, unrun
-    with ExitStack() as shown:
-        if on_progress is None:
-            on_progress = shown.enter_context(progress_bar()) if progress else lambda progress: None
-        _run_in_folder(planned, folder, executor, count, fresh, own, on_progress)
+    with progress_bar.changing_line(every=progress_bar.LINE_EVERY if progress else math.inf) as show:
+        report = on_progress or (lambda seen: show(progress_bar.progress_text(seen)) if progress else None)
+        _run_in_folder(planned, folder, executor, count, fresh, own, report)
     return load(folder)
 
 
 def _checked_call(
-    source: str | os.PathLike[str] | Mapping[str, Any] | Sweep | None,
-    out: str | os.PathLike[str] | None,
-    settings: Mapping[str, object],
-    device: str | None,
-    workers: int | None,
-    part: str | None,
-) -> tuple[Sweep, Path, tuple[int, int], int | None]:
+    source: Source | None, out: AnyPath | None, given: Values, device: str | None, workers: int | None, part: str | None
+) -> tuple[Sweep, Path, Part, int | None]:
     """The sweep on its device, its folder, its part, and the number of workers; an `InputError` for all refused."""
     problems: list[str] = []
 
@@ -148,7 +153,7 @@ def _checked_call(
         found = sweep_of_keywords(settings, folder) if source is None else load_sweep(source, **replaced)
         return found if device is None else on_device(found, device)
 
-    settings = {name: value for name, value in settings.items() if value is not None or name not in KEYS}
+    settings = {name: value for name, value in given.items() if value is not None or name not in KEYS}
     replaced = {name: plain(settings[name], name) for name in ("seed", "samples") if name in settings}
     if source is not None and (others := [name for name in settings if name not in replaced]):
         names = ", ".join(others)
@@ -161,7 +166,7 @@ def _checked_call(
     return planned, folder, own, count
 
 
-def sweep_of_keywords(given: Mapping[str, object], out: str | os.PathLike[str] | None) -> Sweep:
+def sweep_of_keywords(given: Values, out: AnyPath | None) -> Sweep:
     """The sweep that keyword arguments describe; an `InputError` with a line for each value that is refused.
 
     They are `KEYS`, and fields of a walk by name or symbol; a list or a range is an axis of the grid, behind those
@@ -186,7 +191,7 @@ def sweep_of_keywords(given: Mapping[str, object], out: str | os.PathLike[str] |
     return load_sweep(content)
 
 
-def checked_part(given: object) -> tuple[int, int]:
+def checked_part(given: object) -> Part:
     """Number of a part and number of parts of "k/N", 1/1 of None, or an `InputError`."""
     if given is None:
         return 1, 1
@@ -197,13 +202,7 @@ def checked_part(given: object) -> tuple[int, int]:
 
 
 def _run_in_folder(
-    planned: Sweep,
-    folder: Path,
-    executor: Any,
-    workers: int | None,
-    fresh: bool,
-    part: tuple[int, int],
-    report: OnProgress,
+    planned: Sweep, folder: Path, executor: Any, workers: int | None, fresh: bool, part: Part, report: OnProgress
 ) -> None:
     """Run what is missing in a folder."""
     axes = (*Options.model_fields, "links", "start", "plane")  # along them kernels may differ
@@ -232,9 +231,9 @@ def _run_in_folder(
             executor, pulse = held.enter_context(pulsing_threads(at_once))
         if missing:
             tasks = _tasks(planned, missing, at_once if pulse is None else 1)  # threads take turns on a GPU
-            where = str(store.directory), store.stamp
+            where = str(store.directory), stamp(store.directory)
             submitted = (executor.submit(run_shards, planned, *where, tuple(task), pulse) for task in tasks)
-            _follow(submitted, 2 * at_once, pulse, planned, store, missing, progress, report)
+            _follow(submitted, 2 * at_once, pulse or Pulse(), store, progress, report)
         counts = counts_text(progress) or "nothing to do"
         store.log(f"complete after {progress.seconds:.1f} s: {counts}")
 
@@ -257,10 +256,10 @@ def on_device(planned: Sweep, device: str) -> Sweep:
     return moved
 
 
-def run_shards(planned: Sweep, directory: str, stamp: str, shards: Sequence[Shard], pulse: Pulse | None = None) -> None:
+def run_shards(planned: Sweep, directory: str, seal: str, shards: Sequence[Shard], pulse: Pulse | None = None) -> None:
     """Run the walks of some shards and write each shard as soon as its walks are over; what a worker does.
 
-    The folder has to have the stamp, see `SweepFolder.stamp`. The pulse counts the walks that are over, and stops the
+    The seal is the `stamp` that the folder has to have. The pulse counts the walks that are over, and stops the
     work: unfinished shards are not written.
     """
     stop = None if pulse is None else pulse.stop
@@ -285,45 +284,38 @@ def run_shards(planned: Sweep, directory: str, stamp: str, shards: Sequence[Shar
             if keeps[number].series_every is not None:
                 motions[shard][row] = run.recorder.motion()
             if (rows[shard]["status"] != MISSING).all():
-                write_shard(directory, stamp, shard, rows.pop(shard), motions.pop(shard))
+                write_shard(directory, seal, shard, rows.pop(shard), motions.pop(shard))
 
 
 def _follow(
-    tasks: Iterator[concurrent.futures.Future[None]],
-    at_once: int,
-    pulse: Pulse | None,
-    planned: Sweep,
-    store: SweepFolder,
-    missing: Sequence[Shard],
-    progress: SweepProgress,
-    report: OnProgress,
+    tasks: Iterator[Task], at_once: int, pulse: Pulse, store: SweepFolder, progress: SweepProgress, report: OnProgress
 ) -> None:
     """Ask for so many tasks at once, so that memory does not grow with the sweep, and count the shards they write."""
     report(progress)
-    began, written, blocks = time.perf_counter(), 0, planned.blocks
-    folder, left = store.directory / "shards", {shard.name: shard for shard in missing}
+    began, written, blocks = time.perf_counter(), 0, store.manifest.sweep.blocks
+    folder, left = store.directory / "shards", {shard.name: shard for shard in store.missing()}
     lengths = {name: np.concatenate([block.parameter(name).ravel() for block in blocks]) for name in LENGTHS}
-    pending: set[concurrent.futures.Future[None]] = set()
+    pending: set[Task] = set()
     try:
         while True:
             with losses_named():
-                for future in itertools.islice(tasks, at_once - len(pending)):
-                    pending.add(future)
+                pending.update(itertools.islice(tasks, at_once - len(pending)))
                 if not pending:
                     break
-                finished, pending = concurrent.futures.wait(pending, POLL, concurrent.futures.FIRST_COMPLETED)
+                finished, pending = wait(pending, 1.0, FIRST_COMPLETED)  # looks for shards every second
                 for future in finished:
                     future.result()
             for name in left.keys() & set(os.listdir(folder)):
                 shard = left.pop(name)
-                rows = read_shard(store.directory, shard)
+                with opened_shard(store.directory, name, shard.digest) as file:
+                    rows = rows_of(file, shard.kind)
                 columns = {name: rows[name] for name in rows.dtype.names or ()}
                 own = {name: values[shard.walks % blocks[0].stride] for name, values in lengths.items()}
                 found = faults_of_columns(columns | derived_columns(columns), own)
                 progress.statuses.update(Status(int(code)).label for code in rows["status"])
                 progress.inaccurate += int(np.any([*found.values()], axis=0).sum())
                 written += len(shard)
-            progress.done = progress.before + max(written, 0 if pulse is None else pulse.over)
+            progress.done = progress.before + max(written, pulse.over)
             progress.seconds = time.perf_counter() - began
             report(progress)
     finally:

@@ -3,22 +3,23 @@
 import math
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.inputs.arrays import AnyArray
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.setup import Setup
-from warpchain.inputs.validation import InputError, InputWarning, plain, shown, suggestion
+from warpchain.inputs.validation import InputError, InputWarning, checked, plain, shown, suggestion
 from warpchain.status import Status
 from warpchain.store.cell_statistics import CellStatistics
 from warpchain.sweeps.block import POINT, Block
 from warpchain.sweeps.plan import Sweep
 from warpchain.walks import rows
-from warpchain.walks.faults import LENGTHS
+from warpchain.walks.landmarks import LENGTHS
 from warpchain.walks.rows import COLUMNS, MISSING, Column, quantity_of
 from warpchain.walks.walk_result import WalkResult, read_motion
 
@@ -27,9 +28,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-Array = NDArray[Any]
-
-_Variables = dict[str, tuple[tuple[str, ...], Array, dict[str, Any]]]
+_Variables = dict[str, tuple[tuple[str, ...], AnyArray, dict[str, Any]]]
 """Name → axes, values and attributes, as xarray takes them."""
 
 
@@ -53,12 +52,12 @@ class BlockResult:
 
     name: str
     number: int
-    axes: dict[str, Array]
+    axes: dict[str, AnyArray]
     drawn: tuple[str, ...]
-    columns: dict[str, Array]
+    columns: dict[str, AnyArray]
     origin: Sweep
     versions: dict[str, str]
-    motions: Array
+    motions: AnyArray
 
     @property
     def planned(self) -> Block:
@@ -75,9 +74,9 @@ class BlockResult:
         """Number of values of each axis, then the number of samples."""
         return self.columns["index"].shape
 
-    def __getattr__(self, name: str) -> Array:
+    def __getattr__(self, name: str) -> AnyArray:
         """A column."""
-        columns: dict[str, Array] = self.__dict__.get("columns", {})
+        columns: dict[str, AnyArray] = self.__dict__.get("columns", {})
         if name not in columns:
             raise AttributeError(f"{name}: no such column; columns are {', '.join(columns)}", name=name, obj=self)
         return columns[name]
@@ -111,12 +110,6 @@ class BlockResult:
     def is_there(self) -> NDArray[np.bool_]:
         """Whether a walk has been computed, shape `shape`."""
         return np.asarray(self.columns["status"] != MISSING)
-
-    def filled_from(self, other: "BlockResult") -> "BlockResult":
-        """The same block with the walks that only another result of it has."""
-        there = self.is_there
-        columns = {name: np.where(there, values, other.columns[name]) for name, values in self.columns.items()}
-        return replace(self, columns=columns, motions=np.where(there, self.motions, other.motions))
 
     @property
     def kept(self) -> NDArray[np.bool_]:
@@ -207,12 +200,9 @@ class BlockResult:
         walk = run_walk(self.setup_at(place), seed=self.origin.seed, **recording)  # type: ignore[arg-type]
         dx, number = self.columns["dx"][place], self.columns["index"][place]
         if self.is_there[place] and not self.has_same(walk, place):
-            warnings.warn(
-                f"walk {number}: Δx is {walk.dx:g} m, and {dx:g} m in the sweep; it is repeated to the bit by the "
-                "version that ran it, on the same kind of processor",
-                InputWarning,
-                stacklevel=2,
-            )
+            problem = f"walk {number}: Δx is {walk.dx:g} m, and {dx:g} m in the sweep"
+            remedy = "it is repeated to the bit by the version that ran it, on the same kind of processor"
+            warnings.warn(f"{problem}; {remedy}", InputWarning, stacklevel=2)
         return walk
 
     def has_same(self, walk: WalkResult, place: tuple[int, ...]) -> bool:
@@ -227,13 +217,16 @@ class BlockResult:
             samples = ", ".join(map(str, kept[:12]))
             remedy = f"give one of the samples {samples}" if samples else "a sweep with record: {series: true} keeps it"
             raise InputError(f"the motion of walk {self.columns['index'][place]} is not there; {remedy}")
-        values = {name: column[place] for name, column in self.columns.items()}
+        numbers: dict[str, Any] = {}
+        for name, column in rows.STORED_COLUMNS.items():
+            owner = numbers.setdefault(column.path[0], {}) if column.path[1:] else numbers
+            owner[column.path[-1]] = self.columns[name][place].item()
         setup = self.setup_at(place)
         at = [int(np.ravel_multi_index(place, self.shape))]
         (motion,) = (read_motion(group, setup.scene.links) for _, group in self.kept_motions(at))
         return WalkResult(
-            status=Status(int(values["status"])),
-            **rows.numbers_of(values),
+            status=Status(int(self.columns["status"][place])),
+            **numbers,
             **motion,
             wall_time=math.nan,
             setup=setup,
@@ -247,7 +240,7 @@ class BlockResult:
 
     @cached_property
     def faults(self) -> dict[str, NDArray[np.bool_]]:
-        """What makes walks inaccurate, a key of `warpchain.walks.faults.FAULTS` → whether each walk has it."""
+        """What makes walks inaccurate, a key of `warpchain.walks.landmarks.FAULTS` → whether each walk has it."""
         return rows.faults_of_columns(self.columns, {name: self.planned.parameter(name) for name in LENGTHS})
 
     @property
@@ -312,7 +305,7 @@ class BlockResult:
         return notes
 
 
-def status_counts(status: Array) -> dict[str, int]:
+def status_counts(status: AnyArray) -> dict[str, int]:
     """Number of walks by status label, in the order of the codes, missing ones last."""
     counts = {code.label: int((status == code).sum()) for code in Status}
     kept = {label: count for label, count in counts.items() if count or label == Status.AT_REST.label}
@@ -326,9 +319,7 @@ def counted(summary: Mapping[str, int]) -> str:
 
 def located(blocks: Sequence[BlockResult], index: object) -> tuple[BlockResult, tuple[int, ...]]:
     """Block and place along axes and samples of the walk with a number; an `InputError` if there is none."""
-    number = plain(index, "index")
-    if isinstance(number, bool) or not isinstance(number, int):
-        raise InputError(f"index: {shown(number)} is not the number of a walk; give a whole number")
+    number: int = checked(index, "index", int)
     found = [(block, tuple(map(int, at))) for block in blocks for at in np.argwhere(block.columns["index"] == number)]
     if not found:
         largest = max(int(block.columns["index"].max()) for block in blocks)

@@ -1,15 +1,13 @@
 """Statistics of a quantity in each cell of a grid."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.inputs.arrays import AnyArray
 from warpchain.status import Status
 from warpchain.walks.rows import MISSING
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -29,7 +27,7 @@ class CellStatistics:
         missing: number of walks not computed yet.
     """
 
-    axes: dict[str, Array]
+    axes: dict[str, AnyArray]
     unit: str
     mean: NDArray[np.float64]
     sd: NDArray[np.float64]
@@ -39,7 +37,7 @@ class CellStatistics:
     missing: NDArray[np.int64]
 
     @classmethod
-    def of(cls, axes: dict[str, Array], unit: str, column: Array, status: Array) -> "CellStatistics":
+    def of(cls, axes: dict[str, AnyArray], unit: str, column: AnyArray, status: AnyArray) -> "CellStatistics":
         """Statistics of a column over its last axis, that of the samples; ``status`` of the same walks."""
         rested = np.isin(status, [code for code in Status if code.ok])
         had = rested & (column != MISSING if column.dtype.kind == "i" else ~np.isnan(column))

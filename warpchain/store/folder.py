@@ -30,10 +30,10 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from warpchain.files import given_path, make_folder, naming, remove_output, write_whole
+from warpchain.files import AnyPath, given_path, make_folder, naming, remove_output, write_whole
 from warpchain.inputs.validation import DamagedFileError, InputError, InputWarning
-from warpchain.store.manifest import EARLIER, OWN, Folder, Manifest, Shard, read_manifest
-from warpchain.store.shards import FOREIGN, opened_shard, rows_of, shard_files, stamp
+from warpchain.store import shards
+from warpchain.store.shards import Manifest, Part, Shard, read_manifest
 from warpchain.sweeps.designs import EXTENSIBLE
 from warpchain.sweeps.plan import Sweep
 from warpchain.version import NUMERICS_VERSION
@@ -62,15 +62,8 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
     lock: int
     found: NDArray[np.bool_]
 
-    @property
-    def stamp(self) -> str:
-        """What `write_shard` wants of a worker."""
-        return stamp(self.directory)
-
     @classmethod
-    def open(
-        cls, directory: Folder, sweep: Sweep, *, fresh: bool = False, shard_size: int, part: tuple[int, int] = (1, 1)
-    ) -> Self:
+    def open(cls, directory: AnyPath, sweep: Sweep, shard_size: int, fresh: bool = False, part: Part = (1, 1)) -> Self:
         """Begin a sweep in a folder, made if need be, or go on with it, with more samples if the sweep has more.
 
         `fresh` deletes what a sweep has left there, and begins. New shards have `shard_size` walks, those that are
@@ -84,14 +77,28 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         """
         path = given_path(directory)
         make_folder(path)
-        _refuse_strangers(path)
+        for own in (path / name for name in (*shards.OWN, "lock")):
+            if own.is_symlink() or (own.exists() and not (own.is_file() or own.is_dir())):
+                kind = "a symbolic link" if own.is_symlink() else "a pipe or a device"
+                raise InputError(f"{own}: {kind}, where a sweep writes and deletes; remove it, or give another folder")
         is_new = not (path / "lock").exists()
         lock = _locked(path)
         try:
-            manifest = _prepared(path, sweep, Manifest.of(sweep, shard_size, part), fresh)
-            folder = cls(path, manifest, lock, np.zeros(len(manifest.keys), bool))
-            folder._check()
-            folder._describe()
+            manifest = _prepared(path, sweep, Manifest(sweep, shard_size, part), fresh)
+            damaged: dict[str, str] = {}
+            rows, _ = read_rows(path, manifest, damaged)
+            found = np.concatenate([block["status"].ravel() for block in rows]) != MISSING
+            folder = cls(path, manifest, lock, found)
+            for name, problem in damaged.items():
+                remove_output(path / "shards" / name)
+                folder.log(f"{problem}; deleted, its walks are computed again")
+                warnings.warn(f"{problem}; its walks are computed again", InputWarning, stacklevel=3)
+            if read_manifest(path).sweep.digest() != manifest.sweep.digest():
+                remove_output(path / "sweep.yaml")  # which is never older than sweep.h5
+                write_whole(path / "sweep.h5", manifest.image())
+            if not (path / "sweep.yaml").exists():
+                text = yaml.safe_dump(manifest.sweep.canonical(), sort_keys=False, allow_unicode=True)
+                write_whole(path / "sweep.yaml", _YAML_HEAD + text)
         except BaseException as error:
             if is_new and isinstance(error, InputError):
                 (path / "lock").unlink(missing_ok=True)
@@ -108,7 +115,7 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
 
     def missing(self) -> list[Shard]:
         """The shards that are not there yet, in order; errors as of `shard_files`."""
-        written = set(shard_files(self.directory))
+        written = set(shards.shard_files(self.directory))
         return [shard for shard in self.manifest.left(self.found) if shard.name not in written]
 
     def close(self) -> None:
@@ -119,29 +126,9 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         """Close."""
         self.close()
 
-    def _check(self) -> None:
-        """Refuse a folder with foreign shards, delete damaged ones, and note which walks are there."""
-        damaged: dict[str, str] = {}
-        rows, _ = read_rows(self.directory, self.manifest, damaged)
-        self.found[:] = np.concatenate([block["status"].ravel() for block in rows]) != MISSING
-        for name, problem in damaged.items():
-            remove_output(self.directory / "shards" / name)
-            self.log(f"{problem}; deleted, its walks are computed again")
-            warnings.warn(f"{problem}; its walks are computed again", InputWarning, stacklevel=4)
-
-    def _describe(self) -> None:
-        """Write what the folder says of its sweep, if that is new; sweep.yaml is never older than sweep.h5."""
-        description = self.directory / "sweep.yaml"
-        if read_manifest(self.directory).sweep.digest() != self.manifest.sweep.digest():
-            remove_output(description)
-            write_whole(self.directory / "sweep.h5", self.manifest.image())
-        if not description.exists():
-            text = yaml.safe_dump(self.manifest.sweep.canonical(), sort_keys=False, allow_unicode=True)
-            write_whole(description, _YAML_HEAD + text)
-
 
 def read_rows(
-    directory: Folder, manifest: Manifest, damaged: dict[str, str] | None = None
+    directory: AnyPath, manifest: Manifest, damaged: dict[str, str] | None = None
 ) -> tuple[list[Rows], list[NDArray[Any]]]:
     """For each block the rows of its walks, and of each what opens the file with its motion, and the group in there.
 
@@ -154,16 +141,16 @@ def read_rows(
         keys = manifest.keys[manifest.keys["block"] == number]
         tables.append(missing_rows(manifest.row_type, keys).reshape(-1, block.samples))
         motions.append(np.full(tables[-1].shape, None))
-    for name in shard_files(directory):
+    for name in shards.shard_files(directory):
         try:
-            with opened_shard(directory, name, manifest.digest) as file:
-                rows, kept = rows_of(file, manifest.row_type), [int(row) for row in file.get("motion", ())]
+            with shards.opened_shard(directory, name, manifest.digest) as file:
+                rows, kept = shards.rows_of(file, manifest.row_type), [int(row) for row in file.get("motion", ())]
         except DamagedFileError as error:
             if damaged is None:
                 raise
             damaged[name] = str(error).partition("; ")[0]
             continue
-        opened = partial(opened_shard, Path(directory).absolute(), name, manifest.digest)
+        opened = partial(shards.opened_shard, Path(directory).absolute(), name, manifest.digest)
         numbers, cells, samples = (rows[key] for key in KEYS.names or ())
         try:
             for number, table in enumerate(tables):
@@ -172,7 +159,7 @@ def read_rows(
             for row in kept:
                 motions[numbers[row]][cells[row], samples[row]] = opened, f"motion/{row}"
         except IndexError:
-            raise InputError(f"{Path(directory) / 'shards' / name}: {FOREIGN}") from None
+            raise InputError(f"{Path(directory) / 'shards' / name}: {shards.FOREIGN}") from None
     return tables, motions
 
 
@@ -184,13 +171,13 @@ def _prepared(folder: Path, sweep: Sweep, manifest: Manifest, fresh: bool) -> Ma
     _clear_leftovers(folder)
     named = folder / "sweep.h5"
     if not named.exists():
-        for name in (*OWN, EARLIER):
+        for name in (*shards.OWN, shards.EARLIER):
             if (folder / name).exists():
                 raise InputError(f"{folder / name}: in the way of a sweep; give another folder")
         write_whole(named, manifest.image())
     elif fresh:  # the shards go first; nothing goes if there is a foreign file among them
         read_manifest(folder)
-        shard_files(folder)
+        shards.shard_files(folder)
         with naming(folder):
             if (folder / "shards").exists():
                 shutil.rmtree(folder / "shards")
@@ -227,10 +214,7 @@ def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
         if more < count:
             raise InputError(f"{holds} {more} are asked for; give samples: {count} or more, or another folder")
         if more > count and block.sampler not in EXTENSIBLE:
-            raise InputError(
-                f"{holds} a {block.sampler} of {more} samples has other points; give samples: {count}, sampler: random "
-                "from the start, or another folder"
-            )
+            raise InputError(f"{holds} a {block.sampler} does not grow; give samples: {count}, or another folder")
     return found if there == asked else replace(manifest, versions=found.versions)
 
 
@@ -241,14 +225,6 @@ def _clear_leftovers(folder: Path) -> None:
             for path in place.iterdir() if place.is_dir() else ():
                 if _PART.fullmatch(path.name) and (path.is_symlink() or not path.is_dir()):
                     path.unlink(missing_ok=True)
-
-
-def _refuse_strangers(folder: Path) -> None:
-    """Refuse a folder in which a name of the sweep's own is a link, pipe or device; an `InputError`."""
-    for path in (folder / name for name in (*OWN, "lock")):
-        if path.is_symlink() or (path.exists() and not (path.is_file() or path.is_dir())):
-            kind = "a symbolic link" if path.is_symlink() else "a pipe or a device"
-            raise InputError(f"{path}: {kind}, where a sweep writes and deletes; remove it, or give another folder")
 
 
 _held: set[int] = set()

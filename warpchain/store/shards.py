@@ -1,6 +1,9 @@
-"""Shards: immutable HDF5 files that hold the rows of ended walks, and their kept motions.
+"""The shards of a sweep's folder, and its manifest, sweep.h5: which sweep it holds, and which walks a shard has.
 
-A shard has the attributes `name`, `digest` and `numerics_version`, the dataset `rows`, one row for each walk with the
+A shard is an immutable HDF5 file with the rows of some ended walks, each keyed by its block, cell and sample; no list
+says which they are. A sweep that is given more samples gets further shards, for those of its walks that are not there.
+
+It has the attributes `name`, `digest` and `numerics_version`, the dataset `rows`, one row for each walk with the
 columns of `warpchain.walks.rows`, and in the group `motion` one for each walk whose motion is kept, named by its row,
 with the arrays of a saved walk.
 
@@ -9,32 +12,168 @@ was computed: a sweep leaves the same bytes however often it was killed.
 """
 
 import hashlib
+import itertools
+import json
 import os
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from warpchain.files import unreadable, write_whole
+from warpchain.files import AnyPath, naming, write_whole
 from warpchain.hdf5_files import hdf5_image, open_regular, reading_hdf5
 from warpchain.inputs.validation import InputError
-from warpchain.store.manifest import Folder, Shard
-from warpchain.version import NUMERICS_VERSION
-from warpchain.walks.rows import KEYS, MISSING, Rows
+from warpchain.sweeps.designs import EXTENSIBLE
+from warpchain.sweeps.plan import Sweep
+from warpchain.sweeps.sweep_file import read_sweep
+from warpchain.version import NUMERICS_VERSION, package_versions
+from warpchain.walks.rows import KEYS, MISSING, Rows, row_type
 from warpchain.walks.walk_result import write_motion
 
 if TYPE_CHECKING:
     import h5py
 
+Part = tuple[int, int]
+"""Number of a part of a sweep, and number of parts."""
+OWN: Final = ("sweep.h5", "sweep.yaml", "shards", "log.txt")
+"""What a sweep has in its folder, beside the lock."""
+EARLIER: Final = "sweep.json"
+"""What earlier versions have there instead of sweep.h5."""
+MANIFEST: Final = "warpchain sweep"
 KIND: Final = "warpchain shard"
 _NAME: Final = re.compile(r"\d{6,}\.h5")
 FOREIGN: Final = "a shard of another sweep; move it out of this folder"
 
+FIRST_SHARDS: Final = 32
+"""Most walks in each of the first four shards."""
 
-def stamp(directory: Folder) -> str:
+
+@dataclass(frozen=True, eq=False)
+class Shard:
+    """Some walks of a sweep that are computed together and kept in one file.
+
+    `kind` is the type of the rows; `keys` of type `KEYS` and `walks` are of each walk its place and its number.
+    """
+
+    digest: str
+    kind: np.dtype[np.void]
+    keys: Rows
+    walks: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        """Number of walks."""
+        return len(self.walks)
+
+    @property
+    def name(self) -> str:
+        """Name of the file, the number of its first walk."""
+        return f"{self.walks[0]:06d}.h5"
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What a folder holds.
+
+    A shard has `shard_size` walks at most, the first ones fewer, see `_bounds`. `versions` are those of the software
+    that began the sweep. Of `part` (k, N), 1 ≤ k ≤ N, it only has the k-th of N parts; more samples move no walk.
+    """
+
+    sweep: Sweep
+    shard_size: int
+    part: Part = (1, 1)
+    numerics_version: int = NUMERICS_VERSION
+    versions: dict[str, str] = field(default_factory=package_versions)
+
+    @cached_property
+    def digest(self) -> str:
+        """What all shards of the folder have: digest of the sweep, which is the same with more samples."""
+        return self.sweep.digest([1 if b.sampler in EXTENSIBLE else b.samples_given for b in self.sweep.blocks])
+
+    @cached_property
+    def row_type(self) -> np.dtype[np.void]:
+        """Type of the rows: the quantities drawn by any block are columns in all."""
+        return row_type([name for block in self.sweep.blocks for name in block.drawn])
+
+    @cached_property
+    def keys(self) -> Rows:
+        """Block, cell and sample of all walks, in this order."""
+        keys, first = np.empty(self.sweep.walk_count, KEYS), 0
+        for number, block in enumerate(self.sweep.blocks):
+            own = keys[first : first + block.walk_count]
+            own["block"], (own["cell"], own["sample"]) = number, np.divmod(np.arange(len(own)), block.samples)
+            first += len(own)
+        return keys
+
+    @property
+    def wanted(self) -> list[Shard]:
+        """The shards that are computed in an empty folder: all, or those of its part."""
+        return self.left(np.zeros(self.sweep.walk_count, bool))
+
+    def left(self, done: NDArray[np.bool_]) -> list[Shard]:
+        """The shards of the walks that are still to be computed; `done` says which are not, in the order of `keys`."""
+        (number, parts), walks, found = self.part, self.sweep.indices, []
+        own = np.flatnonzero((self.keys["cell"] + self.keys["sample"]) % parts == number - 1)
+        for start, stop in itertools.pairwise(_bounds(len(own), self.shard_size)):
+            places = own[start:stop][~done[own[start:stop]]]
+            if len(places):
+                found.append(Shard(self.digest, self.row_type, self.keys[places], walks[places]))
+        return found
+
+    def image(self) -> bytes:
+        """Content of sweep.h5."""
+        given = {"numerics_version": self.numerics_version, "shard_size": self.shard_size, "part": self.part}
+        texts = {"versions": json.dumps(self.versions), "sweep": json.dumps(self.sweep.canonical(), ensure_ascii=False)}
+        return hdf5_image(MANIFEST, lambda file: file.attrs.update(given | texts))
+
+
+def _bounds(walks: int, most: int) -> list[int]:
+    """Where the shards of some walks begin, and their end.
+
+    The first four have `FIRST_SHARDS` at most, and every four twice as many as those before, so that a sweep that is
+    stopped in its first minute has lost seconds.
+    """
+    bounds = [0]
+    while bounds[-1] < walks:
+        bounds.append(min(walks, bounds[-1] + min(most, FIRST_SHARDS << (len(bounds) - 1) // 4)))
+    return bounds
+
+
+def stored_sweep(path: AnyPath, content: Mapping[str, object]) -> Sweep:
+    """The sweep in a file of results, given its canonical form; an `InputError` if this warpchain refuses it."""
+    try:
+        return Sweep(*read_sweep(content))
+    except InputError as error:
+        problem = error.args[0].partition("; ")[0]
+        raise InputError(f"{path}: {problem}; read it with the version that wrote it") from None
+
+
+def read_manifest(directory: AnyPath) -> Manifest:
+    """The manifest of a folder; an `OSError` if unreadable, an `InputError` if it holds no sweep of this version."""
+    path = Path(directory) / "sweep.h5"
+    if not os.path.lexists(path):
+        if not os.path.exists(directory):
+            raise InputError(f"{directory}: is not there; give the folder of a sweep, or a merged file")
+        if (Path(directory) / EARLIER).exists():
+            raise InputError(f"{directory}: holds a sweep of an earlier warpchain; read it with that version")
+        there = "a saved walk, no sweep" if (Path(directory) / "walk.h5").exists() else "no sweep"
+        raise InputError(f"{directory}: {there} in this folder; give the folder of one, or a merged file")
+    with reading_hdf5(path, MANIFEST, "give the folder of a sweep, or put a copy of the file there") as file:
+        return Manifest(
+            stored_sweep(path, json.loads(file.attrs["sweep"])),
+            int(file.attrs["shard_size"]),
+            (int(file.attrs["part"][0]), int(file.attrs["part"][1])),
+            int(file.attrs["numerics_version"]),
+            json.loads(file.attrs["versions"]),
+        )
+
+
+def stamp(directory: AnyPath) -> str:
     """What tells whether the folder still holds the same sweep: the SHA-256 of its sweep.h5."""
     try:
         with open_regular(Path(directory) / "sweep.h5") as file:
@@ -45,7 +184,7 @@ def stamp(directory: Folder) -> str:
 
 
 def write_shard(
-    directory: Folder, expected: str, shard: Shard, rows: Rows, motions: Mapping[int, Mapping[str, Any]]
+    directory: AnyPath, expected: str, shard: Shard, rows: Rows, motions: Mapping[int, Mapping[str, Any]]
 ) -> None:
     """Write a shard into a folder that is open in the process that runs the sweep; workers need no lock for it.
 
@@ -76,12 +215,6 @@ def write_shard(
     write_whole(Path(directory) / "shards" / shard.name, hdf5_image(KIND, fill))
 
 
-def read_shard(directory: Folder, shard: Shard) -> Rows:
-    """The rows of a shard; needs no lock; errors as of `opened_shard`."""
-    with opened_shard(directory, shard.name, shard.digest) as file:
-        return rows_of(file, shard.kind)
-
-
 def rows_of(file: "h5py.File", kind: np.dtype[np.void]) -> Rows:
     """The rows in an open shard; asked for their type, h5py would take twice as long."""
     rows = np.zeros(file["rows"].shape, kind)
@@ -89,15 +222,14 @@ def rows_of(file: "h5py.File", kind: np.dtype[np.void]) -> Rows:
     return rows
 
 
-def shard_files(directory: Folder) -> list[str]:
+def shard_files(directory: AnyPath) -> list[str]:
     """Names of all files of shards, sorted; an `InputError` names one that is none, but for hidden files."""
     folder = Path(directory) / "shards"
     try:
-        names = sorted(name for name in os.listdir(folder) if not name.startswith("."))
+        with naming(folder, "read"):
+            names = sorted(name for name in os.listdir(folder) if not name.startswith("."))
     except FileNotFoundError:
         return []
-    except OSError as error:
-        raise unreadable(folder, error) from error
     if strange := [name for name in names if not _NAME.fullmatch(name)]:
         more = f" (and {len(strange) - 1} more)" if strange[1:] else ""
         raise InputError(f"{folder / strange[0]}: not a shard of this sweep; move it out of this folder{more}")
@@ -105,7 +237,7 @@ def shard_files(directory: Folder) -> list[str]:
 
 
 @contextmanager
-def opened_shard(directory: Folder, name: str, digest: str) -> "Iterator[h5py.File]":
+def opened_shard(directory: AnyPath, name: str, digest: str) -> "Iterator[h5py.File]":
     """The shard of this name and digest; an `OSError` if it is unreadable, an `InputError` if damaged or foreign."""
     path = Path(directory) / "shards" / name
     with reading_hdf5(path, KIND, "delete it and run the sweep again, which computes only its walks") as file:

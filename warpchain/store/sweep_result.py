@@ -1,36 +1,42 @@
 """Results of sweeps as arrays with named axes, read from a folder or from a merged file.
 
 A folder can be read while its sweep runs: walks that are not there yet are missing, and counted.
+
+A merged file is one HDF5 file with a whole sweep: columns with named axes, and the kept motions. Axes and samples are
+dimension scales; units and meanings are attributes of every dataset, and the resolved sweep, versions and counts by
+status those of the file. A single block is in the root group, which `xarray.open_dataset(path, engine="h5netcdf")`
+opens; several are in groups of their names (`group=`). The kept motions of a block are in its group `motion`, those of
+each walk in a group named by the place of the walk in a flat column, as in a saved walk.
 """
 
 import json
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warpchain.hdf5_files import reading_hdf5
-from warpchain.inputs.validation import InputError, shown, suggestion
+from warpchain.files import AnyPath, Kind, checked_output, given_path, write_whole
+from warpchain.hdf5_files import hdf5_image, kind_of_hdf5, reading_hdf5
+from warpchain.inputs.arrays import AnyArray
+from warpchain.inputs.validation import InputError, InputWarning, shown, suggestion
 from warpchain.store.block_result import BlockResult, counted, located, status_counts
 from warpchain.store.cell_statistics import CellStatistics
 from warpchain.store.folder import read_rows
-from warpchain.store.manifest import Folder, read_manifest, stored_sweep
-from warpchain.store.shards import stamp
+from warpchain.store.shards import read_manifest, stamp, stored_sweep
 from warpchain.sweeps.plan import Sweep
 from warpchain.walks.rows import COLUMNS, STORED_COLUMNS, derived_columns, drawn_column, quantity_of
 from warpchain.walks.walk_result import WalkResult
 
 if TYPE_CHECKING:
+    import h5py
     import pandas
     import xarray
     from matplotlib.figure import Figure, SubFigure
-
-Array = NDArray[Any]
 
 KIND: Final = "warpchain sweep result"
 REMEDY: Final = "merge the folders again, or fetch another copy of the file"
@@ -86,13 +92,13 @@ class SweepResult:
 
     def _repr_png_(self) -> bytes | None:
         """The main figure; None if there is nothing to draw yet."""
-        from warpchain.pictures.inline import first_png
+        from warpchain.pictures.style import first_png
 
         return first_png([self.plot])
 
     def _repr_html_(self) -> str:
         """Walks by status, axes of each block, and the main figure."""
-        from warpchain.pictures.inline import fragment
+        from warpchain.pictures.style import fragment
 
         return fragment(repr(self), self._repr_png_())
 
@@ -200,7 +206,7 @@ class SweepResult:
         }
 
 
-def load(path: Folder) -> SweepResult:
+def load(path: AnyPath) -> SweepResult:
     """Read the folder of a sweep, as far as the sweep is, or a file that `warpchain merge` wrote.
 
     Raises:
@@ -210,7 +216,7 @@ def load(path: Folder) -> SweepResult:
     return _load_merged(path) if os.path.isfile(path) else _load_folder(path)
 
 
-def _load_folder(directory: Folder) -> SweepResult:
+def _load_folder(directory: AnyPath) -> SweepResult:
     while True:
         manifest, begun = read_manifest(directory), stamp(directory)
         try:
@@ -223,7 +229,7 @@ def _load_folder(directory: Folder) -> SweepResult:
     return _result(manifest.sweep, provenance | {"versions": manifest.versions}, rows, motions)
 
 
-def _load_merged(path: Folder) -> SweepResult:
+def _load_merged(path: AnyPath) -> SweepResult:
     opened = partial(reading_hdf5, Path(path).absolute(), KIND, REMEDY, WANTED)
     with reading_hdf5(path, KIND, REMEDY, WANTED) as file:
         sweep = stored_sweep(path, json.loads(file.attrs["sweep"]))
@@ -237,7 +243,7 @@ def _load_merged(path: Folder) -> SweepResult:
         return _result(sweep, provenance, groups, motions)
 
 
-def _result(sweep: Sweep, provenance: dict[str, Any], stored: Sequence[Any], motions: Sequence[Array]) -> SweepResult:
+def _result(sweep: Sweep, provenance: dict[str, Any], stored: Sequence[Any], motions: Sequence[Any]) -> SweepResult:
     """A result, given for each block what has its stored columns by name, and its motions, both in any shape."""
     blocks = {}
     for number, block in enumerate(sweep.blocks):
@@ -256,3 +262,80 @@ def _result(sweep: Sweep, provenance: dict[str, Any], stored: Sequence[Any], mot
             motions=motions[number].reshape(block.shape),
         )
     return SweepResult(blocks=blocks, origin=sweep, provenance=provenance)
+
+
+def merge(sources: AnyPath | Sequence[AnyPath], path: AnyPath) -> None:
+    """Write the results of a sweep to one HDF5 file, whole or not at all; an older merged file is replaced.
+
+    The file is made in memory.
+
+    Args:
+        sources: the folder of the sweep, or several, or merged files, which have different walks of one sweep.
+        path: the file. An `InputWarning` says how many walks are missing in it, if any are.
+
+    Raises:
+        OSError: a folder cannot be read, or the file cannot be written, or is there already and no merged file.
+        InputError: there is no sweep in a folder, a shard is damaged or foreign, or sweeps do not fit together.
+    """
+    folders = [sources] if isinstance(sources, str | os.PathLike) else list(sources)
+    target = given_path(path)
+    checked_output(target, _MERGED)
+    first, *others = folders
+    whole = load(first)
+    for folder in others:
+        result = load(folder)
+        if any(whole.provenance[name] != result.provenance[name] for name in ("digest", "numerics_version")):
+            raise InputError(f"{folder}: is not the sweep of {first}, with the same seed and samples; give its parts")
+        blocks = {}
+        for block, other in zip(whole.blocks.values(), result.blocks.values(), strict=True):
+            there = block.is_there
+            if (there & other.is_there).any():
+                raise InputError(f"{folder}: has walks that a folder before it has; give each part of a sweep once")
+            columns = {key: np.where(there, values, other.columns[key]) for key, values in block.columns.items()}
+            blocks[block.name] = replace(block, columns=columns, motions=np.where(there, block.motions, other.motions))
+        whole = replace(whole, blocks=blocks)
+    write_whole(target, hdf5_image(KIND, partial(_fill, whole=whole)), _MERGED)
+    if missing := whole.missing_count:
+        problem = f"{missing:,} of {whole.walk_count:,} walks are missing"
+        remedy = "merge again with all parts, once they have run"
+        warnings.warn(f"{path}: {problem}; {remedy}", InputWarning, stacklevel=2)
+
+
+def _is_merged(path: Path) -> bool:
+    """Whether `merge` has written this file, and nothing has damaged it since; an `OSError` if it cannot be read."""
+    try:
+        return not path.is_symlink() and path.is_file() and kind_of_hdf5(path, WANTED) == KIND
+    except InputError:
+        return False
+
+
+_MERGED: Final = Kind("merged sweep", _is_merged)
+"""All that a merged file replaces."""
+
+
+def _fill(file: "h5py.File", whole: SweepResult) -> None:
+    """Fill the empty file."""
+    file.attrs.update(whole.notes())
+    for name, block in whole.blocks.items():
+        group = file if len(whole.blocks) == 1 else file.create_group(name, track_order=True)
+        group.attrs["block"] = name
+        coordinates, variables = block.variables()
+        if further := [name for name, (dims, _, _) in coordinates.items() if dims != (name,)]:
+            group.attrs["coordinates"] = " ".join(further)  # as xarray has it
+        for name, (dims, values, notes) in {**coordinates, **variables}.items():
+            _put(group, name, values, notes, () if dims == (name,) else dims)
+        for place, motion in block.kept_motions(np.flatnonzero(block.kept)):
+            group.copy(motion, group.require_group("motion"), str(place))
+
+
+def _put(group: "h5py.Group", name: str, values: AnyArray, notes: Mapping[str, Any], dims: Sequence[str]) -> None:
+    """Write a variable along some axes, or one of the axes; each is closed here, on which bytes depend."""
+    if values.dtype.kind == "b":  # NetCDF has no truth values; xarray's way to write them
+        values, notes = values.astype(np.int8), {**notes, "dtype": "bool"}
+    data = values.astype(object) if values.dtype.kind == "U" else values
+    dataset = group.create_dataset(name, data=data, **({"compression": "gzip", "shuffle": True} if dims else {}))
+    dataset.attrs.update(notes)
+    if not dims:
+        dataset.make_scale(name)
+    for place, dim in enumerate(dims):
+        dataset.dims[place].attach_scale(group[dim])

@@ -1,34 +1,43 @@
-"""One block of a sweep: a grid of cells, and what the samples of a cell draw."""
+"""One block of a sweep: a grid of cells, and what the samples of a cell draw; and the values of an axis in a file.
+
+These are a list, a range that is written out, or names with values that are lists.
+"""
 
 import math
-from collections.abc import Container, Iterable, Iterator, Mapping
+from collections import Counter
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from decimal import Decimal
 from functools import lru_cache
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, BeforeValidator, Field, ValidationError, ValidationInfo, WrapValidator
 
+from warpchain.inputs import validation
 from warpchain.inputs.distributions import Distribution, Gaussian
-from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.parameters import preset as parameter_preset
-from warpchain.inputs.scene import Scene
-from warpchain.inputs.sections import SECTION_OF, SECTIONS
-from warpchain.inputs.setup import Setup, combined, options_beside
-from warpchain.inputs.validation import InputError, json_value, path_of, validated
+from warpchain.inputs.scene import COMPOUND, Scene
+from warpchain.inputs.setup import SECTIONS, Setup, combined, options_beside
+from warpchain.inputs.validation import FIELDS, SECTION_OF, InputError, checked, json_value, path_of, shown, validated
 from warpchain.sweeps.designs import walks_per_sample
-from warpchain.walks.faults import least
+from warpchain.walks.landmarks import least
 
 Value = float | int | str | tuple[Any, ...] | None
 """A value of a field; truth values are integers to Python, and None is null."""
+Sections = Mapping[str, Mapping[str, Value]]
 POINT: Final = "point"
 """Name of the axis of parameter sets."""
 _Place = tuple[tuple[str, Value], ...]
 """Names and values of the axes of one section in a cell."""
 
-_KEPT: Final = 2**14
-"""Most values of a section that are kept while cells are gone through: more than an axis has."""
+AXIS_LIMIT: Final = 10_000
+"""Most values of one axis."""
+CELL_LIMIT: Final = 100_000
+"""Most cells of a sweep, because each is checked when the sweep is loaded."""
+Name = Annotated[str, Field(pattern="^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=validation.LONGEST_NAME)]
+"""Of a block, or of a value on an axis."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +63,7 @@ class Block:
     path: str
     name: str
     preset: str | None
-    sections: Mapping[str, Mapping[str, Value]]
+    sections: Sections
     axes: dict[str, tuple[Value, ...]]
     named: Mapping[str, Mapping[str, Value]]
     points: Mapping[str, tuple[Value, ...]]
@@ -104,19 +113,10 @@ class Block:
         """The `fixed` setups of some cells; those that are alike in a section share its checked values."""
         sections = self.sections
         axes = self.axes | {name: tuple(values.values()) for name, values in self.named.items()}
-
-        @lru_cache(_KEPT)
-        def parameters(preset: str, at: _Place) -> Parameters:
-            return parameter_preset(preset).with_values({**sections["parameters"], **dict(at)})
-
-        @lru_cache(_KEPT)
-        def scene(at: _Place) -> Scene:
-            return validated(Scene, {**sections["scene"], **dict(at)}, "scene")
-
-        @lru_cache(_KEPT)
-        def options(plane: str, at: _Place) -> Options:
-            return options_beside(plane, {**sections["options"], **dict(at)})
-
+        kept = lru_cache(2**14)  # more than an axis has values
+        scene = kept(lambda at: validated(Scene, {**sections["scene"], **dict(at)}, "scene"))
+        options = kept(lambda plane, at: options_beside(plane, {**sections["options"], **dict(at)}))
+        changed = kept(lambda name, at: parameter_preset(name).with_values({**sections["parameters"], **dict(at)}))
         for cell in cells:
             at: dict[str, _Place] = dict.fromkeys(SECTIONS, ())
             preset = str(self.preset)
@@ -128,9 +128,8 @@ class Block:
                 for field, column in given.items():
                     at[SECTION_OF[field]] += ((field, column[place]),)
             try:
-                checked = scene(at["scene"])
-                changed = parameters(preset, at["parameters"])
-                yield combined(preset, changed, checked, options(checked.plane, at["options"]))
+                own, parameters = scene(at["scene"]), changed(preset, at["parameters"])
+                yield combined(preset, parameters, own, options(own.plane, at["options"]))
             except InputError as error:
                 raise InputError(self._located(error, cell)) from None
 
@@ -182,17 +181,89 @@ class Block:
             **({} if self.preset is None else {"preset": self.preset}),
             "samples": self.samples_given,
             "sampler": self.sampler,
-            **{
-                section: {
-                    name: value for name, value in getattr(first, section).model_dump().items() if name not in replaced
-                }
-                for section in SECTIONS
-            },
+            **{section: getattr(first, section).model_dump(exclude=replaced) for section in SECTIONS},
             "distributions": {"all": "fixed"} | {name: each.canonical() for name, each in self.distributions.items()},
             **({"points": {name: list(values) for name, values in self.points.items()}} if self.points else {}),
-            "grid": {
-                name: json_value(self.named.get(name)) or list(values)
-                for name, values in self.axes.items()
-                if name != POINT
-            },
+            "grid": {n: json_value(self.named.get(n)) or list(values) for n, values in self.axes.items() if n != POINT},
         }
+
+
+class _Range(BaseModel):
+    """Values from one to another, both included, in steps or of a number."""
+
+    model_config = validation.STRICT
+    first: float = Field(alias="from")
+    last: float = Field(alias="to")
+    step: float | None = Field(None, gt=0)
+    count: int | None = Field(None, ge=2, le=AXIS_LIMIT)
+
+    def values(self) -> list[int | float]:
+        """All values, computed in decimals, so that three steps of 0.1 from 0 lead to 0.3 and to no other number."""
+        first, last = Decimal(str(self.first)), Decimal(str(self.last))
+        if first >= last:
+            raise InputError(f"to: {self.last} is not greater than from: {self.first}; give a greater value")
+        if (self.step is None) == (self.count is None):
+            raise InputError("step: a range needs either step or count; give one of them")
+        step = (last - first) / (self.count - 1) if self.count else Decimal(str(self.step))
+        if (last - first) / step >= AXIS_LIMIT:
+            raise InputError(f"step: gives more than {AXIS_LIMIT} values; give a larger step")
+        intervals = int((last - first) / step) if self.count is None else self.count - 1
+        below = first + intervals * step
+        if self.count is None and below != last:
+            raise InputError(f"to: steps of {step} from {first} miss {last}; give {below}, {below + step} or a count")
+        values = [first + number * step for number in range(intervals)] + [last]
+        return [int(value) if value == int(value) and abs(value) < 2**53 else float(value) for value in values]
+
+
+def _expanded(values: Any, check: Callable[[Any], list[Any]], info: ValidationInfo) -> list[Any]:
+    """The values of an axis, those of a range written out; together no more than sweeps of `CELL_LIMIT` cells have."""
+    if isinstance(values, Mapping):
+        if info.context["expanded"] > CELL_LIMIT + validation.MOST_VALUES:  # type: ignore[index]
+            raise ValueError(f"more than {CELL_LIMIT} values in the ranges of all axes; give fewer")
+        try:
+            values = _Range.model_validate(values).values()
+        except ValidationError as error:
+            raise InputError(validation.refusals(error, "", ("from", *_Range.model_fields))[0]) from None
+        info.context["expanded"] += len(values)  # type: ignore[index]
+    checked = check(values)
+    value, count = Counter(checked).most_common(1)[0]
+    if count > 1:
+        raise ValueError(f"{shown(value)} is given twice; leave one out")
+    return checked
+
+
+def list_of(kind: Any) -> Any:
+    """Annotation of a list of values."""
+    return Annotated[list[kind], Field(min_length=1, max_length=AXIS_LIMIT)]
+
+
+def axis(kind: Any) -> Any:
+    """Annotation of the values of an axis, a list or a range."""
+    return Annotated[list_of(kind), WrapValidator(_expanded, json_schema_input_type=list_of(kind) | _Range)]
+
+
+def _with_names(values: Any) -> Any:
+    if not isinstance(values, Mapping):
+        raise ValueError("no names; give each value one, as in floor: {flat: flat, ramp: [[0, 0], [1, 0.1]]}")
+    return values
+
+
+def named_axis(kind: Any) -> Any:
+    """Annotation of the values of an axis whose values may be lists: name → value."""
+    named = Annotated[dict[Name, kind], Field(min_length=1, max_length=AXIS_LIMIT)]
+    return Annotated[named, BeforeValidator(_with_names, json_schema_input_type=named)]
+
+
+def is_axis(name: str, given: object) -> bool:
+    """Whether a list or mapping that is given for a field by its name is an axis, and no value of the field."""
+
+    def is_value(value: object) -> bool:
+        try:
+            checked(value, name, Annotated[FIELDS[name].annotation, Field(), *FIELDS[name].metadata])
+        except InputError:
+            return False
+        return True
+
+    if isinstance(given, list) and name in COMPOUND:  # of values without names, which an axis refuses
+        return not is_value(given) and bool(given) and all(map(is_value, given))
+    return isinstance(given, list) or (isinstance(given, dict) and not is_value(given))

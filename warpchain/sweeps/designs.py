@@ -45,25 +45,17 @@ def check_design(sampler: str, samples: int, dimensions: int, path: str) -> None
         if sampler == "saltelli":
             raise InputError(f"{path}.sampler: saltelli has nothing to draw; give distributions")
         if samples > 1:
-            raise InputError(
-                f"{path}.samples: nothing is drawn, so all {samples} samples would be the same; "
-                "give 1, or distributions"
-            )
+            raise InputError(f"{path}.samples: nothing is drawn, so all would be the same; give 1, or distributions")
         return
     if sampler == "random":
         return
     columns = dimensions * (2 if sampler == "saltelli" else 1)
     if samples * columns > DESIGN_LIMIT:
-        raise InputError(
-            f"{path}.samples: {samples} designed samples of {columns} numbers each are too many; "
-            f"give at most {1 << (DESIGN_LIMIT // columns).bit_length() - 1}, or sampler: random"
-        )
+        most = 1 << (DESIGN_LIMIT // columns).bit_length() - 1
+        raise InputError(f"{path}.samples: {samples} are too many; give at most {most}, or sampler: random")
     if sampler in ("sobol", "saltelli") and samples & (samples - 1):
         lower = 1 << (samples.bit_length() - 1)
-        raise InputError(
-            f"{path}.samples: {samples} is not a power of two, which {sampler} needs to be balanced; "
-            f"give {lower} or {2 * lower}"
-        )
+        raise InputError(f"{path}.samples: {samples} is no power of 2, as {sampler} needs; give {lower} or {2 * lower}")
 
 
 @functools.lru_cache(maxsize=4)

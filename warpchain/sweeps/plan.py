@@ -11,7 +11,6 @@ and the index only: no table of walks exists, and a walk is the same whoever ask
 import bisect
 import hashlib
 import json
-import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -20,12 +19,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.files import AnyPath
 from warpchain.inputs.distributions import DRAW_LIMIT, Distribution, draw, placed, random_generator
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS
 from warpchain.inputs.scene import Scene
-from warpchain.inputs.sections import SECTIONS
-from warpchain.inputs.setup import Setup
+from warpchain.inputs.setup import SECTIONS, Setup
 from warpchain.inputs.validation import InputError
 from warpchain.sweeps.block import Block
 from warpchain.sweeps.designs import design_points, walks_per_sample
@@ -35,6 +34,8 @@ from warpchain.walks.motion import Keep
 
 Point = dict[str, float]
 """Drawn values by name."""
+Cell = tuple[int, ...]
+"""Place of a cell along every axis of its block."""
 
 LEAST_SHARE: Final = 0.05
 """Least share of a distribution that must be physical; where less is, redrawing would take too long."""
@@ -49,7 +50,7 @@ class PlannedWalk:
 
     index: int
     block: int
-    cell: tuple[int, ...]
+    cell: Cell
     sample: int
     setup: Setup
     drawn: Point
@@ -72,11 +73,6 @@ class Sweep:
     same_samples_along: tuple[str, ...]
     blocks: tuple[Block, ...]
     recording: Recording
-
-    @classmethod
-    def of(cls, source: "str | os.PathLike[str] | Mapping[str, object]", **replaced: object) -> "Sweep":
-        """The sweep of a file, or of the content of one, whose cells were checked before, see `read_sweep`."""
-        return cls(*read_sweep(source, **replaced))
 
     @cached_property
     def walk_count(self) -> int:
@@ -110,41 +106,31 @@ class Sweep:
 
     def undrawn(self, indices: Iterable[int]) -> Iterator[PlannedWalk]:
         """Walks without their draws, which take most of the time; options and number of links never depend on them."""
-        before: tuple[int, tuple[int, ...]] | None = None
+        before: tuple[int, Cell] | None = None
         for index in map(int, indices):
-            number, cell, sample = self._located(index)
+            sample, place = divmod(index, self.blocks[0].stride)
+            number = bisect.bisect_right(self.blocks, place, key=lambda block: block.first_cell) - 1
+            block = self.blocks[number]
+            if not 0 <= sample < block.samples:
+                raise IndexError(f"walk {index} of a sweep of {self.walk_count} walks")
+            cell = tuple(map(int, np.unravel_index(place - block.first_cell, block.shape[:-1])))
             if (number, cell) != before:
-                before, fixed = (number, cell), self.blocks[number].fixed(cell)
+                before, fixed = (number, cell), block.fixed(cell)
             yield PlannedWalk(index, number, cell, sample, fixed, {})
-
-    def _located(self, index: int) -> tuple[int, tuple[int, ...], int]:
-        """Number of a walk's block, its cell and its sample."""
-        sample, cell = divmod(index, self.blocks[0].stride)
-        number = bisect.bisect_right(self.blocks, cell, key=lambda block: block.first_cell) - 1
-        block = self.blocks[number]
-        if not 0 <= sample < block.samples:
-            raise IndexError(f"walk {index} of a sweep of {self.walk_count} walks")
-        return number, tuple(map(int, np.unravel_index(cell - block.first_cell, block.shape[:-1]))), sample
 
     def keep(self, walk: PlannedWalk) -> Keep:
         """What is kept of the motion of a walk."""
-        every = {
-            name: choice.steps(walk.setup.options, f"sweep.record.{name}") if choice.includes(walk.sample) else None
-            for name, choice in self.recording.choices.items()
-        }
-        frames = self.recording.frames
-        before = (frames.before or 0.0) if frames is not None and frames.includes(walk.sample) else 0.0
+        chosen = {name: choice for name, choice in self.recording.choices.items() if choice.includes(walk.sample)}
+        every = {name: choice.steps(walk.setup.options, f"sweep.record.{name}") for name, choice in chosen.items()}
+        before = getattr(chosen.get("frames"), "before", None) or 0.0
         return Keep(series_every=every.get("series"), frame_every=every.get("frames"), before=before)
 
     def check(self) -> None:
         """Check every cell: its fixed values, its distributions, and that a random sample makes a possible walk."""
         most = max(block.samples for block in self.blocks)
         for name, choice in self.recording.choices.items():
-            if choice.samples != "all" and choice.samples[-1] >= most:
-                raise InputError(
-                    f"sweep.record.{name}.samples: {choice.samples[-1]} is no sample of any block; "
-                    f"give numbers from 0 to {most - 1}"
-                )
+            if choice.samples != "all" and (last := choice.samples[-1]) >= most:
+                raise InputError(f"sweep.record.{name}.samples: no block has sample {last}; give 0 to {most - 1}")
         for block in self.blocks:
             first = before = None
             checked: dict[str, Distribution] = {}
@@ -157,10 +143,8 @@ class Sweep:
                 distributions = placed(block.distributions, fixed)
                 for name, distribution in distributions.items():
                     if distribution != checked.get(name) and distribution.share() < LEAST_SHARE:
-                        raise InputError(
-                            f"{block.path}.distributions.{name}: less than {LEAST_SHARE:.0%} of the draws "
-                            f"{distribution} are physical; give a uniform distribution"
-                        )
+                        path, law = f"{block.path}.distributions.{name}", distribution.canonical()
+                        raise InputError(f"{path}: less than {LEAST_SHARE:.0%} of {law} is physical; give uniform")
                 checked = distributions
                 self._first_possible(block, cell, fixed, distributions, 0, designed=False)
 
@@ -169,35 +153,28 @@ class Sweep:
         for name in Options.model_fields:
             here, there = getattr(first, name), getattr(options, name)
             if here != there and name not in block.varied:
-                raise InputError(
-                    f"{block.path}.grid: {name} is {here!r} in one cell and {there!r} in another, as methods "
-                    f"or devices have it; give {name} once for all, or each such method, and each kind of "
-                    "device, a block of its own"
-                )
+                raise InputError(f"{block.path}.grid: {name} is {here!r} in one cell, {there!r} in another; use blocks")
         for name, choice in self.recording.choices.items():
             choice.steps(options, f"sweep.record.{name}")
 
     def _first_possible(
-        self,
-        block: Block,
-        cell: tuple[int, ...],
-        fixed: Setup,
-        distributions: Mapping[str, Distribution],
-        row: int,
-        *,
-        designed: bool,
+        self, block: Block, cell: Cell, fixed: Setup, laws: Mapping[str, Distribution], row: int, designed: bool
     ) -> tuple[list[Point], list[Setup]]:
         """Points for the walks of sample `row` of a cell, the first that make possible walks only, and their setups.
 
         The designed ones are tried first, then random ones; if all are impossible, an `InputError` says so.
         """
-        stream = self._stream(block, cell)
+        number = 0  # of the cell's random stream among those of the block
+        for (name, values), place in zip(block.axes.items(), cell, strict=True):
+            if name not in self.same_samples_along:
+                number = number * len(values) + place
+        stream = block.first_stream + number
         rng, problem = random_generator(self.seed, stream, row), ""
-        makers: list[Callable[[], Point]] = [lambda: draw(distributions, rng)] * DRAW_LIMIT
+        makers: list[Callable[[], Point]] = [lambda: draw(laws, rng)] * DRAW_LIMIT
         if designed:
-            matrix = design_points(block.sampler, self.seed, stream, block.samples_given, len(distributions))
+            matrix = design_points(block.sampler, self.seed, stream, block.samples_given, len(laws))
             fractions = iter(matrix[row].tolist())
-            makers = [lambda: {name: each.quantile(next(fractions)) for name, each in distributions.items()}, *makers]
+            makers = [lambda: {name: each.quantile(next(fractions)) for name, each in laws.items()}, *makers]
         for point in makers:
             points = [point()]
             if block.sampler == "saltelli":  # rows of A and B, and A with one value of B, of each quantity in turn
@@ -208,14 +185,6 @@ class Sweep:
             except InputError as error:
                 problem = str(error)
         raise InputError(f"{block.path}.distributions: {DRAW_LIMIT} samples made no possible walk; the last: {problem}")
-
-    def _stream(self, block: Block, cell: tuple[int, ...]) -> int:
-        """Number of a cell's random stream, through all blocks; axes in `same_samples_along` do not count."""
-        number = 0
-        for (name, values), place in zip(block.axes.items(), cell, strict=True):
-            if name not in self.same_samples_along:
-                number = number * len(values) + place
-        return block.first_stream + number
 
     def canonical(self) -> dict[str, Any]:
         """The sweep as JSON-able content of a file, with every default and range written out."""
@@ -247,7 +216,11 @@ class Sweep:
         return hashlib.sha256(text.encode()).hexdigest()
 
 
-def load_sweep(source: "str | os.PathLike[str] | Mapping[str, object] | Sweep", **replaced: object) -> Sweep:
+Source = AnyPath | Mapping[str, object] | Sweep
+"""What says what a sweep is: a file, its content, or a sweep."""
+
+
+def load_sweep(source: Source, **replaced: object) -> Sweep:
     """Load and check a sweep.
 
     Every cell is checked, see `Sweep.check`.
@@ -262,6 +235,6 @@ def load_sweep(source: "str | os.PathLike[str] | Mapping[str, object] | Sweep", 
     """
     if isinstance(source, Sweep) and not replaced:
         return source
-    sweep = Sweep.of(source.canonical() if isinstance(source, Sweep) else source, **replaced)
+    sweep = Sweep(*read_sweep(source.canonical() if isinstance(source, Sweep) else source, **replaced))
     sweep.check()
     return sweep

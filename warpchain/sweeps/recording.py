@@ -51,10 +51,7 @@ class Series(BaseModel):
         ratio = self.interval / options.record_interval
         steps = round(ratio)
         if steps < 1 or abs(ratio - steps) > 1e-6 * ratio:
-            raise InputError(
-                f"{path}.interval: {self.interval} s is no whole multiple of options.record_interval "
-                f"{options.record_interval} s; give one"
-            )
+            raise InputError(f"{path}.interval: {self.interval} s is no multiple of options.record_interval; give one")
         return steps
 
 

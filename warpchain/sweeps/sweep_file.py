@@ -1,30 +1,32 @@
 """The grammar of sweep files: `SweepFile` says it once, for checks, the JSON schema of editors and the reference page.
 
 `read_sweep` makes `Block`s of a file, with every range written out and every distribution resolved. An error is a line
-that begins with the path of the offending value, such as `sweep.blocks[0].grid.frequency[3]`.
+that begins with the path of the offending value, such as `sweep.blocks[0].grid.frequency[3]`. Sweeps that come with the
+package are found by their bare names, and so is the file that a new sweep starts from.
 """
 
 import math
 import os
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Annotated, Any, Final, Literal, Self
 
 import pydantic
 from pydantic import AfterValidator, BaseModel, Field, ValidationError, ValidationInfo, model_validator
 
+from warpchain.files import AnyPath, write_whole
 from warpchain.inputs import validation
 from warpchain.inputs.distributions import DRAWABLE, LARGEST_SEED, TABLE, Distribution, Gaussian, Uniform
 from warpchain.inputs.parameters import PRESETS
 from warpchain.inputs.scene import COMPOUND
-from warpchain.inputs.sections import SECTIONS
+from warpchain.inputs.setup import SECTIONS
 from warpchain.inputs.validation import FIELDS, SECTION_OF, STRICT, SYMBOL_OF, InputError, ModelT, Whole, shown
 from warpchain.inputs.yaml_files import read_yaml
-from warpchain.sweeps.axes import CELL_LIMIT, Name, axis, list_of, named_axis
-from warpchain.sweeps.block import POINT, Block, Value
+from warpchain.sweeps.block import CELL_LIMIT, POINT, Block, Name, Sections, Value, axis, list_of, named_axis
 from warpchain.sweeps.designs import SAMPLERS, check_design
 from warpchain.sweeps.recording import Frames, Recording
-from warpchain.sweeps.shipped import sweep_path
 
 VERSION: Final = 1
 """Version of the file format."""
@@ -37,6 +39,10 @@ A power of two, because numbers of designed samples are.
 
 _Preset = Literal[*PRESETS]  # type: ignore[valid-type]
 _Sampler = Literal[*SAMPLERS]  # type: ignore[valid-type]
+
+_PACKAGE: Final = Path(__file__).parents[1]
+_SHIPPED: Final = _PACKAGE / "shipped_sweeps"
+"""In a checkout a link to sweeps/."""
 
 # Fields by name or symbol
 
@@ -65,12 +71,8 @@ class _Given(BaseModel):
 
 
 _TYPES: Final[Mapping[str, Any]] = {
-    name: Annotated[
-        field.annotation,
-        Field(description=field.description, json_schema_extra=field.json_schema_extra),
-        *field.metadata,
-    ]
-    for name, field in FIELDS.items()
+    name: Annotated[f.annotation, Field(description=f.description, json_schema_extra=f.json_schema_extra), *f.metadata]
+    for name, f in FIELDS.items()
 }
 _AXES: Final = {name: (named_axis if name in COMPOUND else axis)(kind) for name, kind in _TYPES.items()}
 
@@ -201,10 +203,7 @@ class BlockKeys(WalkKeys):
         first = next(iter(self.points), "")
         for name, values in self.points.items():
             if len(values) != len(self.points[first]):
-                raise InputError(
-                    f"points.{name}: {len(values)} values, but {first} has {len(self.points[first])}; give a value of "
-                    "each for every set"
-                )
+                raise InputError(f"points.{name}: {len(values)} values, not {len(self.points[first])}; give as many")
         return self
 
 
@@ -262,7 +261,7 @@ def _checked(model: type[ModelT], content: object, path: str, source: object) ->
         raise InputError(*validation.refusals(error, path, keys)) from None
 
 
-def read_walk_file(path: str | os.PathLike[str]) -> tuple[str | None, dict[str, dict[str, Any]]]:
+def read_walk_file(path: AnyPath) -> tuple[str | None, dict[str, dict[str, Any]]]:
     """Preset or None, and values by section and full names, of the YAML file of a walk; else an `InputError`."""
     file = _checked(WalkKeys, read_yaml(path), "", path)
     return file.preset, {section: getattr(file, section) for section in SECTIONS}
@@ -272,7 +271,7 @@ def read_walk_file(path: str | os.PathLike[str]) -> tuple[str | None, dict[str, 
 
 
 def read_sweep(
-    source: str | os.PathLike[str] | Mapping[str, object], **replaced: object
+    source: AnyPath | Mapping[str, object], **replaced: object
 ) -> tuple[str, int, tuple[str, ...], tuple[Block, ...], Recording]:
     """The fields of a `Sweep`: name, seed, axes of equal samples, blocks, recording; see `load_sweep`."""
     content = validation.plain(source, "sweep") if isinstance(source, Mapping) else read_yaml(sweep_path(source))
@@ -286,10 +285,8 @@ def read_sweep(
         blocks = [_block("main", "sweep", None, file)]
     else:
         blocks = [_block(each.name, f"sweep.blocks[{i}]", file, each) for i, each in enumerate(file.blocks)]
-    same, known = (
-        {*map(validation.full_name, file.same_samples_along)},
-        {name for block in blocks for name in block.axes},
-    )
+    same = {*map(validation.full_name, file.same_samples_along)}
+    known = {name for block in blocks for name in block.axes}
     for name in same - known:
         remedy = validation.suggestion(name, sorted(known))
         raise InputError(f"sweep.same_samples_along: {shown(name)} is no axis of any block; {remedy}")
@@ -324,9 +321,7 @@ def _block(name: str, path: str, outer: BlockKeys | None, inner: BlockKeys) -> B
     return Block(path, name, fixed, sections, axes, named, points, drawn, sampler or "random", samples)
 
 
-def _drawn(
-    given: Mapping[str, Any], sections: Mapping[str, Mapping[str, Value]], varied: set[str], path: str
-) -> dict[str, Distribution]:
+def _drawn(given: Mapping[str, Any], sections: Sections, varied: set[str], path: str) -> dict[str, Distribution]:
     """What a block draws, in the order of drawing.
 
     Given values are exact, unless their quantity has a distribution of its own name, without a mean and ends.
@@ -355,7 +350,33 @@ def _numbered(blocks: list[Block], same_samples_along: tuple[str, ...]) -> Itera
         if cells > CELL_LIMIT:
             raise InputError(f"{block.path}.grid: {cells:.6g} cells; give fewer values, for {CELL_LIMIT} cells at most")
         if walks > WALK_LIMIT:
-            raise InputError(
-                f"{block.path}.samples: {walks:.6g} walks; give fewer samples, for {WALK_LIMIT} walks at most"
-            )
+            raise InputError(f"{block.path}.samples: {walks:.6g} walks; give fewer, for {WALK_LIMIT} walks at most")
         first_stream += math.prod(len(values) for name, values in block.axes.items() if name not in same_samples_along)
+
+
+# Where files are
+
+
+def shipped_sweeps() -> list[str]:
+    """Bare names of the sweeps that come with the package."""
+    return sorted(path.stem for path in _SHIPPED.glob("*.yaml"))
+
+
+def sweep_path(source: AnyPath) -> Path:
+    """Path of a sweep file, or of a sweep of the package by its bare name; an `InputError` if it is neither."""
+    path = validation.checked_path(source, "sweep")
+    name = str(path)
+    if os.path.isfile(path) or not re.fullmatch(r"[A-Za-z0-9_-]+", name):
+        return path
+    known = shipped_sweeps()
+    if name not in known:
+        raise InputError(f"{name}: neither a file nor a shipped sweep; {validation.suggestion(name, known)}")
+    return _SHIPPED / f"{name}.yaml"
+
+
+def write_new_sweep(path: Path) -> None:
+    """Write a small sweep file whose comments explain its keys; an `InputError` if there is a file already."""
+    text = (_PACKAGE / "sweeps" / "new_sweep.yaml").read_text(encoding="utf-8")
+    if os.path.lexists(path):
+        raise InputError(f"--new: {path} exists; give another name")
+    write_whole(path, text)

@@ -1,8 +1,16 @@
-"""Landmarks of a walk that its samples tell: the loop at the release, and the bounces off the floor."""
+"""What is told of a walk beside its motion: the loop at the release, a plane that tilts, bounces, what is inaccurate.
 
+The values of a plane are those of :mod:`warpchain.kernels.layout`: lateral speed, two rates, the components of the
+room's X and Y axes along the plane's axes e1, e2, e3, and the origin in the room. Z = X × Y points to the right of the
+way that the chain walks.
+"""
+
+import math
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.floor import slope_points
@@ -18,7 +26,7 @@ RELEASE: Final = {
     "height": "height of the joints' outline, in their plane",
     "lowest": "y of the lowest point of all circles",
 }
-"""Keys of `WalkResult.release`, see `at_release`."""
+"""Keys of `WalkResult.release`."""
 PAUSE: Final = 0.01
 """A floor impulse so long [s] after the one before begins a new bounce, as kernels count them."""
 SLIDES: Final = 1e-6
@@ -27,13 +35,21 @@ FAINT: Final = 1e-9
 """… and how small it is, relative to the momentum of the walk, if nothing touches: rounding is 1e-13."""
 BOUNCE: Final = ("start", "end", "impulse_x", "impulse_y", "sticks_at")
 """Columns of a table of bounces."""
-
-
-def at_release(sample: Array) -> dict[str, Any]:
-    """Fields of a `WalkResult` out of the first sample of a walk."""
-    columns = [layout.CENTER_X, layout.CENTER_Y, layout.WIDTH, layout.HEIGHT, layout.LOWEST]
-    release = dict(zip(RELEASE, sample[columns].tolist(), strict=True))
-    return {"release": release, "release_speed": float(sample[layout.LOOP_SPEED])}
+MOST_ENERGY_ERROR: Final = 0.05
+"""Greatest energy error of a walk that nothing warns of."""
+ENERGY_REMEDY: Final = (
+    f"more than {100 * MOST_ENERGY_ERROR:g} % of the energy at release is unaccounted for; lower options.tolerance"
+)
+FAULTS: Final = {
+    "energy": ENERGY_REMEDY,
+    "opening": "joints opened by more than a link length, so that the chain came apart; lower the masses or "
+    "options.tolerance, or raise parameters.joint_stiffness",
+    "penetration": "circles sank in by more than the least radius, through what they touched; "
+    "lower options.contact_step",
+}
+"""Faults of a walk, each with what it means and what to try."""
+LENGTHS: Final = ("link_length", "circle_radius", "link_radii", "charm_radius")
+"""Quantities against which openings and penetrations are held."""
 
 
 def bounces(time: Array, velocity: Array, setup: Setup) -> dict[str, Array]:
@@ -60,3 +76,69 @@ def bounces(time: Array, velocity: Array, setup: Setup) -> dict[str, Array]:
     ]
     table = np.array([(*row, np.nan)[: len(BOUNCE)] for row in rows]).reshape(-1, len(BOUNCE))
     return dict(zip(BOUNCE, table.T, strict=True))
+
+
+def released_plane(setup: Setup, position: Array) -> Array:
+    """The plane of a chain at its release, (PLANE_VALUES,).
+
+    It is tilted about a line along the room's X axis. Its lowest point stays at its height, and the centre of mass
+    stays above z = 0 and moves sideways at the scene's lateral speed. The position, (n, 3), is in the upright plane.
+    """
+    scene, parameters = setup.scene, setup.parameters
+    links = link_values(scene, parameters)
+    masses = links.mass
+    center_x, center_y, _ = masses @ position / masses.sum()
+    ends = position[:, 1] - parameters.link_length / 2 * np.abs(np.sin(position[:, 2]))  # the lower ones of all links
+    lowest = float(np.min(ends - links.radius))
+    sine, cosine = math.sin(scene.tilt), math.cos(scene.tilt)
+    turn_x, turn_y = -scene.tilt_rate, scene.yaw_rate
+    plane = np.zeros(layout.PLANE_VALUES)
+    plane[layout.PLANE_SPEED] = scene.lateral_speed - turn_x * center_y + turn_y * center_x
+    plane[layout.PLANE_TURN_X], plane[layout.PLANE_TURN_Y] = turn_x, turn_y
+    plane[layout.AHEAD : layout.AHEAD + 3] = 1.0, 0.0, 0.0
+    plane[layout.UP : layout.UP + 3] = 0.0, cosine, sine
+    raised = lowest * (1 - cosine) + parameters.half_width * abs(sine)
+    plane[layout.ORIGIN : layout.ORIGIN + 3] = 0.0, raised, center_y * sine
+    return plane
+
+
+def angles(planes: Array) -> tuple[Array, Array]:
+    """Tilt and yaw [rad] of planes, shape (…, ≥ PLANE_VALUES); yaw within (−π, π], anticlockwise from above."""
+    ahead, up = (planes[..., first : first + 3] for first in (layout.AHEAD, layout.UP))
+    sideways = np.cross(ahead, up)
+    return np.arcsin(np.clip(up[..., 2], -1.0, 1.0)), np.arctan2(-sideways[..., 0], ahead[..., 0])
+
+
+def frame_axes(planes: Array) -> Array:
+    """e1 and e2 in the room, shape (f, 2, 3), of planes (f, PLANE_VALUES)."""
+    ahead, up = (planes[:, first : first + 3] for first in (layout.AHEAD, layout.UP))
+    axes = np.stack([ahead, up, np.cross(ahead, up)], axis=1)  # room axes along axis 1, components along axis 2
+    return np.ascontiguousarray(axes[:, :, :2].transpose(0, 2, 1))
+
+
+def state_of_plane(plane: Array) -> dict[str, Array]:
+    """The fields of a `State` that tell its plane, (PLANE_VALUES,)."""
+    origin = plane[layout.ORIGIN : layout.ORIGIN + 3]
+    return {"origin": origin, "axes": frame_axes(plane[None])[0], "plane_rates": plane[:3]}
+
+
+def energy_error(at_release: ArrayLike, residual: ArrayLike) -> NDArray[np.float64]:
+    """Size of the energy unaccounted for [J], relative to kinetic and potential energy at release; NaN before it."""
+    energy = np.asarray(at_release, np.float64)
+    return np.abs(residual) / np.where(energy > 0, energy, np.nan)
+
+
+def least(value: Any) -> float:
+    """The least of a number or of several; ∞ for None."""
+    return float(np.min(np.inf if value is None else value))
+
+
+def faults(energy_error: Any, opening: Any, penetration: Any, lengths: Mapping[str, Any]) -> dict[str, Any]:
+    """Whether walks have each of `FAULTS`: of numbers or arrays; NaN is no fault.
+
+    Given are the greatest opening of a joint and penetration of a circle [m], and the `least` of each of `LENGTHS` [m].
+    """
+    link_length, circle_radius, link_radii, charm_radius = (lengths[name] for name in LENGTHS)
+    radius = np.minimum(charm_radius, np.where(np.isinf(link_radii), circle_radius, link_radii))
+    found = energy_error > MOST_ENERGY_ERROR, opening > link_length, penetration > radius
+    return dict(zip(FAULTS, found, strict=True))

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Annotated
 
 from pydantic import Field
@@ -12,32 +11,13 @@ from warpchain.inputs.setup import Setup, check_has_joint_forces
 from warpchain.inputs.validation import InputError, checked, plain
 from warpchain.walks.motion import LONGEST_INTERVAL, Keep
 from warpchain.walks.scheduler import compile_kernels, run_setups
-from warpchain.walks.walk_phases import WalkRun
+from warpchain.walks.walk_phases import Progress
 from warpchain.walks.walk_result import WalkResult
 
-SHORTEST_INTERVAL = 1e-6
-"""Least time [s] between two frames, as between two samples."""
-_INTERVAL = Annotated[float, Field(ge=SHORTEST_INTERVAL, lt=LONGEST_INTERVAL)]
+_INTERVAL = Annotated[float, Field(ge=1e-6, lt=LONGEST_INTERVAL)]  # as between two samples
 _BEFORE = Annotated[float, Field(ge=0, le=LONGEST_INTERVAL)]
 RECORD_BEFORE = 0.5
 """Time [s] before the release that is kept if frames are, unless told otherwise."""
-
-
-@dataclass(frozen=True)
-class Progress:
-    """Where a walk is.
-
-    Attributes:
-        phase: ``"compile"``, ``"settle"``, ``"spin up"``, ``"hold"`` or ``"walk"``.
-        time: Simulated time [s] since the start, in phase ``"walk"`` since the release.
-        speed: Speed [m/s] along the loop, in phase ``"walk"`` of the centre of mass.
-        attempts: Attempted steps so far.
-    """
-
-    phase: str
-    time: float
-    speed: float
-    attempts: int
 
 
 OnProgress = Callable[[Progress], None]
@@ -55,12 +35,11 @@ def run_walk(
     """Run a walk whose setup is complete, samples drawn; the seed is only noted. The rest is as of `warpchain.walk`."""
     interval: float | None = checked(frame_interval, "frame_interval", _INTERVAL | None, "s")
     before: float | None = checked(record_before, "record_before", _BEFORE | None, "s")
-    if interval is None and before:
-        raise InputError("record_before: a time is given, but frame_interval is None; give a frame_interval as well")
+    if interval is None and (before or record_loads):
+        name = "record_before" if before else "record_loads"
+        raise InputError(f"{name}: kept with frames, but frame_interval is None; give a frame_interval as well")
     if record_loads:
         check_has_joint_forces(setup.options)
-        if interval is None:
-            raise InputError("record_loads: loads are kept with frames, but frame_interval is None; give one")
     samples = 0.0 if interval is None else interval / setup.options.record_interval
     keep = Keep(
         series_every=1,
@@ -69,18 +48,12 @@ def run_walk(
         loads=record_loads,
         before=(RECORD_BEFORE if before is None and interval is not None else before or 0.0) * setup.has_drive,
     )
-
-    def watch(run: WalkRun) -> None:
-        if on_progress is not None:
-            attempts = run.counts["accepted"] + run.counts["rejected"]
-            on_progress(Progress(run.phase, run.walk_time or run.simulated_time, run.speed, attempts))
-
+    report = on_progress or (lambda progress: None)
     with gpu_turn([setup.options.device]):
-        if on_progress is not None:
-            on_progress(Progress("compile", 0.0, 0.0, 0))
+        report(Progress("compile", 0.0, 0.0, 0))
         compile_kernels([setup])
         started = time.perf_counter()
-        ((_, run),) = run_setups([setup], keeps=[keep], watch=watch)
+        ((_, run),) = run_setups([setup], keeps=[keep], watch=lambda run: report(run.progress()))
         return WalkResult(
             **run.outcome(),
             **run.recorder.motion(),

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from warpchain.engine.tallies import CONTACTS, LOST
 from warpchain.inputs.distributions import DRAWABLE
 from warpchain.inputs.validation import FIELDS, field_unit
-from warpchain.walks.faults import MOST_ENERGY_ERROR, energy_error, faults
+from warpchain.walks.landmarks import MOST_ENERGY_ERROR, energy_error, faults
 from warpchain.walks.walk_result import NUMBERS, WalkResult
 
 Rows = NDArray[np.void]
+Columns = Mapping[str, NDArray[Any]]
 
 KEYS: Final = np.dtype([("block", "<i4"), ("cell", "<i4"), ("sample", "<i4")])
 """What a row is found by: number of its block, of its cell in C order over the axes, of its sample in the cell."""
@@ -24,8 +25,6 @@ MISSING: Final = -1
 """Status of a walk that has not been computed yet; no code of `Status` is negative."""
 
 _DRAWN: Final = "_drawn"
-_PREFIXES: Final = {"greatest_penetration": "penetration"}
-"""Field that is a dictionary → how the names of its columns begin, if not with its own."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +48,7 @@ def _stored_columns() -> Iterator[tuple[str, Column]]:
             continue
         kind = "<i8" if types[name][0] in (int, dict[str, int]) else "<f8"
         for key, meaning in (stored.keys or {"": stored.meaning}).items():
-            prefix = "loss" if name == "energy" and key in LOST else _PREFIXES.get(name, name)
+            prefix = "loss" if name == "energy" and key in LOST else name.removeprefix("greatest_") if key else name
             path = (name, key) if key else (name,)
             yield "_".join((prefix, *path[1:])), Column(kind, stored.unit, meaning, path)
 
@@ -98,16 +97,7 @@ def fill_row(row: Any, outcome: Mapping[str, Any], drawn: Mapping[str, float]) -
         row[drawn_column(name)] = value
 
 
-def numbers_of(values: Mapping[str, Any]) -> dict[str, Any]:
-    """The fields of a `WalkResult` in the columns of one walk, those apart that are no columns."""
-    found: dict[str, Any] = {}
-    for name, column in STORED_COLUMNS.items():
-        owner = found.setdefault(column.path[0], {}) if column.path[1:] else found
-        owner[column.path[-1]] = values[name].item()
-    return found
-
-
-def derived_columns(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[np.float64]]:
+def derived_columns(columns: Columns) -> dict[str, NDArray[np.float64]]:
     """The columns that are computed from others."""
     at_release = columns["energy_kinetic_at_release"] + columns["energy_potential_at_release"]
     return {"energy_at_release": at_release, "energy_error": energy_error(at_release, columns["energy_residual"])}
@@ -135,10 +125,8 @@ def field_column(name: str) -> Column:
     return Column("<f8", field_unit(field), f"{meaning}; as drawn for the walk" if name.endswith(_DRAWN) else meaning)
 
 
-def faults_of_columns(
-    columns: Mapping[str, NDArray[Any]], lengths: Mapping[str, NDArray[Any]]
-) -> dict[str, NDArray[np.bool_]]:
-    """Whether each walk in columns of a sweep has each of `warpchain.walks.faults.FAULTS`.
+def faults_of_columns(columns: Columns, lengths: Columns) -> dict[str, NDArray[np.bool_]]:
+    """Whether each walk in columns of a sweep has each of `warpchain.walks.landmarks.FAULTS`.
 
     Lengths are the least of each of `LENGTHS` [m] before anything was drawn, along the axes of the columns.
     """

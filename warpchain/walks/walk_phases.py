@@ -2,11 +2,12 @@
 
 The drive (settle, spin-up, hold until steady) needs a sprocket and no floor, the walk a floor and no sprocket. The
 equations of the drive do not contain the floor, so the chain is driven about the origin and raised to its clearance at
-the release.
+the release. The state of a walk at any time after that is that of the walk, run again until then.
 """
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.engine.batch import Batch
+from warpchain.engine.devices import gpu_turn
 from warpchain.engine.snapshot import CACHES, change, restore, take_snapshot
 from warpchain.engine.sprocket_motion import motion_rows
 from warpchain.engine.tallies import CONTACTS, COUNTS, EXTREMES, LOST
@@ -23,14 +25,13 @@ from warpchain.inputs.scene import joint_radius, link_values, settling_time
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.inputs.state import State
-from warpchain.inputs.validation import InputError
+from warpchain.inputs.validation import InputError, checked
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.status import Status
 from warpchain.walks.drive import drive_of
-from warpchain.walks.landmarks import at_release
+from warpchain.walks.landmarks import RELEASE, angles, released_plane, state_of_plane
 from warpchain.walks.motion import NOTHING, Keep
-from warpchain.walks.moving_plane import angles, plane_of_state, released_plane, state_of_plane
 from warpchain.walks.recorder import Recorder
 
 _OF_THE_RUN = ("raised", "drive_time", "drift", "_at_full_speed", "_has_sprocket")
@@ -39,6 +40,23 @@ _NO_FALL: Mapping[str, float] = {
     **dict.fromkeys(("lateral_drift", "final_tilt", "final_yaw", "greatest_tilt", "fell_at"), math.nan),
     **dict.fromkeys(("fell_over", "fell_before_collapse"), -1),
 }
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a walk is.
+
+    Attributes:
+        phase: ``"compile"``, ``"settle"``, ``"spin up"``, ``"hold"`` or ``"walk"``.
+        time: Simulated time [s] since the start, in phase ``"walk"`` since the release.
+        speed: Speed [m/s] along the loop, in phase ``"walk"`` of the centre of mass.
+        attempts: Attempted steps so far.
+    """
+
+    phase: str
+    time: float
+    speed: float
+    attempts: int
 
 
 def phase_features(setup: Setup) -> dict[str, Features]:
@@ -84,6 +102,7 @@ class WalkRun:
         self._settled = settling_time(scene)
         self._tilts = scene.plane == "tilting"
         self._level = math.cos(math.radians(scene.slope))  # of a distance along the floor
+        self._walk_end = min(scene.walk_limit, scene.walk_until or math.inf)  # since the release, if it is not at rest
         self._farthest = (scene.distance_limit or 0.0) * self._level  # along x
 
     def phases(self) -> Iterator[Features]:
@@ -108,10 +127,21 @@ class WalkRun:
                 batch.set_state(world, first_area=area)
                 batch.resume(world, self._walk_end, Status.TIME_LIMIT)
         elif not setup.has_drive:
-            self._release(*self._ellipse())
+            scene, length = setup.scene, setup.parameters.link_length
+            speed = 2 * math.pi * scene.frequency * joint_radius(scene, setup.parameters)
+            try:
+                laid = lay_chain(ellipse(scene.ellipse_aspect), scene.links, length, speed, scene.phase)
+            except ValueError:
+                problem = f"too far from 1 for {scene.links} links; give one closer to it"
+                raise InputError(f"scene.ellipse_aspect: {problem}") from None
+            self._release(*laid)
         else:
             hanging = math.nan
-            self._start_drive()
+            (position, velocity), drive = drive_of(setup, self._links)
+            self._at_full_speed, self._hold_softness = drive["hold_start"], drive["hold_softness"]
+            batch.set_drive(world, **drive)
+            load = partial(batch.load, world, position, velocity, softness=self._hold_softness)
+            load(stop_time=self._settled, stop_status=Status.FINISHED)
             if setup.scene.start == "rest":
                 yield features["driven"]
                 if batch.status(world) != Status.FINISHED:
@@ -138,58 +168,11 @@ class WalkRun:
         self.is_free = True
         yield features["free"]
 
-    def _ellipse(self) -> tuple[Array, Array]:
-        """Position and velocity (n, 3) of a chain that starts as an ellipse."""
-        scene, length = self.setup.scene, self.setup.parameters.link_length
-        speed = 2 * math.pi * scene.frequency * joint_radius(scene, self.setup.parameters)
-        try:
-            return lay_chain(ellipse(scene.ellipse_aspect), scene.links, length, speed, scene.phase)
-        except ValueError:
-            raise InputError(
-                f"scene.ellipse_aspect: {scene.links} links cannot follow an ellipse of aspect "
-                f"{scene.ellipse_aspect}; give one closer to 1, or more links"
-            ) from None
-
-    def _start_drive(self) -> None:
-        """Lay the chain on its sprocket; it is to settle there, if it starts at rest."""
-        (position, velocity), drive = drive_of(self.setup, self._links)
-        self._at_full_speed, self._hold_softness = drive["hold_start"], drive["hold_softness"]
-        self._batch.set_drive(self._world, **drive)
-        self._batch.load(
-            self._world,
-            position,
-            velocity,
-            stop_time=self._settled,
-            stop_status=Status.FINISHED,
-            softness=self._hold_softness,
-        )
-
-    @property
-    def phase(self) -> str:
-        """`settle`, `spin up`, `hold` or `walk`."""
-        if self._released:
-            return "walk"
-        now = self._batch.time(self._world)
-        return "settle" if now < self._settled else "spin up" if now < self._at_full_speed else "hold"
-
-    @property
-    def _walk_end(self) -> float:
-        """Time [s] since the release at which a walk ends that is not at rest."""
-        scene = self.setup.scene
-        return min(scene.walk_limit, scene.walk_until or math.inf)
-
     @property
     def counts(self) -> dict[str, int]:
         """Counters of all phases so far."""
         before = self._before["counts"] if self._released else 0
         return dict(zip(COUNTS, (before + self._batch.host["state/counts"][self._world]).tolist(), strict=True))
-
-    @property
-    def extremes(self) -> dict[str, float]:
-        """Greatest opening and depths [m] of all phases so far."""
-        now = self._batch.host["state/extremes"][self._world]
-        now = np.fmax(self._before["extremes"], now) if self._released else now
-        return dict(zip(EXTREMES, now.tolist(), strict=True))
 
     @property
     def walk_time(self) -> float:
@@ -204,24 +187,23 @@ class WalkRun:
     @property
     def hold_time(self) -> float:
         """Time [s] for which the loop was held at full frequency; NaN if it was not."""
-        if not self._has_sprocket:
-            return math.nan
         end = self.drive_time if self._released else self._batch.time(self._world)
-        return max(0.0, end - self._at_full_speed)
+        return max(0.0, end - self._at_full_speed) if self._has_sprocket else math.nan
 
-    @property
-    def speed(self) -> float:
-        """Speed [m/s] of the centre of mass in the walk, along the loop before."""
-        sample = self._batch.last_sample(self._world)
+    def progress(self) -> Progress:
+        """Where the walk is."""
+        now, sample = self._batch.time(self._world), self._batch.last_sample(self._world)
+        attempts = self.counts["accepted"] + self.counts["rejected"]
         if self._released:
-            return math.hypot(sample[layout.CENTER_U], sample[layout.CENTER_V])
-        return float(sample[layout.LOOP_SPEED])
+            speed = math.hypot(sample[layout.CENTER_U], sample[layout.CENTER_V])
+            return Progress("walk", now or self.drive_time, speed, attempts)
+        phase = "settle" if now < self._settled else "spin up" if now < self._at_full_speed else "hold"
+        return Progress(phase, now, float(sample[layout.LOOP_SPEED]), attempts)
 
     def energy(self) -> dict[str, float]:
         """Where the energy of the walk went [J]; NaN before the release. Keys: `walk_result.ENERGIES`."""
         first, last = self._batch.first_sample(self._world), self._batch.last_sample(self._world)
-        losses = self._batch.losses(self._world)
-        lost = {name: losses[name] for name in LOST}
+        lost = {name: loss for name, loss in self._batch.losses(self._world).items() if name in LOST}
         ledger = {
             "kinetic_at_release": float(first[layout.KINETIC]),
             "potential_at_release": float(first[layout.GRAVITATIONAL] + first[layout.SPRING]),
@@ -268,9 +250,14 @@ class WalkRun:
 
     def outcome(self) -> dict[str, Any]:
         """Results of the walk apart from its motion, by the names of the fields of `WalkResult`."""
-        counts, extremes = self.counts, self.extremes
+        counts, greatest = self.counts, self._batch.host["state/extremes"][self._world]
+        if self._released:
+            greatest = np.fmax(self._before["extremes"], greatest)
+        extremes = dict(zip(EXTREMES, greatest.tolist(), strict=True))
         is_at_rest = self.status == Status.AT_REST
         first, last = self._batch.first_sample(self._world), self._batch.last_sample(self._world)
+        released = first if self._released else np.full_like(first, np.nan)
+        columns = [layout.CENTER_X, layout.CENTER_Y, layout.WIDTH, layout.HEIGHT, layout.LOWEST]
         # Δx is x of the centre of mass, because the sprocket's centre is at x = 0; on a slope, along the floor
         return {
             "status": self.status,
@@ -292,7 +279,8 @@ class WalkRun:
             **self._ending("strands_met_at", "strands_met", layout.STRANDS_MET_AT),
             **self._ending("collapsed_at", "collapse", layout.COLLAPSED_AT),
             "sprocket_height": self.raised if self._has_sprocket else math.nan,
-            **at_release(first if self._released else np.full_like(first, np.nan)),
+            "release": dict(zip(RELEASE, released[columns].tolist(), strict=True)),
+            "release_speed": float(released[layout.LOOP_SPEED]),
         }
 
     def drain(self) -> None:
@@ -326,23 +314,21 @@ class WalkRun:
         restore(batch, world, {name: part for name, part in memory.items() if is_kept or name not in CACHES})
         batch.set_state(world, next_frame=np.floor(start.time / interval) if interval > 0 else -1)
         batch.set_drive(world, farthest=self._farthest)
-        if is_kept and self._is_at(start):
+        here = {"position": batch.position(world), "velocity": batch.velocity(world)}
+        here |= state_of_plane(batch.plane(world)) if self._tilts else {}
+        is_there = all(values.tobytes() == getattr(start, name).tobytes() for name, values in here.items())
+        if is_kept and is_there:  # to the bit
             batch.resume(world, self._walk_end, Status.TIME_LIMIT)
             self.recorder.go_on(memory["state/last_sample"], start.time)
             return None
         if self._tilts:
-            batch.set_plane(world, plane_of_state(start))
+            assert start.origin is not None and start.axes is not None and start.plane_rates is not None
+            e1, e2 = start.axes
+            axes = np.stack([e1, e2, np.cross(e1, e2)])  # the plane's along axis 0
+            batch.set_plane(world, np.concatenate([start.plane_rates, axes[:, 0], axes[:, 1], start.origin]))
         change(batch, world, start.position, start.velocity)
         batch.resume(world, batch.time(world), Status.FINISHED)
         return float(memory["state/first_area"])
-
-    def _is_at(self, start: State) -> bool:
-        """Whether the world has the places and velocities of a state, to the bit."""
-        batch, world = self._batch, self._world
-        here = {"position": batch.position(world), "velocity": batch.velocity(world)}
-        if self._tilts:
-            here |= state_of_plane(batch.plane(world))
-        return all(values.tobytes() == getattr(start, name).tobytes() for name, values in here.items())
 
     def _raise(self, position: Array, clearance: float) -> float:
         """How far a chain at this position must be raised to a clearance [m]."""
@@ -365,13 +351,47 @@ class WalkRun:
     def _load(self, position: Array, velocity: Array) -> None:
         """Begin the walk of a chain on its floor."""
         self._batch.set_drive(self._world, farthest=self._farthest)
-        self._batch.load(
-            self._world,
-            position,
-            velocity,
-            stop_time=self._walk_end,
-            stop_status=Status.TIME_LIMIT,
-            attempts_before=int(self._before["counts"][[layout.ACCEPTED, layout.REJECTED]].sum()),
-            softness=self._hold_softness,
-            has_frame_marks=self.recorder.keep.frame_interval > 0,
-        )
+        before = int(self._before["counts"][[layout.ACCEPTED, layout.REJECTED]].sum())
+        has_marks = self.recorder.keep.frame_interval > 0
+        load = partial(self._batch.load, self._world, position, velocity, softness=self._hold_softness)
+        load(stop_time=self._walk_end, stop_status=Status.TIME_LIMIT, attempts_before=before, has_frame_marks=has_marks)
+
+
+def state_at(setup: Setup, t: object, end: float) -> State:
+    """The state of a walk at the end of its first step at or after a time [s], see `WalkResult.state`.
+
+    Launches that go past that step are undone and shortened, down to one attempt: so the walk makes the steps that it
+    always makes, and none for this time. Its end [s] is NaN if it came before the release. An `InputError` says that
+    there is no such time, or that the walk, run again, ends before.
+    """
+    time: float = checked(t, "t", float, "s")
+    first = setup.scene.release[-1][0] if setup.scene.release is not None else 0.0  # then the sprocket vanishes
+    if setup.start is not None:
+        first = setup.start.time
+    if np.isnan(end):
+        raise InputError("t: the walk ended before its release, and has no such time; see its status")
+    if setup.start is None and 0 <= time < first:
+        raise InputError(f"t: {time:g} s: the sprocket is there until {first:g} s, and a state has none; give more")
+    if not first <= time <= end:
+        raise InputError(f"t: {time:g} s is not in the walk; give a time from {first:g} to {end:.6g}")
+    with gpu_turn([setup.options.device]):
+        batch = Batch(1, setup.scene.links, setup.options, faces=len(setup.floor.laws))
+        run = WalkRun(batch, 0, setup)
+        attempts = batch.attempts_of_launch
+        for features in run.phases():
+            while not (has_come := run.is_free and batch.time(0) >= time) and batch.status(0) == Status.RUNNING:
+                before = take_snapshot(batch, 0) if run.is_free else None
+                batch.launch([0], features, attempts)
+                if before is not None and batch.time(0) >= time and attempts > 1:
+                    restore(batch, 0, before)
+                    attempts = max(1, attempts // 8)
+            if has_come:
+                return State(
+                    position=batch.position(0),
+                    velocity=batch.velocity(0),
+                    setup=replace(setup, start=None),
+                    time=batch.time(0),
+                    memory=run.memory(),
+                    **(state_of_plane(batch.plane(0)) if setup.scene.plane == "tilting" else {}),
+                )
+        raise InputError(f"t: run again, the walk ends as {run.status.label} at {batch.time(0):.6g} s; give less")

@@ -22,20 +22,16 @@ from warpchain.engine.tallies import COUNTS, DEPTHS, EXTREMES, IMPULSES, LOST
 from warpchain.files import write_whole
 from warpchain.hdf5_files import Stored, hdf5_image, put, read_fields, reading_hdf5, stored_fields, write_fields
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.scene import Scene, contact_radius
-from warpchain.inputs.setup import Setup
+from warpchain.inputs.scene import contact_radius
+from warpchain.inputs.setup import SECTIONS, Setup
 from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError, json_value, validated
 from warpchain.kernels import layout
 from warpchain.loop.stationary_loop import BEFORE, FIELDS, BeforeRelease
-from warpchain.pictures.walk_shape import Kind
+from warpchain.pictures.labels import Kind
 from warpchain.status import Status
-from warpchain.walks.faults import FAULTS, LENGTHS, MOST_ENERGY_ERROR, energy_error, faults, least
-from warpchain.walks.landmarks import RELEASE, bounces
-from warpchain.walks.moving_plane import in_room
-from warpchain.walks.stored_state import read_state, write_state
+from warpchain.walks.landmarks import FAULTS, LENGTHS, MOST_ENERGY_ERROR, RELEASE, bounces, energy_error, faults, least
 
 if TYPE_CHECKING:
     import h5py
@@ -49,6 +45,7 @@ WANTED: Final = "give a saved walk; `walk --like SWEEP --index I` saves one"
 
 _SINCE_FLOOR: Final = "time since the last impulse on the floor; NaN if there was none"
 _FIXED: Final = "if the plane is fixed"
+_NEVER: Final = "NaN if it never was"
 
 ENERGIES: Final = {
     "kinetic_at_release": "kinetic energy at release",
@@ -59,6 +56,15 @@ ENERGIES: Final = {
     "residual": "energy at release, less that at the end and all losses: the error of the integration",
 }
 """Keys of `WalkResult.energy`. Losses count as positive."""
+_GROUP: Final = "start"
+"""Group of the state that a walk began from, so that it can be run again to the bit."""
+_STATE: Final = {
+    "position": ("m, m, rad", "x, y and angle of each link"),
+    "velocity": ("m/s, m/s, rad/s", "their rates"),
+    "origin": ("m", "origin of the plane's coordinates in the room"),
+    "axes": ("1", "axes of x and y of the plane in the room"),
+    "plane_rates": ("m/s, rad/s, rad/s", "speed across the plane, and its turning rates about x and y"),
+}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -85,22 +91,16 @@ class WalkResult:
         Stored(
             "1",
             "greatest change of the held loop's mean height, width or place, relative to height or width, while it was "
-            "last watched; NaN if it never was",
+            f"last watched; {_NEVER}",
         ),
     ]
     lateral_drift: Annotated[
         float, Stored("m", "z of the centre of mass at rest, to the right; NaN unless the plane tilts")
     ]
-    final_tilt: Annotated[
-        float, Stored("rad", "tilt of the plane at the end, positive to the left; NaN if the plane is fixed")
-    ]
-    final_yaw: Annotated[
-        float, Stored("rad", "heading of the plane at the end, anticlockwise; NaN if the plane is fixed")
-    ]
-    greatest_tilt: Annotated[float, Stored("rad", "greatest size of the tilt in the walk; NaN if the plane is fixed")]
-    fell_at: Annotated[
-        float, Stored("s", "from the release until the plane was first tilted by 45°; NaN if it never was")
-    ]
+    final_tilt: Annotated[float, Stored("rad", f"tilt of the plane at the end, positive to the left; NaN {_FIXED}")]
+    final_yaw: Annotated[float, Stored("rad", f"heading of the plane at the end, anticlockwise; NaN {_FIXED}")]
+    greatest_tilt: Annotated[float, Stored("rad", f"greatest size of the tilt in the walk; NaN {_FIXED}")]
+    fell_at: Annotated[float, Stored("s", f"from the release until the plane was first tilted by 45°; {_NEVER}")]
     fell_over: Annotated[int, Stored("1", "1 if the plane was ever tilted by 45°, 0 if not; −1 if the plane is fixed")]
     fell_before_collapse: Annotated[
         int, Stored("1", "1 if it fell over before its loop collapsed, 0 if not; −1 if the plane is fixed")
@@ -184,7 +184,7 @@ class WalkResult:
         """Joints x, y, z [m] in the room, (f, n, 3), if the plane tilts; else None: `frame_joints` are in the room."""
         if self.setup.scene.plane == "fixed":
             return None
-        return in_room(self.frame_joints, self.frame_origin, self.frame_axes)
+        return self.frame_origin[:, None, :] + self.frame_joints @ self.frame_axes
 
     def __repr__(self) -> str:
         """One line with the most important numbers."""
@@ -222,7 +222,7 @@ class WalkResult:
         Raises:
             InputError: `t` is no such time, the chain was never released, or the device of the walk is not here.
         """
-        from warpchain.walks.revisit import state_at
+        from warpchain.walks.walk_phases import state_at
 
         is_released = not np.isnan(self.energy["kinetic_at_release"])
         return state_at(self.setup, t, self.walk_time if is_released else np.nan)
@@ -291,13 +291,13 @@ class WalkResult:
 
     def _repr_png_(self) -> bytes | None:
         """The film strip, or height and speed if there are no frames; None if there is nothing to draw."""
-        from warpchain.pictures.inline import first_png
+        from warpchain.pictures.style import first_png
 
         return first_png(partial(self.plot, kind) for kind in ("film_strip", "height_and_speed"))
 
     def _repr_html_(self) -> str:
         """The most important numbers, why the walk is inaccurate if it is, and the picture."""
-        from warpchain.pictures.inline import fragment
+        from warpchain.pictures.style import fragment
 
         return fragment("\n".join([repr(self), *self.warnings()]), self._repr_png_())
 
@@ -385,12 +385,8 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
     with reading_hdf5(path, KIND, remedy, WANTED) as file:
         given = json.loads(file.attrs["setup"])
         try:
-            setup = Setup(
-                preset=given["preset"],
-                parameters=validated(Parameters, given["parameters"], "parameters"),
-                scene=validated(Scene, given["scene"], "scene"),
-                options=validated(Options, given["options"], "options"),
-            )
+            sections: Any = {name: validated(model, given[name], name) for name, model in SECTIONS.items()}
+            setup = Setup(preset=given["preset"], **sections)
             setup = replace(setup, start=read_state(file, setup))
         except InputError as error:
             raise InputError(f"{path}: {error}; read it with the version that wrote it") from None
@@ -407,3 +403,29 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
 def _setup_as_dict(setup: Setup) -> dict[str, Any]:
     models = {name: getattr(setup, name).model_dump() for name in ("parameters", "scene", "options")}
     return {"preset": setup.preset, **models}
+
+
+def write_state(file: "h5py.File", state: State) -> None:
+    """Write a state of a walk; its setup is that of the file."""
+    put(file, f"{_GROUP}/time", state.time, "s", "time since the release")
+    for name, (unit, meaning) in _STATE.items():
+        if (values := getattr(state, name)) is not None:
+            put(file, f"{_GROUP}/{name}", values, unit, meaning)
+    for name, values in state.memory.items():
+        put(file, f"{_GROUP}/memory/{name}", values, "1", "what else the walk had then")
+
+
+def read_state(file: "h5py.File", setup: Setup) -> State | None:
+    """The state that a walk began from; None if it began as its scene says."""
+    if _GROUP not in file:
+        return None
+    group, memory = file[_GROUP], {}
+
+    def remember(name: str, node: object) -> None:
+        if hasattr(node, "dtype"):
+            memory[name] = np.array(node)
+
+    if "memory" in group:
+        group["memory"].visititems(remember)
+    arrays = {name: group[name][()] for name in _STATE if name in group}
+    return State(setup=setup, time=float(group["time"][()]), memory=memory, **arrays)

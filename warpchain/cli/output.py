@@ -1,25 +1,30 @@
-"""What the command line shows: tables."""
+"""What commands print and write: tables, and the folder of a walk with its record and its figures."""
 
 import itertools
 import json
 import math
+import os
 import sys
+import tempfile
 from collections.abc import Container, Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, Final
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, get_args
 
 from warpchain.engine.tallies import LOST
-from warpchain.inputs.validation import json_value, printable
-from warpchain.pictures.labels import cell_table
-from warpchain.walks.faults import FAULTS
-from warpchain.walks.walk_result import WalkResult
+from warpchain.files import checked_output, make_folder, naming, remove_output
+from warpchain.inputs.validation import json_value, one_line, printable
+from warpchain.pictures.labels import Kind, cell_table
+from warpchain.walks.landmarks import FAULTS
+from warpchain.walks.walk_result import WalkResult, load_walk
 
 if TYPE_CHECKING:
     from warpchain.store.sweep_result import SweepResult
 
+RECORD: Final = "walk.h5"
+_PICTURES: Final = (*(f"{kind}.png" for kind in get_args(Kind)), "walk.gif")
+"""What `plot` and `animate` write beside the record unless told otherwise."""
 _MOST_CELLS: Final = 1000
 """Most cells of a sweep that a table lists; one of 100,000 would take minutes to lay out."""
-_WIDE: Final = 180
-"""Columns of a table where there is no terminal to ask."""
 
 
 def print_table(headings: Iterable[str], rows: Iterable[Sequence[str]], left: Container[str] = ()) -> None:
@@ -32,7 +37,8 @@ def print_table(headings: Iterable[str], rows: Iterable[Sequence[str]], left: Co
         table.add_column(heading, justify="left" if heading in left else "right", no_wrap=heading != "meaning")
     for row in rows:
         table.add_row(*("" if text.startswith("nan") else text for text in row))
-    Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else _WIDE).print(table)
+    width = None if sys.stdout.isatty() else 180  # where there is no terminal to ask
+    Console(highlight=False, markup=False, width=width).print(table)
 
 
 def print_sweep(result: "SweepResult", as_json: bool) -> None:
@@ -108,3 +114,58 @@ def _walk_rows(result: WalkResult) -> Iterator[tuple[str, str]]:
         yield "unaccounted for", f"{energy['residual']:.1e} J"
     for warning in result.warnings():
         yield "warning", warning
+
+
+def saved(path: Path, wanted: str) -> "WalkResult | SweepResult":
+    """The walk or the sweep of a file or a folder; else an `InputError` says what is `wanted` in its place."""
+    from warpchain.hdf5_files import kind_of_hdf5
+    from warpchain.store.sweep_result import KIND, load
+
+    record = path / RECORD if os.path.isfile(path / RECORD) else path
+    is_sweep = record.is_dir() or (record.suffix != ".h5" and not record.exists())
+    return load(record) if is_sweep or kind_of_hdf5(record, wanted) == KIND else load_walk(record)
+
+
+def try_walk_folder(folder: Path) -> None:
+    """Check before a walk that all its files can be written to a folder, by an `OSError`; nothing is left there."""
+    nearest = folder.absolute()
+    with naming(folder):
+        while True:
+            try:
+                nearest.lstat()
+                break
+            except FileNotFoundError:
+                nearest = nearest.parent
+        with tempfile.TemporaryDirectory(prefix=".warpchain-", dir=nearest):
+            pass
+    if folder.is_dir():
+        for name in (RECORD, *_PICTURES):
+            checked_output(folder / name)
+
+
+def write_walk(result: WalkResult, folder: Path) -> Iterator[Path]:
+    """Write the record, then its film strip, whole or not at all; yield the path of each.
+
+    Figures and film of an earlier walk, which do not belong to this record, are deleted.
+    """
+    make_folder(folder)
+    result.save(folder / RECORD)
+    yield folder / RECORD
+    for name in _PICTURES:
+        remove_output(folder / name)
+    yield from draw_figures(result, folder, ["film_strip"])
+
+
+def draw_figures(walk: WalkResult, folder: Path, kinds: Iterable[Kind]) -> Iterator[Path]:
+    """Draw figures into a folder; yield the path of each, and say on stderr which a walk has nothing for, and why."""
+    from warpchain.pictures.style import save_figure
+
+    for kind in kinds:
+        path = folder / f"{kind}.png"
+        try:
+            figure = walk.plot(kind)
+        except ValueError as error:
+            print(one_line(f"{path}: not drawn; {error}"), file=sys.stderr)
+        else:
+            save_figure(figure, path)
+            yield path
