@@ -17,7 +17,7 @@ from warpchain.run.progress_bar import SweepProgress
 from warpchain.run.sweep_run import sweep
 from warpchain.store.sweep_result import load
 from warpchain.sweeps.plan import load_sweep
-from warpchain.walks.landmarks import ENERGY_REMEDY, FAULTS, LENGTHS
+from warpchain.walks.landmarks import FAULTS, LENGTHS
 from warpchain.walks.rows import faults_of_columns
 
 COARSE = {
@@ -51,7 +51,7 @@ def test_a_walk_warns(fault: str, limit: str | None, part: float, capsys: pytest
         "opening": {"greatest_opening": size},
         "penetration": {"greatest_penetration": whole.greatest_penetration | {"self": size}},
     }
-    walk, remedy = make_walk(**changed[fault]), FAULTS.get(fault, ENERGY_REMEDY)
+    walk, remedy = make_walk(**changed[fault]), FAULTS.get(fault, FAULTS["energy"])
     print_walk(walk)
     table = " ".join(capsys.readouterr().out.split())
     told = (remedy in table, remedy in walk.warnings(), any(w in repr(walk) for w in ("inaccurate", "error")))
@@ -100,9 +100,9 @@ def test_a_sweep_counts_inaccurate_walks(tmp_path: Path, command: Command) -> No
     assert result.energy_error[0, 0] > 0.05 > 1e-3 > result.energy_error[1, 0]
     assert result.inaccurate.tolist() == [[True], [False]] and result.inaccurate_count == 1
     assert seen[-1].inaccurate == 1 and "1 inaccurate" in (tmp_path / "sweep/log.txt").read_text()
-    assert f"1 inaccurate: {ENERGY_REMEDY}" in " ".join(command("info", "sweep").out.split())
+    assert f"1 inaccurate: {FAULTS['energy']}" in " ".join(command("info", "sweep").out.split())
     assert json.loads(command("info", "sweep", "--json").out)["inaccurate"] == 1
     command("report", "sweep")
     page = (tmp_path / "sweep/report.html").read_text()
-    assert "Inaccurate walks" in page and f"energy: 1</h3><p>{ENERGY_REMEDY}" in page
+    assert "Inaccurate walks" in page and f"energy: 1</h3><p>{FAULTS['energy']}" in page
     assert load(tmp_path / "sweep").unit("energy_error") == "1"

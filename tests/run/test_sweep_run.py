@@ -11,8 +11,8 @@ import pytest
 
 from tests.support.setups import setup_walk
 from warpchain.inputs.setup import Setup
-from warpchain.run.gpu_workers import LostWorkersError
 from warpchain.run.sweep_run import run_shards, sweep
+from warpchain.run.workers import LostWorkersError
 from warpchain.status import Status
 from warpchain.walks.scheduler import run_setups
 

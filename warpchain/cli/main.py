@@ -51,7 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 def _refuse_for(error: Exception) -> None:
     """Print what was refused or failed, and exit; return if the error is a defect of the program."""
     from warpchain.inputs.validation import DamagedFileError, InputError, one_line
-    from warpchain.run.gpu_workers import LostWorkersError
+    from warpchain.run.workers import LostWorkersError
 
     problems, status = [str(error)], REFUSED
     if isinstance(error, typer.TyperException):

@@ -54,8 +54,8 @@ def sweep(
 
         start_early(device)
     from warpchain.cli.output import print_sweep
-    from warpchain.run.gpu_workers import gpu_workers
     from warpchain.run.sweep_run import sweep as run
+    from warpchain.run.workers import gpu_workers
     from warpchain.status import Status
 
     if gpus is not None:

@@ -105,7 +105,7 @@ def figure6(result: SweepResult) -> Picture:
     rows = np.array([row for series in cells.values() for each in series.values() for row in each]).reshape(-1, 3)
     frequencies = np.unique(rows[:, 0])
     if not np.isfinite(rows[:, 1]).any() or len(cells) == len(frequencies) == 1:
-        raise NothingToShow("Figure 6 takes walks at rest over links and frequency; let the sweep go on, or give such")
+        raise NothingToShow("Figure 6 has walks at rest over links and frequency; give such a block, or let it go on")
     gap = float(np.diff(frequencies).min()) if len(frequencies) > 1 else 1.0
     columns = {1: 1, 2: 2, 4: 2}.get(len(cells), 3)
     size = max(4.2, 3.1 * columns), 1.0 + 2.6 * -(-len(cells) // columns)

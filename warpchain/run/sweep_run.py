@@ -37,8 +37,8 @@ from warpchain.inputs.validation import (
     validated,
 )
 from warpchain.run import progress_bar
-from warpchain.run.gpu_workers import Pulse, losses_named, pulsing_threads
 from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text
+from warpchain.run.workers import Pulse, losses_named, pulsing_threads
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
 from warpchain.store.shards import Part, Shard, opened_shard, rows_of, stamp, write_shard

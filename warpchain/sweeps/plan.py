@@ -153,7 +153,8 @@ class Sweep:
         for name in Options.model_fields:
             here, there = getattr(first, name), getattr(options, name)
             if here != there and name not in block.varied:
-                raise InputError(f"{block.path}.grid: {name} is {here!r} in one cell, {there!r} in another; use blocks")
+                both = f"{here!r} in one cell, {there!r} in another"
+                raise InputError(f"{block.path}.grid: {name} is {both}; give each a block of its own")
         for name, choice in self.recording.choices.items():
             choice.steps(options, f"sweep.record.{name}")
 

@@ -15,8 +15,8 @@ from warpchain.engine.batch import Batch, Recorded
 from warpchain.inputs.arrays import Array
 from warpchain.kernels import layout
 from warpchain.loop.stationary_loop import BEFORE, BeforeRelease
-from warpchain.walks.landmarks import angles, frame_axes
 from warpchain.walks.motion import Keep
+from warpchain.walks.moving_plane import angles, frame_axes
 
 SERIES: Final[dict[str, int | list[int]]] = {
     "time": layout.TIME,

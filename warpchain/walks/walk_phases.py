@@ -30,8 +30,9 @@ from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.status import Status
 from warpchain.walks.drive import drive_of
-from warpchain.walks.landmarks import RELEASE, angles, released_plane, state_of_plane
+from warpchain.walks.landmarks import RELEASE
 from warpchain.walks.motion import NOTHING, Keep
+from warpchain.walks.moving_plane import angles, released_plane, state_of_plane
 from warpchain.walks.recorder import Recorder
 
 _OF_THE_RUN = ("raised", "drive_time", "drift", "_at_full_speed", "_has_sprocket")

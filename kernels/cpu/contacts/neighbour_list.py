@@ -107,5 +107,4 @@ def neighbour_list(columns: int):
 @wp.func
 def list_slack(K: Rows, chain: Chain, nearest: wp.int32, opening: wp.float64):
     """How far joints may still move [m], see :func:`contacts.pair_list.slack_of`."""
-    displacement = greatest_distance(K, chain, RIGHT_X, 0, LISTED_X)
-    return pair_list.slack_of(chain, nearest, opening, displacement)
+    return pair_list.slack_of(chain, nearest, opening, greatest_distance(K, chain, RIGHT_X, 0, LISTED_X))

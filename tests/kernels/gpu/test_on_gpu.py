@@ -22,7 +22,7 @@ from warpchain import simulate, sweep, walk
 from warpchain.engine.batch import Batch
 from warpchain.engine.sprocket_motion import motion_rows
 from warpchain.inputs.options import Options
-from warpchain.run.gpu_workers import gpu_workers
+from warpchain.run.workers import gpu_workers
 from warpchain.status import Status
 from warpchain.walks import scheduler
 

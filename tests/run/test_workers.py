@@ -13,9 +13,9 @@ import yaml
 
 from tests.run.test_sweep_run import TINY, data_of
 from tests.support.command_line import Command
-from warpchain.run.gpu_workers import LostWorkersError, gpu_workers
 from warpchain.run.progress_bar import SweepProgress
 from warpchain.run.sweep_run import sweep
+from warpchain.run.workers import LostWorkersError, gpu_workers
 
 GPU_OF_WORKER = "__import__('time').sleep(0.5) or __import__('os').environ['CUDA_VISIBLE_DEVICES']"
 """Takes a while, so that other workers have to take the next ones; text, for workers cannot import tests."""
