@@ -85,6 +85,8 @@ def test_a_worker_that_is_killed_ends_the_sweep_in_one_line(tmp_path: Path) -> N
 
 PARENT = """
 import sys
+from warpchain.run.sweep_run import sweep
+from warpchain.run.workers import gpu_workers
 
 if __name__ == "__main__":
     with gpu_workers(2) as executor:
