@@ -38,6 +38,16 @@ def saved(tiny_walk: WalkResult, tmp_path: Path) -> Path:
     return tmp_path / "saved/walk.h5"
 
 
+def test_a_folder_is_of_a_walk_or_of_a_sweep(command: Command, saved: Path) -> None:
+    """Else commands that take a folder would have to guess which is meant."""
+    answer = command("sweep", "quickstart", "-o", str(saved.parent))
+    assert answer.status == 2 and "walk.h5: in the way of a sweep; delete it, or give another folder" in answer.err
+    Path("swept").mkdir()
+    Path("swept/sweep.h5").touch()
+    answer = command("walk", "-o", "swept")
+    assert (answer.status, answer.err) == (2, "error: swept: holds a sweep; give another folder\n")
+
+
 @pytest.mark.parametrize("options", [(), ("-o", "new/deep")])
 def test_plot_draws_a_saved_walk_and_tells_what_it_leaves_out(
     command: Command, saved: Path, options: Sequence[str]

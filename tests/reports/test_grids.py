@@ -176,6 +176,7 @@ def test_any_column_of_numbers(tmp_path: Path, command: Command) -> None:
         with pytest.raises(InputError, match=rf"^quantity: '{name}' is no column of numbers; "):
             result.plot(quantity=name)
     assert command("plot", ".", "-o", "drawn", "--quantity", "walk_time").out == "drawn/walk_time_against_gravity.png\n"
+    assert command("plot", ".", "-o", "none", "--quantity", "walk_tim").status == 2 and not Path("none").exists()
 
 
 def test_a_figure_may_be_given(tmp_path: Path) -> None:

@@ -77,6 +77,8 @@ def test_settings_of_a_walk_are_those_of_a_sweep(tmp_path):
     assert refused(samples=1, links=[60], grid={"links": [60]}, out=tmp_path) == [
         "links: given twice, also in grid; leave one out"
     ]
+    unsaid = dict.fromkeys(("frequency", "method", "tolerance", "name"))
+    assert warpchain.sweep(links=30, samples=1, **SHORT, **unsaid, out=tmp_path / "unsaid").walk_count == 1
     assert refused(samples=1, linsk=60, out=tmp_path) == ["'linsk': unknown name; did you mean scene.links?"]
 
 
@@ -100,6 +102,11 @@ def test_parameter_sets(tmp_path):
     assert list(design.quantity.values)[:2] == ["floor_friction", "phase"]
     assert (design.sel(quantity="phase").values == table["phase"].values[:, None, None]).all()
     assert (design.sel(quantity="inner_mass").values == result.inner_mass_drawn).all()
+    words = warpchain.sweep(
+        points={"method": ["explicit", "explicit"]}, links=30, samples=1, **SHORT, out=tmp_path / "words"
+    )
+    with pytest.raises(InputError, match=r"method: its values are words, .*; take to_xarray"):
+        words.design()
     data = result.to_xarray()
     assert data.floor_friction.dims == ("point",) and (data.floor_friction == table["mu_fc"]).all()
     for place, index in np.ndenumerate(result.index):

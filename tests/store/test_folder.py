@@ -21,9 +21,9 @@ from tests.support.synthetic_sweep import LONG_SWEEP, SHARD_SIZE, SWEEP, content
 from warpchain.inputs.validation import InputError, InputWarning
 from warpchain.store import folder
 from warpchain.store.folder import SweepFolder
-from warpchain.store.shards import Manifest, stamp, write_shard
+from warpchain.store.shards import Manifest, read_manifest, stamp, write_shard
 from warpchain.store.sweep_result import load
-from warpchain.sweeps.plan import Sweep
+from warpchain.sweeps.plan import Sweep, load_sweep
 from warpchain.version import NUMERICS_VERSION
 
 FIRST, SECOND = "000000.h5", "000001.h5"
@@ -167,13 +167,23 @@ def test_other_numerics_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 
 @pytest.mark.parametrize("fresh", [False, True])
-@pytest.mark.parametrize("name", ["sweep.yaml", "shards", "log.txt", "sweep.h5", "lock"])
+@pytest.mark.parametrize("name", ["sweep.yaml", "shards", "log.txt", "sweep.h5", "lock", "walk.h5"])
 def test_files_of_others_are_not_touched(tmp_path: Path, name: str, fresh: bool) -> None:
     """A folder that has such a name for something else is refused, even to start anew."""
     (tmp_path / name).write_text("mine: true")
     with refused(InputError, tmp_path, str(tmp_path / name), "give"):
         open_folder(tmp_path, fresh=fresh)
     assert (tmp_path / name).read_text() == "mine: true" and os.listdir(tmp_path) == [name]
+
+
+def test_a_sweep_may_have_more_values_than_a_file(tmp_path: Path) -> None:
+    """What its blocks share stands once in a file and in each block of a folder, which is read all the same."""
+    values = {"links": 400, "start": "ellipse", "link_masses": [3e-3] * 400, "link_inertias": [1.5e-7] * 400}
+    blocks = [{"name": f"b{k}", "scene": {"frequency": k + 1.0}} for k in range(130)]
+    shared = {"version": 1, "name": "many", "seed": 1, "preset": "paper", "samples": 1, "scene": values}
+    planned = load_sweep(shared | {"blocks": blocks})
+    (tmp_path / "sweep.h5").write_bytes(Manifest(planned, SHARD_SIZE).image())
+    assert read_manifest(tmp_path).sweep.digest() == planned.digest()
 
 
 def test_a_shard_of_another_sweep_is_refused(tmp_path: Path) -> None:

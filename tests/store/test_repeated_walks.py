@@ -104,6 +104,9 @@ def test_numbers_that_say_no_walk_are_refused(folder: Path) -> None:
         result.walk(0, sample=1)
     with pytest.raises(InputError, match="index: Input should be a valid integer; given True"):
         result.walk(True)
+    for several in ([3.0, 4.0], np.array([3.0, 4.0]), [3.0]):
+        with pytest.raises(InputError, match=r"^frequency: .* is not on the axis; give one of "):
+            result.walk(frequency=several)
 
 
 def test_a_walk_that_is_not_the_same_brings_a_warning(folder: Path) -> None:

@@ -153,6 +153,14 @@ def test_a_measured_outline_closes_and_moves_as_little_as_it_must() -> None:
     assert (state.velocity == 0).all() and state.time == 0
 
 
+def test_the_clock_of_a_state_is_that_of_its_walk() -> None:
+    """No other time is taken, of a state that was measured none but 0."""
+    state = State.of_joints(outline(12, warpchain.preset("soft").link_length))
+    for time in (-1.0, 1.0, math.nan, "a"):
+        with pytest.raises(InputError, match=r"^time: .* is not that of its walk; give 0$"):
+            replace(state, time=time)
+
+
 def test_measured_velocities_keep_links_as_long_as_they_are() -> None:
     """A rotation of all joints comes back as it is; of any rates, what would stretch links is taken away."""
     joints = outline(12, warpchain.preset("soft").link_length)

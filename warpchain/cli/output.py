@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final, get_args
 
 from warpchain.engine.tallies import LOST
 from warpchain.files import checked_output, make_folder, naming, remove_output
-from warpchain.inputs.validation import json_value, one_line, printable
+from warpchain.inputs.validation import InputError, json_value, one_line, printable
 from warpchain.pictures.labels import Kind, cell_table
 from warpchain.walks.landmarks import FAULTS
 from warpchain.walks.walk_result import WalkResult, load_walk
@@ -138,6 +138,8 @@ def try_walk_folder(folder: Path) -> None:
                 nearest = nearest.parent
         with tempfile.TemporaryDirectory(prefix=".warpchain-", dir=nearest):
             pass
+    if (folder / "sweep.h5").exists():
+        raise InputError(f"{folder}: holds a sweep; give another folder")
     if folder.is_dir():
         for name in (RECORD, *_PICTURES):
             checked_output(folder / name)

@@ -143,20 +143,21 @@ def plot(
     if kind is not None and not is_walk:
         raise InputError("--kind: a sweep has none; leave it out, or give the file of a saved walk")
     folder = folder or (path.parent if path.is_file() else path)
+    pictures = [] if isinstance(found, WalkResult) else list(figures(found, quantity or "dx"))
+    if not is_walk and not pictures:
+        name = path if quantity is None else f"--quantity: {quantity}"
+        raise InputError(f"{name}: no walk at rest has a value, or no axis has several; give another --quantity")
     make_folder(folder)
     drawn = (
         draw_figures(found, folder, kinds_of(found) if kind is None else (kind,))
         if isinstance(found, WalkResult)
-        else (picture.save(folder) for picture in figures(found, quantity or "dx"))
+        else (picture.save(folder) for picture in pictures)
     )
     count = 0
     for count, drawing in enumerate(drawn, 1):  # noqa: B007
         print(printable(str(drawing)))
     if not count and is_walk:
         raise typer.Exit(FAILED)
-    if not count:
-        name = path if quantity is None else f"--quantity: {quantity}"
-        raise InputError(f"{name}: no walk at rest has a value, or no axis has several; give another --quantity")
 
 
 def report(

@@ -92,7 +92,7 @@ class State:
             the last link's the first one's. Links 0, 2, … are inner ones. If the plane tilts, places are in the plane.
         velocity: their rates [m/s, m/s, rad/s], (n, 3).
         setup: of its walk: parameters of the chain, scene, options.
-        time: since the release [s].
+        time: since the release [s]; 0 unless it is a state of a walk.
         origin: origin of the plane's coordinates in the room [m], (3,); None if the plane is fixed, like the next two.
         axes: directions of x and y of the plane in the room, (2, 3).
         plane_rates: speed [m/s] across the plane at its origin, and its turning rates [rad/s] about x and y, (3,).
@@ -120,6 +120,9 @@ class State:
             object.__setattr__(self, name, checked_array(getattr(self, name), name, *shape))
         if self.axes is not None and not np.allclose(self.axes @ self.axes.T, np.eye(2), atol=1e-9):
             raise InputError("axes: not two directions at right angles; give unit vectors")
+        clock = float(self.memory.get("state/time", 0.0))
+        if self.time != clock:
+            raise InputError(f"time: {self.time!r} s is not that of its walk; give {clock:g}")
         left, right = np.split(circles_of(self.position, self.parameters.link_length), 2)
         opening = np.linalg.norm(np.roll(left, -1, axis=0) - right, axis=1)
         if (widest := float(opening.max())) > WIDEST_OPENING * self.parameters.link_length:

@@ -9,7 +9,7 @@ import yaml
 
 from warpchain.inputs.validation import DEEPEST, InputError, checked_path, plain, shown
 
-LARGEST_FILE: Final = 100_000
+LARGEST_FILE: Final = 400_000
 """Most bytes of a YAML file."""
 
 

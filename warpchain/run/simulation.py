@@ -185,11 +185,15 @@ class Chains:
         floor = checked(floor, "floor", bool)
         position = checked_array(position, "position", "W", "n", 3)
         velocity, (worlds, links, _) = checked_array(velocity, "velocity", *position.shape), position.shape
-        if len(parameters) != worlds or not all(isinstance(each, Parameters) for each in parameters):
+        if not isinstance(parameters, list | tuple) or len(parameters) != worlds:
             raise InputError(f"parameters: {shown(parameters)} are not of {worlds} chains; give Parameters of each")
         if worlds < 1 or links < 4 or links % 2:
             raise InputError(f"position: {worlds} chains of {links} links; give chains of an even number of at least 4")
         check_links_on_gpu(links, options.device, "position")
+        for place, rates, chain in zip(position, velocity, parameters, strict=True):
+            state = State.of_links(place, rates, chain)
+            if floor:
+                state.setup.floor.check_above(place, chain.link_length, "position")
         self.time, self._links = 0.0, links
         with gpu_turn([options.device]):
             self._batch = Batch(worlds, links, options)

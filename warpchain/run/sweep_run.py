@@ -55,6 +55,8 @@ Task = Future[None]
 
 KEYS: Final = (*BlockKeys.model_fields, "same_samples_along", "record", "name", "seed")
 """Keys of a sweep file that are keywords."""
+OF_WALKS: Final = ("links", "frequency", "start", "method", "tolerance")
+"""Fields of which None is the default, as of `warpchain.walk`."""
 SHARD_WALKS = 256
 """Most walks in a shard."""
 GPU_TASK_WALKS = 262144
@@ -153,7 +155,7 @@ def _checked_call(
         found = sweep_of_keywords(settings, folder) if source is None else load_sweep(source, **replaced)
         return found if device is None else on_device(found, device)
 
-    settings = {name: value for name, value in given.items() if value is not None or name not in KEYS}
+    settings = {name: value for name, value in given.items() if value is not None or name not in (*KEYS, *OF_WALKS)}
     replaced = {name: plain(settings[name], name) for name in ("seed", "samples") if name in settings}
     if source is not None and (others := [name for name in settings if name not in replaced]):
         names = ", ".join(others)

@@ -146,11 +146,12 @@ class BlockResult:
             raise InputError(f"{unknown[0]}: no axis of block {self.name}; {known}")
         place = []
         for name, values in self.axes.items():
-            found = np.flatnonzero(values == at.get(name, values[0]))
+            wanted = plain(at[name], name) if name in at else values[0]
+            found = [k for k, value in enumerate(values.tolist()) if value == wanted]
             if not len(found) or (name not in at and len(values) > 1):
                 problem = f"{shown(at[name])} is not on the axis" if name in at else "missing"
                 raise InputError(f"{name}: {problem}; give one of {', '.join(map(str, values))}")
-            place.append(int(found[0]))
+            place.append(found[0])
         if type(plain(sample)) is not int or not 0 <= sample < self.shape[-1]:
             raise InputError(f"sample: there is no sample {shown(sample)}; give 0 to {self.shape[-1] - 1}")
         return (*place, sample)
@@ -265,6 +266,10 @@ class BlockResult:
         Values of parameter sets (`points`) and those that samples drew; NaN of a walk that is not there.
         """
         points = [*self.planned.points]
+        if words := [name for name, values in self.planned.points.items() if isinstance(values[0], str)]:
+            raise InputError(f"{words[0]}: its values are words, and a design has numbers; take to_xarray()")
+        if not points and not self.drawn:
+            raise InputError(f"block {self.name}: nothing differs between its walks beside axes; take to_xarray()")
         whole = self.to_xarray().reset_coords(points)[[*points, *map(rows.drawn_column, self.drawn)]]
         array = whole.to_dataarray("quantity").astype(float).assign_coords(quantity=[*points, *self.drawn])
         return array.transpose(*self.dims, "quantity")

@@ -171,9 +171,9 @@ def _prepared(folder: Path, sweep: Sweep, manifest: Manifest, fresh: bool) -> Ma
     _clear_leftovers(folder)
     named = folder / "sweep.h5"
     if not named.exists():
-        for name in (*shards.OWN, shards.EARLIER):
+        for name in (*shards.OWN, shards.EARLIER, "walk.h5"):
             if (folder / name).exists():
-                raise InputError(f"{folder / name}: in the way of a sweep; give another folder")
+                raise InputError(f"{folder / name}: in the way of a sweep; delete it, or give another folder")
         write_whole(named, manifest.image())
     elif fresh:  # the shards go first; nothing goes if there is a foreign file among them
         read_manifest(folder)

@@ -31,7 +31,7 @@ from warpchain.hdf5_files import hdf5_image, open_regular, reading_hdf5
 from warpchain.inputs.validation import InputError
 from warpchain.sweeps.designs import EXTENSIBLE
 from warpchain.sweeps.plan import Sweep
-from warpchain.sweeps.sweep_file import read_sweep
+from warpchain.sweeps.sweep_file import fields_of
 from warpchain.version import NUMERICS_VERSION, package_versions
 from warpchain.walks.rows import KEYS, MISSING, Rows, row_type
 from warpchain.walks.walk_result import write_motion
@@ -147,7 +147,7 @@ def _bounds(walks: int, most: int) -> list[int]:
 def stored_sweep(path: AnyPath, content: Mapping[str, object]) -> Sweep:
     """The sweep in a file of results, given its canonical form; an `InputError` if this warpchain refuses it."""
     try:
-        return Sweep(*read_sweep(content))
+        return Sweep(*fields_of(content))
     except InputError as error:
         problem = error.args[0].partition("; ")[0]
         raise InputError(f"{path}: {problem}; read it with the version that wrote it") from None
@@ -163,7 +163,7 @@ def read_manifest(directory: AnyPath) -> Manifest:
             raise InputError(f"{directory}: holds a sweep of an earlier warpchain; read it with that version")
         there = "a saved walk, no sweep" if (Path(directory) / "walk.h5").exists() else "no sweep"
         raise InputError(f"{directory}: {there} in this folder; give the folder of one, or a merged file")
-    with reading_hdf5(path, MANIFEST, "give the folder of a sweep, or put a copy of the file there") as file:
+    with reading_hdf5(path, MANIFEST, "give the folder of a sweep, put a copy there, or delete the folder") as file:
         return Manifest(
             stored_sweep(path, json.loads(file.attrs["sweep"])),
             int(file.attrs["shard_size"]),

@@ -124,8 +124,8 @@ class SweepResult:
     def unit(self, name: str) -> str:
         """SI unit of a column or an axis of any block, "1" for pure numbers; a `KeyError` if there is none."""
         first, *others = self.blocks.values()
-        owner = next((block for block in others if name in block.columns or name in block.dims), first)
-        return owner.unit(name)
+        known = (block for block in others if name in (*block.columns, *block.dims, *block.planned.points))
+        return next(known, first).unit(name)
 
     def cell_statistics(self, quantity: str = "dx") -> dict[str, CellStatistics]:
         """Name of each block that has a column of numbers → its statistics, see `BlockResult.statistics`.
@@ -145,9 +145,10 @@ class SweepResult:
 
         Its other arguments, without a number, say which walk of the only block it is.
         """
-        repeat = self.__getattr__("walk") if index is None else self.located(index)[0].walk
-        walk: WalkResult = repeat(index, **words)
-        return walk
+        if index is None and len(self.blocks) > 1:
+            raise InputError("index: missing; give the number of a walk, or call walk of one of the blocks")
+        block = next(iter(self.blocks.values())) if index is None else self.located(index)[0]
+        return block.walk(index, **words)
 
     def located(self, index: object) -> tuple[BlockResult, tuple[int, ...]]:
         """Block and place of the walk with a number; an `InputError` if there is none."""

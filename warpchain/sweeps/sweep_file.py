@@ -270,16 +270,23 @@ def read_walk_file(path: AnyPath) -> tuple[str | None, dict[str, dict[str, Any]]
 # From a file to blocks
 
 
-def read_sweep(
-    source: AnyPath | Mapping[str, object], **replaced: object
-) -> tuple[str, int, tuple[str, ...], tuple[Block, ...], Recording]:
-    """The fields of a `Sweep`: name, seed, axes of equal samples, blocks, recording; see `load_sweep`."""
+Fields = tuple[str, int, tuple[str, ...], tuple[Block, ...], Recording]
+"""Of a `Sweep`: name, seed, axes of equal samples, blocks, recording."""
+
+
+def read_sweep(source: AnyPath | Mapping[str, object], **replaced: object) -> Fields:
+    """The fields of a `Sweep`, see `load_sweep`."""
     content = validation.plain(source, "sweep") if isinstance(source, Mapping) else read_yaml(sweep_path(source))
     replaced = {key: value for key, value in replaced.items() if value is not None}
     if isinstance(content, dict):
         if "samples" in replaced and content.get("samples") is None:
             raise InputError("samples: each block of the sweep has its own; change the file")
         content |= replaced
+    return fields_of(content, source)
+
+
+def fields_of(content: Any, source: AnyPath | Mapping[str, object] = "") -> Fields:
+    """The fields of a `Sweep`, from the content of a file in Python's own types, however many values it has."""
     file = _checked(SweepFile, content, "sweep", source)
     if file.blocks is None:
         blocks = [_block("main", "sweep", None, file)]
