@@ -78,6 +78,10 @@ def test_other_measurements_condition_the_gaussian() -> None:
     assert after.mean == pytest.approx(expected @ (precision @ answer.mean + [400 * 4.2, 0]))
     with pytest.raises(InputError, match="mass: not in the posterior; give one of circle_radius"):
         answer.given(mass=(1.0, 0.1))
+    wrong: Any
+    for wrong in (0.27, (np.nan, 0.1), (4.2, 0.05, 0.05), ("4.2", "0.05")):
+        with pytest.raises(InputError, match=r"^circle_radius=\(value, error\): "):
+            answer.given(circle_radius=wrong)
 
 
 @pytest.mark.parametrize(
@@ -113,7 +117,7 @@ def test_a_film_that_contradicts_itself_is_refused(wrong: Any) -> None:
 
 
 def test_films_that_are_not_the_bank_s_are_refused() -> None:
-    """Another experiment, more films than repetitions, none, and a bank too small to hold chains out."""
+    """Another experiment, more films than repetitions, none, no list, no edges, and a bank too small."""
     bank = made_bank(160, seed=1)
     (film,) = films_of(bank, 0, 1, CAMERA, 0)
     for wrong in ([dataclasses.replace(film, frequency=20.5)], [film] * 5, []):
@@ -121,6 +125,12 @@ def test_films_that_are_not_the_bank_s_are_refused() -> None:
             InputError, match=r"films: they are not .*; give 1 to 4 of each of 60 links at 20 Hz, and a bank"
         ):
             bank.posterior(wrong)
+    unlisted: Any
+    for unlisted in (film, [film, "film.csv"], None):
+        with pytest.raises(InputError, match=r"^films(\[1\])?: Input should be a"):
+            bank.posterior(unlisted)
+    with pytest.raises(InputError, match=r"^films: unlike the bank; check .* outline"):
+        bank.posterior([dataclasses.replace(film, outline=np.full(4, np.nan))])
     with pytest.raises(InputError, match="a bank of 32 chains or more"):
         made_bank(20, seed=1).posterior([film])
 

@@ -1,6 +1,7 @@
 """The friction of a floor is the slope of way against lift, and its error holds."""
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
@@ -39,16 +40,28 @@ def test_slow_loops_are_known_less() -> None:
     [
         ({}, films.Camera(noise=1e-4), "camera.noise: .*scatters"),
         ({}, films.Camera(fps=120.0), "camera.fps: 120, .* slow motion, fps to read"),
+        ({"time": EXACT.time - 1e300}, films.Camera(), r"film: it shows -1"),
         ({"time": EXACT.time + 0.1}, films.Camera(), r"film: it shows 0\.00"),
         ({"time": EXACT.time - 0.012}, films.Camera(), "nothing falls freely; check unit, fps and release"),
         ({"time": EXACT.time * 8}, films.Camera(fps=30), "nothing falls freely; check unit, fps and release"),
         ({"center": EXACT.center * [-1, 1]}, films.Camera(), r"direction: .* backwards; give the other direction"),
+        ({"time": np.where(EXACT.time > 0.3, np.nan, EXACT.time)}, films.Camera(), r"film\.time: .* not finite"),
+        ({"center": np.where(EXACT.center < 0, np.inf, EXACT.center)}, films.Camera(), r"film\.center: .* not finite"),
+        ({"center": EXACT.center[1:]}, films.Camera(), r"film\.center: its shape is"),
         ({"speed": 754.0}, films.Camera(), r"speed/\(2πf\) is 6 m, no sprocket's; check speed \(m/s\) and frequency"),
     ],
 )
 def test_a_film_that_is_not_what_it_says_is_refused(
     changes: dict[str, np.ndarray], camera: films.Camera, wrong: str
 ) -> None:
-    """Noise, frame rate, times, a mirrored picture, and speed in another unit."""
+    """Noise, frame rate, times, a mirrored picture, numbers that are not finite, and speed in another unit."""
     with pytest.raises(InputError, match=wrong):
         films.friction_line(dataclasses.replace(EXACT, **changes), camera)
+
+
+@pytest.mark.parametrize("value", [0, np.nan, "240", None])
+@pytest.mark.parametrize("name", ["fps", "noise"])
+def test_a_camera_has_positive_numbers(name: str, value: Any) -> None:
+    """A rate or an error that is none is refused where it is given."""
+    with pytest.raises(InputError, match=f"^camera.{name}: "):
+        films.Camera(**{name: value})

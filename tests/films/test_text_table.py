@@ -31,6 +31,7 @@ def write(folder: Path, text: str) -> Path:
         TRACKER.format(table(FILM.time, FILM.center)),
         TRACKER.format(table(FILM.time, FILM.center).replace(".", ",")),
         TRACKER.format(table(FILM.time, FILM.center) + "\n9.0\t\t\n"),
+        TRACKER.format("nan\t0\t0\n" + table(FILM.time, FILM.center) + "\n9.0\tnan\t0\n9.1\t-inf\t0\n9.2\t0\t1e999\n"),
         "t;x;y\n" + table(FILM.time, FILM.center, ";").replace(".", ","),
         "frame,t,x,y\n" + "\n".join(f"7,{line}" for line in table(FILM.time, FILM.center, ",").splitlines()),
         '"t (s)" "x (mm)" "y (mm)"\n'.replace(" (", "(") + table(FILM.time, 1e3 * FILM.center, " "),
@@ -94,17 +95,22 @@ def test_what_is_no_film_is_refused(text: str, wrong: str, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize(
-    "value", [{"links": "many"}, {"frequency": 0.0}, {"fps": -30.0}, {"speed": 0.0}, {"outline": [1, 2, 3]}]
+    "value",
+    [
+        *({"links": "many"}, {"frequency": 0.0}, {"fps": -30.0}, {"speed": 0.0}, {"outline": [1, 2, 3]}),
+        *({"release": "a"}, {"release": np.nan}, {"path": 5}),
+        *({"origin": origin} for origin in (("a", "b"), (1, 2, 3), 5, (np.nan, 0))),
+    ],
 )
 def test_values_beside_the_file_are_checked(value: dict[str, Any], tmp_path: Path) -> None:
     """A line names what is none of a film."""
     path = write(tmp_path, TRACKER.format(table(FILM.time, FILM.center)))
     with pytest.raises(InputError, match=f"^{next(iter(value))}: "):
-        films.read(path, **{"links": 60, "frequency": 20.0, "release": 0.0} | value)
+        films.read(**{"path": path, "links": 60, "frequency": 20.0, "release": 0.0} | value)
 
 
 def test_an_unknown_unit_or_a_missing_file_is_refused(tmp_path: Path) -> None:
-    """Units are m, cm and mm, and not others than the heads'; in m, places in cm leave too short a film."""
+    """Units are m, cm and mm, and not others than the heads'; in m, places in cm leave too short a film; no devices."""
     with pytest.raises(InputError, match="unit: 'inch'"):
         films.read(tmp_path / "film.txt", links=60, frequency=20.0, unit="inch")  # type: ignore[arg-type]
     path = write(tmp_path, "t (s);x (cm);y (cm)\n" + table(FILM.time, 100 * FILM.center, ";"))
@@ -114,5 +120,7 @@ def test_an_unknown_unit_or_a_missing_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"film: it shows .* check unit, fps, or give release"):
         films.friction_line(films.read(path, links=60, frequency=20.0))
     path.unlink()
+    with pytest.raises(InputError, match=r"^/dev/null: no regular file; give the path of a text table"):
+        films.read("/dev/null", links=60, frequency=20.0)
     with pytest.raises(OSError, match=r"film\.txt"):
         films.read(tmp_path / "film.txt", links=60, frequency=20.0)

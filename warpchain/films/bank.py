@@ -15,11 +15,12 @@ from typing import Final, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import InstanceOf
 
 from warpchain.films.film import CAREFUL, CLOCK, Camera, Film, edges, summary
-from warpchain.inputs.arrays import Array
+from warpchain.inputs.arrays import Array, checked_array
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.validation import InputError
+from warpchain.inputs.validation import InputError, checked
 from warpchain.store.block_result import BlockResult
 from warpchain.store.sweep_result import SweepResult
 from warpchain.walks.rows import MISSING
@@ -115,6 +116,7 @@ class Bank:
         Raises:
             InputError: a film is of no experiment of the bank, or not as the camera says, or lies outside of the bank.
         """
+        films = checked(films, "films", list[InstanceOf[Film]])
         groups: dict[tuple[int, float], list[Film]] = {}
         for film in films:
             film.check(camera)
@@ -133,7 +135,7 @@ class Bank:
         mean = (middle := self.values.mean(axis=0)) + prior * found[0]
         scale = prior * sigma / np.sqrt(np.mean(residuals**2, axis=0))
         edge = np.abs(found[0]) > np.where(sigma < IDENTIFIED, EDGE, EDGE + 1)
-        if distance > 1 or edge.any():
+        if not distance <= 1 or edge.any():  # NaN, too
             numbers = zip(self.names, mean, middle, prior, edge | ~edge.any(), strict=True)
             off = [f"{name}: {x:.3g}, in the bank {m:.2g} ± {s:.2g}" for name, x, m, s, shown in numbers if shown]
             suspects = "direction, origin, outline, speed (m/s), frequency, unit and release"
@@ -179,9 +181,10 @@ class Posterior:
     def given(self, **measured: tuple[float, float]) -> Self:
         """The posterior after other measurements, name=(value, standard error); `coverage` stays that of the films."""
         mean, covariance = self.mean, self.covariance
-        for name, (value, error) in measured.items():
+        for name, given in measured.items():
             if name not in self.names:
                 raise InputError(f"{name}: not in the posterior; give one of {', '.join(self.names)}")
+            value, error = checked_array(given, f"{name}=(value, error)", 2)
             k = self.names.index(name)
             gain = covariance[k] / (covariance[k, k] + error**2)
             mean, covariance = mean + gain * (value - mean[k]), covariance - np.outer(gain, covariance[k])

@@ -1,12 +1,13 @@
 """A film of a walk, real or of a simulated walk, and the camera that made it."""
 
 from dataclasses import dataclass, replace
-from typing import Final, Self
+from typing import Annotated, Final, Self
 
 import numpy as np
+from pydantic import Field
 
-from warpchain.inputs.arrays import Array
-from warpchain.inputs.validation import InputError
+from warpchain.inputs.arrays import Array, checked_array
+from warpchain.inputs.validation import InputError, checked
 from warpchain.walks.walk_result import WalkResult
 
 GRAVITY: Final = 9.809
@@ -19,7 +20,7 @@ CLOCK: Final = np.arange(0.02, 0.361, 0.02)
 
 @dataclass(frozen=True, kw_only=True)
 class Camera:
-    """A camera, and the standard deviations of its errors; the lower five are the same in all films of a chain.
+    """A camera, and the standard deviations of its errors, above 0; the lower five are common to all films of a chain.
 
     Attributes:
         fps: frames a second.
@@ -42,6 +43,11 @@ class Camera:
     origin: float = 5e-4
     roll: float = 2.6e-3
     outline: float = 5e-4
+
+    def __post_init__(self) -> None:
+        """Refuse what is no positive number."""
+        for name, value in vars(self).items():
+            checked(value, f"camera.{name}", Annotated[float, Field(gt=0)])
 
     def errors(self, random: np.random.Generator) -> Array:
         """Errors that all films of a chain have: scale, floor, origin, roll, four edges."""
@@ -97,12 +103,14 @@ class Film:
         return float(np.sqrt(self.center[self.time < 0].var(axis=0, ddof=1).mean()))
 
     def check(self, camera: Camera) -> None:
-        """Refuse a film that is too short, not as the camera says, or goes backwards."""
-        first, last, rate = self.time[0], self.time[-1], 1 / float(np.median(np.diff(self.time)))
+        """Refuse a film that has no finite numbers, is too short, not as the camera says, or goes backwards."""
+        checked_array(self.time, "film.time", "t")
+        checked_array(self.center, "film.center", len(self.time), 2)
+        first, last = self.time[0], self.time[-1]
         if first > 0.02 - BEFORE or last < CLOCK[-1] + 0.01:
             needed = f"−{BEFORE:g} to {CLOCK[-1] + 0.02:g} s; if the film has them, check unit, fps, or give release"
             raise InputError(f"film: it shows {first:.3f} to {last:.3f} s after the release; give {needed}")
-        if abs(rate / camera.fps - 1) > 0.05:
+        if abs((rate := 1 / float(np.median(np.diff(self.time)))) / camera.fps - 1) > 0.05:
             wrong = f"{camera.fps:g}, but the film has {rate:.4g} frames a second"
             raise InputError(f"camera.fps: {wrong}; give that or, if it plays in slow motion, fps to read")
         if self.noise > 1.5 * camera.noise:

@@ -3,15 +3,14 @@
 import os
 import re
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Annotated, Final, Literal
 
 import numpy as np
 from pydantic import Field
 
 from warpchain.films.film import BEFORE, GRAVITY, Film
-from warpchain.inputs.arrays import Array
-from warpchain.inputs.validation import InputError, Whole, checked, shown
+from warpchain.inputs.arrays import Array, checked_array
+from warpchain.inputs.validation import InputError, Whole, checked, checked_path, shown
 
 UNITS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 _POSITIVE: Final = Annotated[float, Field(gt=0)]
@@ -32,8 +31,8 @@ def read(
 ) -> Film:
     """Read a film: a text table with columns t, x and y of the centre of mass, as Tracker exports it.
 
-    Lines above the heads of the columns, and other columns, are passed over. Columns are parted by
-    tabs, semicolons, commas or spaces; a comma that does not part them is a decimal point.
+    Lines above the heads of the columns, other columns, and frames with an empty cell or `nan` are passed over.
+    Columns are parted by tabs, semicolons, commas or spaces; a comma that does not part them is a decimal point.
 
     Args:
         path: the file.
@@ -49,17 +48,21 @@ def read(
 
     Raises:
         OSError: the file cannot be read.
-        InputError: it has no such columns, or a line that is not numbers; or another value is refused.
+        InputError: it is no file, has no such columns, or a line that is not numbers; or another value is refused.
     """
     checked(links, "links", Annotated[Whole, Field(ge=4)])
     checked(frequency, "frequency", _POSITIVE, "Hz")
     checked(fps, "fps", _POSITIVE | None)
+    checked(release, "release", float | None, "s")
     checked(speed, "speed", _POSITIVE | None, "m/s")
+    checked_array(origin, "origin", 2)
     checked(outline, "outline", Annotated[list[float], Field(min_length=4, max_length=4)] | None)
     if unit not in (None, *UNITS) or direction not in ("right", "left"):
         raise InputError(f"unit: {shown(unit)}, direction: {shown(direction)}; give m, cm or mm, and right or left")
-    lines = []
-    for line in Path(path).read_text(encoding="utf-8-sig", errors="replace").splitlines():
+    lines, file = [], checked_path(path, "path")
+    if file.exists() and not file.is_file():  # others may never end
+        raise InputError(f"{path}: no regular file; give the path of a text table")
+    for line in file.read_text(encoding="utf-8-sig", errors="replace").splitlines():
         mark = next((mark for mark in "\t;," if mark in line), None)
         line = line if mark == "," else line.replace(",", ".")  # numbers with decimal points
         lines.append([cell.strip(' "') for cell in line.split(mark)])
@@ -82,7 +85,8 @@ def read(
                 rows.append([float(cell) for cell in row])
             except ValueError:
                 raise InputError(f"{path}: line {number} is not numbers; correct or delete it") from None
-    time, x, y = np.array(rows).reshape(-1, 3).T
+    table = np.array(rows).reshape(-1, 3)
+    time, x, y = table[np.isfinite(table).all(axis=1)].T  # pandas writes nan where nothing was marked
     if len(time) < 20 or np.any(np.diff(time) <= 0):
         raise InputError(f"{path}: {len(time)} frames; give at least 20, in order of time")
     time = time if fps is None else np.round((time - time[0]) / np.median(np.diff(time))) / fps

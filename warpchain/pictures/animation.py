@@ -23,7 +23,7 @@ from scipy.spatial.transform import Rotation
 
 from warpchain.files import checked_output, replacing, write_whole
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.validation import checked
+from warpchain.inputs.validation import InputError, checked, short
 from warpchain.pictures import chain
 from warpchain.pictures.chain import center_in_room, checked_joints
 from warpchain.pictures.labels import Walk, headline
@@ -32,6 +32,8 @@ from warpchain.pictures.style import BLUE, GROUND, INK, tidy
 WIDTH, TALLEST = 960, 560
 """Greatest width and height of a picture [pixels]."""
 DPI: Final = 100
+MOST: Final = {".gif": 1200, ".mp4": 100_000}
+"""Most pictures: those of a GIF are in memory at once, up to 0.5 MB each; so many of an MP4 take an hour."""
 
 INNER, OUTER, EDGE = "#9CCBE6", BLUE, "#00385A"
 """Colours of inner links, of outer links and of their edges."""
@@ -73,10 +75,14 @@ def animate(walk: Walk, path: str | os.PathLike[str], *, fps: float = 30.0, slow
         _write_mp4(walk, target, fps, slow)
 
 
-def _chosen_frames(walk: Walk, fps: float, slow: float) -> list[int]:
+def _chosen_frames(walk: Walk, path: Path, fps: float, slow: float) -> list[int]:
     """Number of the frame that each picture shows: the last one recorded by then. Pictures come at a constant rate."""
-    start, end = walk.frame_time[0], walk.frame_time[-1]
-    marks = start + np.arange(math.floor((end - start) * fps * slow + 1e-6) + 1) / (fps * slow)
+    start = walk.frame_time[0]
+    count = float(walk.frame_time[-1] - start) * fps * slow + 1e-6
+    if (pictures := max(float(np.floor(count)) + 1, _HOLD * fps)) > MOST[path.suffix.lower()]:
+        remedy = f"lower fps or slow; a GIF has {MOST['.gif']} at most, an MP4 {MOST['.mp4']}"
+        raise InputError(f"{path}: {short(pictures)} pictures are too many; {remedy}")
+    marks = start + np.arange(math.floor(count) + 1) / (fps * slow)
     chosen: list[int] = (np.searchsorted(walk.frame_time, marks + 1e-9, side="right") - 1).tolist()
     return chosen if chosen[-1] == len(walk.frame_time) - 1 else [*chosen, len(walk.frame_time) - 1]
 
@@ -89,9 +95,7 @@ def _write_gif(walk: Walk, path: Path, fps: float, slow: float) -> None:
     from PIL import Image
 
     delay = round(100 / fps)
-    chosen = _chosen_frames(walk, 100 / delay, slow)
-    if len(chosen) > 1200:  # all are in memory at once, up to 0.5 MB each
-        raise ValueError(f"{path}: {len(chosen)} pictures are too many for a GIF; lower fps or slow, or give .mp4")
+    chosen = _chosen_frames(walk, path, 100 / delay, slow)
     film = Film(walk)
     palette = Image.fromarray(film.picture(len(walk.frame_time) // 2)).quantize(64)
     palette.putpalette([255 if part > 247 else part for part in palette.getpalette() or []])  # its white is a mean
@@ -110,11 +114,11 @@ def _write_mp4(walk: Walk, path: Path, fps: float, slow: float) -> None:
     import matplotlib as mpl
     from matplotlib.animation import FFMpegWriter
 
+    chosen = _chosen_frames(walk, path, fps, slow)
     try:
         ffmpeg = importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe()
     except ImportError:
         raise ImportError(f"{path}: MP4 needs imageio-ffmpeg; pip install 'warpchain[video]'") from None
-    chosen = _chosen_frames(walk, fps, slow)
     chosen += chosen[-1:] * round(_HOLD * fps)
     film = Film(walk)
     # What ffmpeg says would be lines on the terminal.
