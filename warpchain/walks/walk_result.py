@@ -280,8 +280,8 @@ class WalkResult:
             slow: playing time per simulated time; in a .html file the value at the start.
 
         Raises:
-            ValueError: the walk has no frames, the suffix is another, `fps` or `slow` is not positive, or a GIF would
-                have too many pictures.
+            ValueError: the walk has no frames, the suffix is another, `fps` or `slow` is not positive, or a GIF or
+                MP4 would have too many pictures.
             ImportError: an .mp4 is asked for, and imageio-ffmpeg is not installed.
             OSError: the file cannot be written.
         """
