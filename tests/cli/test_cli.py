@@ -4,7 +4,6 @@ import json
 import re
 import subprocess
 import sys
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +17,6 @@ from warpchain.inputs.parameters import preset
 
 QUICK = "--links 32 --preset soft --method dp5 --start ellipse --frequency 5".split()
 """A walk of half a simulated second."""
-
-WALK_MODULE = import_module("warpchain.walks.one_walk")
 
 
 @pytest.fixture(scope="module")
@@ -155,6 +152,6 @@ def test_a_defect_is_not_disguised_as_bad_input(monkeypatch: pytest.MonkeyPatch)
     def broken(*_: object, **__: object) -> None:
         raise ValueError("operands could not be broadcast together")
 
-    monkeypatch.setattr(WALK_MODULE, "run_walk", broken)
+    monkeypatch.setattr("warpchain.walks.one_walk.run_walk", broken)
     with pytest.raises(ValueError, match="broadcast"):
         main(["walk"])

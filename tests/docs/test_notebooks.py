@@ -3,19 +3,12 @@
 import json
 import re
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from tests.docs.code_blocks import ROOT
 
 NOTEBOOKS = [*sorted((ROOT / "docs/notebooks").glob("*.ipynb")), *sorted((ROOT / "studies").glob("*/*.ipynb"))]
-
-
-def code_cells(notebook: Path) -> list[Any]:
-    """The cells of a notebook that hold code."""
-    cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
-    return [cell for cell in cells if cell["cell_type"] == "code"]
 
 
 @pytest.mark.slow
@@ -37,7 +30,8 @@ def test_notebook_runs(notebook: Path, tmp_path: Path, monkeypatch: pytest.Monke
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
 def test_committed_notebook_was_run(notebook: Path) -> None:
     """All cells were run in order, from the first; there are outputs, no errors and no paths of a machine."""
-    cells = code_cells(notebook)
+    content = json.loads(notebook.read_text(encoding="utf-8"))
+    cells = [cell for cell in content["cells"] if cell["cell_type"] == "code"]
     assert [cell["execution_count"] for cell in cells] == list(range(1, len(cells) + 1))
     outputs = [output for cell in cells for output in cell["outputs"]]
     assert outputs and all(output["output_type"] in ("display_data", "execute_result", "stream") for output in outputs)

@@ -91,6 +91,11 @@ STILL = [0.1, 0, 0, 0]
         ({"method": "hybrid", "plane": "tilting"}, "options.method: 'hybrid' keeps planes fixed; give "),
         ({"method": "hybird"}, "options.method: 'hybird' is unknown; did you mean hybrid?"),
         ({"device": "gpu"}, "options.device: 'gpu' is no device; give cpu, cuda or cuda:N"),
+        (
+            {"soften_drive": True, "record_interval": 5e-3},
+            "options.soften_drive: joints stiffen at each record_interval, and 0.005 s is too long for that; give at "
+            "most 0.002 s, or ",
+        ),
         ({"contact_step": 1e-13}, "options.smallest_step: 1e-12 s is not below contact_step; give less"),
         (
             {"circle_radius": 0.007},

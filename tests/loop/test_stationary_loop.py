@@ -90,13 +90,13 @@ def test_an_ellipse_has_its_curvature() -> None:
 def test_what_makes_no_mean_loop_is_refused() -> None:
     """Too few frames, a loop that stands, runs backwards or is nowhere free, and a walk without frames of the time."""
     before, radius, _ = make_ring(30)
-    few = frames_of(before.frame_joints[:5])
-    with pytest.raises(ValueError, match="5 frames are too few"):
-        average(few, radius)
-    with pytest.raises(ValueError, match="does not run clockwise"):
-        average(frames_of(before.frame_joints[::-1]), radius)
-    with pytest.raises(ValueError, match="hardly moves"):
-        average(frames_of(np.repeat(before.frame_joints[:1], 20, axis=0)), radius)
+    for joints, problem in (
+        (before.frame_joints[:5], "5 frames are too few"),
+        (before.frame_joints[::-1], "does not run clockwise"),
+        (np.repeat(before.frame_joints[:1], 20, axis=0), "hardly moves"),
+    ):
+        with pytest.raises(ValueError, match=problem):
+            average(frames_of(joints), radius)
     with pytest.raises(ValueError, match="no free part"):
         average_frames(before, SOFT, MASS, np.zeros(2), radius)
     with pytest.raises(ValueError, match="record_before"):

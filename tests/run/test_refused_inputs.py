@@ -67,6 +67,7 @@ REFUSED: dict[Callable[..., object], list[tuple[dict[str, Any], str]]] = {
         ({"links": 8}, r"options\.links: not possible here; give it in scene"),
         ({"skin": -1.0, "tolerance": 1.0}, r"options\.\w+: .* \(and 1 more\)"),
         ({"soften_pile": True}, r"options\.soften_pile: only a walk has phases .*"),
+        ({"soften_drive": True}, r"options\.soften_drive: only a walk .*"),
         ({"parameters": {"link_length": 1.0}}, r"preset: .* is unknown; presets are paper, soft"),
         ({"position": "abc"}, r"position: not an array of numbers; give one of shape \(n, 3\)"),
         ({"position": changed(np.nan)}, "position: holds a number that is not finite; .*"),

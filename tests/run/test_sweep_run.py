@@ -123,7 +123,6 @@ def test_a_failing_walk_stops_the_sweep_and_keeps_what_is_done(tmp_path, monkeyp
 def test_a_dask_worker_may_be_killed(tmp_path, uninterrupted):
     """With a worker of a Dask cluster killed in the middle, nothing is lost and the bytes are the same."""
     distributed = pytest.importorskip("distributed")
-    content = TINY | {"samples": 20}
     with (
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster,
         distributed.Client(cluster) as client,
@@ -136,14 +135,13 @@ def test_a_dask_worker_may_be_killed(tmp_path, uninterrupted):
                 os.kill(pids[0], signal.SIGKILL)
                 killed.append(progress.done)
 
-        result = sweep(content, tmp_path / "sweep", executor=client, on_progress=kill_once)
+        result = sweep(TINY, tmp_path / "sweep", executor=client, on_progress=kill_once)
         after = set(client.run(os.getpid).values())
     assert killed and killed[0] < 80
     assert pids[0] not in after
     assert result.missing_count == 0
     assert data_of(tmp_path / "sweep") == uninterrupted
-    indices = np.sort(result.index.ravel())
-    np.testing.assert_array_equal(indices, np.arange(80))
+    np.testing.assert_array_equal(np.sort(result.index.ravel()), np.arange(80))
 
 
 @pytest.mark.slow

@@ -36,11 +36,9 @@ def open_folder(directory: Path, sweep: Any = SWEEP, **settings: Any) -> SweepFo
     return SweepFolder.open(directory, sweep, **({"shard_size": SHARD_SIZE} | settings))
 
 
-def play(part: str, directory: Path, *, namespace: bool = False) -> Any:
-    """What a part of `synthetic_sweep` prints, played in a process of its own."""
-    command = [sys.executable, synthetic_sweep.__file__, part, str(directory)]
-    if namespace:
-        command = ["unshare", "--mount", "--map-root-user", *command]
+def play(part: str, directory: Path, *within: str) -> Any:
+    """What a part of `synthetic_sweep` prints, played in a process of its own, which a command may surround."""
+    command = [*within, sys.executable, synthetic_sweep.__file__, part, str(directory)]
     done = subprocess.run(command, capture_output=True, encoding="utf-8", timeout=100)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
@@ -55,16 +53,6 @@ def refused(error: type[Exception], directory: Path, *words: str) -> Iterator[No
     text = str(caught.value)
     assert "\n" not in text and all(word in text for word in words), text
     assert (content(directory) if directory.exists() else {}) == before
-
-
-needs_namespace = pytest.mark.skipif(
-    shutil.which("unshare") is None
-    or subprocess.run(
-        ["unshare", "--mount", "--map-root-user", "mount", "-t", "tmpfs", "tmpfs", "/mnt"], capture_output=True
-    ).returncode
-    != 0,
-    reason="needs a mount namespace",
-)
 
 
 # Begin, go on, end
@@ -240,10 +228,13 @@ def test_workers_need_the_folder(tmp_path: Path) -> None:
 # What the system refuses
 
 
-@needs_namespace
 def test_a_full_disk(tmp_path: Path) -> None:
     """A disk that fills up in the middle: a clear line, nothing lost, and the sweep goes on once there is room."""
-    done = play("full_disk", tmp_path / "full", namespace=True)
+    namespace = ("unshare", "--mount", "--map-root-user")
+    mount = [*namespace, "mount", "-t", "tmpfs", "tmpfs", "/mnt"]
+    if shutil.which("unshare") is None or subprocess.run(mount, capture_output=True).returncode != 0:
+        pytest.skip("needs a mount namespace")
+    done = play("full_disk", tmp_path / "full", *namespace)
     writing, opening = done["messages"]
     assert ".h5: cannot be written (No space left on device); make room" in writing
     assert "make room" in opening and done["missing"] == 0

@@ -75,24 +75,19 @@ def test_a_walk_of_a_sweep_from_the_command_line(command: Command, folder: Path)
 
 
 @pytest.mark.parametrize(
-    ("words", "problem"),
+    ("line", "problem"),
     [
-        (["--like", "DIR"], "--like: DIR has many walks; give --index"),
-        (["--like", "DIR", "--index", "9"], "index: the sweep has no walk 9"),
-        (["--like", "DIR", "--index", "one"], "index: Input should be a valid integer; given 'one'"),
-        (["--index", "3"], "--index: names a walk of a sweep, but --like is missing"),
+        ("walk --like DIR", "--like: DIR has many walks; give --index"),
+        ("walk --like DIR --index 9", "index: the sweep has no walk 9"),
+        ("walk --like DIR --index one", "index: Input should be a valid integer; given 'one'"),
+        ("walk --index 3", "--index: names a walk of a sweep, but --like is missing"),
+        ("animate DIR", "the folder of a sweep, not of a saved walk; give a saved walk"),
     ],
 )
-def test_a_walk_that_is_not_named_is_refused(command: Command, folder: Path, words: list[str], problem: str) -> None:
-    """A sweep without a number, a number without a sweep, or one that is not there."""
-    answer = command("walk", *(word.replace("DIR", str(folder)) for word in words))
+def test_a_walk_that_is_not_named_is_refused(command: Command, folder: Path, line: str, problem: str) -> None:
+    """A sweep without a number, a number without a sweep, or one that is not there; a film of a whole sweep."""
+    answer = command(*(word.replace("DIR", str(folder)) for word in line.split()))
     assert answer.status == 2 and problem.replace("DIR", str(folder)) in answer.err
-
-
-def test_a_film_of_a_whole_sweep_is_refused(command: Command, folder: Path) -> None:
-    """The line says how to get the walk of a sweep that a film takes."""
-    answer = command("animate", str(folder))
-    assert answer.status == 2 and "the folder of a sweep, not of a saved walk; give a saved walk" in answer.err
 
 
 def test_numbers_that_say_no_walk_are_refused(folder: Path) -> None:

@@ -12,7 +12,7 @@ from scipy.optimize import minimize
 
 import warpchain
 from tests.oracle_model.motion_equations import gravitational_energy, kinetic_energy
-from warpchain import InputError, Parameters, State, WalkResult
+from warpchain import InputError, State, WalkResult
 from warpchain.walks.walk_result import MOTION, NUMBERS
 
 SPUN = {"links": 36, "frequency": 15.0, "start": "spinning"}
@@ -126,36 +126,39 @@ def outline(links: int, length: float) -> np.ndarray:
     return np.column_stack([radius * np.cos(angle), radius * (1.2 + np.sin(angle))])
 
 
+LENGTH = warpchain.preset("paper").link_length
+RING = outline(12, LENGTH)
+
+
 def test_a_measured_outline_closes_and_moves_as_little_as_it_must() -> None:
     """Joints with errors become links of one length that meet; no way to do so needs noticeably less motion."""
-    length = Parameters.model_fields and warpchain.preset("paper").link_length
-    measured = outline(12, length) + np.random.default_rng(3).normal(0, 3e-4, (12, 2))
+    measured = RING + np.random.default_rng(3).normal(0, 3e-4, (12, 2))
     state = State.of_joints(measured)
     spans = np.linalg.norm(state.joints - np.roll(state.joints, 1, axis=0), axis=1)
-    np.testing.assert_allclose(spans, length, rtol=1e-12)
+    np.testing.assert_allclose(spans, LENGTH, rtol=1e-12)
     ends = state.joints - state.position[:, :2]
     lefts = np.roll(state.position[:, :2] - ends, -1, axis=0)
     np.testing.assert_allclose(lefts, state.joints, atol=1e-15)
 
     def misfit(joints: np.ndarray) -> np.ndarray:
-        places = length * joints.reshape(-1, 2)
-        return np.sum((places - np.roll(places, 1, axis=0)) ** 2, axis=1) / length**2 - 1
+        places = joints.reshape(-1, 2)
+        return np.sum((places - np.roll(places, 1, axis=0)) ** 2, axis=1) - 1
 
     best = minimize(
-        lambda joints: np.sum((joints - measured.ravel() / length) ** 2),
-        measured.ravel() / length,
+        lambda joints: np.sum((joints - measured.ravel() / LENGTH) ** 2),
+        measured.ravel() / LENGTH,
         constraints={"type": "eq", "fun": misfit},
         method="SLSQP",
         options={"ftol": 1e-14, "maxiter": 300},
     )
     assert best.success
-    assert np.sum((state.joints - measured) ** 2) < 1.01 * best.fun * length**2
+    assert np.sum((state.joints - measured) ** 2) < 1.01 * best.fun * LENGTH**2
     assert (state.velocity == 0).all() and state.time == 0
 
 
 def test_the_clock_of_a_state_is_that_of_its_walk() -> None:
     """No other time is taken, of a state that was measured none but 0."""
-    state = State.of_joints(outline(12, warpchain.preset("soft").link_length))
+    state = State.of_joints(RING)
     for time in (-1.0, 1.0, math.nan, "a"):
         with pytest.raises(InputError, match=r"^time: .* is not that of its walk; give 0$"):
             replace(state, time=time)
@@ -163,12 +166,11 @@ def test_the_clock_of_a_state_is_that_of_its_walk() -> None:
 
 def test_measured_velocities_keep_links_as_long_as_they_are() -> None:
     """A rotation of all joints comes back as it is; of any rates, what would stretch links is taken away."""
-    joints = outline(12, warpchain.preset("soft").link_length)
-    turning = 7.0 * np.column_stack([-joints[:, 1], joints[:, 0]])
-    state = State.of_joints(joints, turning, "soft")
+    turning = 7.0 * np.column_stack([-RING[:, 1], RING[:, 0]])
+    state = State.of_joints(RING, turning, "soft")
     np.testing.assert_allclose(state.velocity[:, 2], 7.0, rtol=1e-9)
     rates = np.random.default_rng(4).normal(0, 1, (12, 2))
-    state = State.of_joints(joints, rates, "soft")
+    state = State.of_joints(RING, rates, "soft")
     angle, omega = state.position[:, 2], state.velocity[:, 2]
     arm = state.parameters.link_length / 2 * omega[:, None] * np.column_stack([-np.sin(angle), np.cos(angle)])
     right, left = state.velocity[:, :2] + arm, state.velocity[:, :2] - arm
@@ -185,10 +187,6 @@ def test_a_chain_on_an_outline_falls_to_rest() -> None:
     masses = 18 * (walk.setup.parameters.inner_mass + walk.setup.parameters.outer_mass)
     assert walk.gravitational_energy[0] == pytest.approx(masses * walk.setup.parameters.gravity * height, rel=1e-9)
     assert walk.time[0] == 0 and walk.sprocket_center is None and math.isnan(walk.sprocket_radius)
-
-
-LENGTH = warpchain.preset("paper").link_length
-RING = outline(12, LENGTH)
 
 
 @pytest.mark.parametrize(

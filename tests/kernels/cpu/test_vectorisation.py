@@ -24,9 +24,7 @@ RIGID = COMMON | {
     *("fastest", "meeting", "prepare", "place_stage", "factorise", "solve_forces", "damp", "keep_stage"),
     *("openings", "opening_rates", "push", "close", "begin"),
 }
-TILTING = EXPLICIT | {
-    *("shift_first_stage", "tilting_gap", "resolve_tilting_floor", "write_plane_sums"),
-}
+TILTING = EXPLICIT | {"shift_first_stage", "tilting_gap", "resolve_tilting_floor", "write_plane_sums"}
 HOT_FUNCTIONS = {"dp5": EXPLICIT, "hybrid": RIGID}
 
 

@@ -21,6 +21,14 @@ def walk(request: pytest.FixtureRequest) -> warpchain.WalkResult:
     )
 
 
+def nearest(walk: warpchain.WalkResult, apart: int) -> np.ndarray:
+    """Least distance in each frame (f,) of two joints that are so many links apart, or more [m]."""
+    n = walk.setup.scene.links
+    steps = np.arange(n)[:, None] - np.arange(n)
+    far = np.minimum(steps % n, -steps % n) >= apart
+    return np.array([np.hypot(*np.moveaxis(frame[:, None] - frame, -1, 0))[far].min() for frame in walk.frame_joints])
+
+
 def test_collapse_is_seen_in_the_frames(walk: warpchain.WalkResult) -> None:
     """`collapsed_at` is the first frame that encloses less than half of the area of the first one."""
     area = shoelace(walk.frame_joints)
@@ -31,10 +39,7 @@ def test_collapse_is_seen_in_the_frames(walk: warpchain.WalkResult) -> None:
 
 def test_self_contact_is_seen_in_the_frames(walk: warpchain.WalkResult) -> None:
     """Circles of links without a common joint are apart in all frames before `self_contact_at`, and meet around it."""
-    joints, n, radius = walk.frame_joints, walk.setup.scene.links, walk.setup.parameters.circle_radius
-    steps = np.arange(n)[:, None] - np.arange(n)
-    far = np.minimum(steps % n, -steps % n) > 1  # the two circles of a joint belong to neighbours
-    least = np.array([np.hypot(*np.moveaxis(frame[:, None] - frame, -1, 0))[far].min() for frame in joints])
+    radius, least = walk.setup.parameters.circle_radius, nearest(walk, 2)  # the circles of a joint are of neighbours
     at = int(np.flatnonzero(walk.frame_time == walk.self_contact_at)[0])
     assert np.all(least[:at] > 2 * radius - 1e-4)
     assert least[at - 1 : at + 1].min() < 2 * radius + 1e-3
@@ -47,10 +52,7 @@ def test_strands_meet_after_the_first_crease(method: str) -> None:
     walk = warpchain.walk(
         links=120, frequency=20.0, preset="soft", start="ellipse", method=method, frame_interval=1e-3, walk_limit=1.2
     )
-    joints, n, radius = walk.frame_joints, 120, walk.setup.parameters.circle_radius
-    steps = np.arange(n)[:, None] - np.arange(n)
-    far = np.minimum(steps % n, -steps % n) >= layout.STRANDS_APART
-    least = np.array([np.hypot(*np.moveaxis(frame[:, None] - frame, -1, 0))[far].min() for frame in joints])
+    radius, least = walk.setup.parameters.circle_radius, nearest(walk, layout.STRANDS_APART)
     at = int(np.flatnonzero(walk.frame_time == walk.strands_met_at)[0])
     assert walk.self_contact_at + 0.1 < walk.strands_met_at
     assert np.all(least[:at] > 2 * radius - 1e-4)

@@ -5,10 +5,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import warpchain
-from tests.support.presets import PAPER
-from tests.support.setups import setup_walk
-from warpchain import InputError, State, Status
-from warpchain.inputs.start_shapes import ellipse, lay_chain
+from warpchain import State, Status
 
 SERIES = ("time", "center", "center_velocity", "kinetic_energy", "spring_energy", "lowest", "rms_speed")
 
@@ -21,21 +18,9 @@ def short_walk(**settings):
 
 
 @pytest.fixture(scope="module")
-def stiff_walk():
-    """The walk with its own joints throughout."""
-    return short_walk()
-
-
-@pytest.fixture(scope="module")
-def softened_walk():
-    """The same, softened in the pile."""
-    return short_walk(soften_pile=True)
-
-
-@pytest.fixture(scope="module")
-def loose_walk():
-    """The same, in steps to a looser tolerance from there."""
-    return short_walk(soften_pile=True, soft_tolerance=1e-3)
+def walks():
+    """The walk with its own joints throughout, softened in the pile, and in steps to a looser tolerance from there."""
+    return short_walk(), short_walk(soften_pile=True), short_walk(soften_pile=True, soft_tolerance=1e-3)
 
 
 def shoelace(joints: np.ndarray) -> np.ndarray:
@@ -44,27 +29,30 @@ def shoelace(joints: np.ndarray) -> np.ndarray:
     return 0.5 * np.sum(x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1), axis=1)
 
 
-def test_joints_soften_at_the_first_mark_of_a_small_area(softened_walk) -> None:
+def test_joints_soften_at_the_first_mark_of_a_small_area(walks) -> None:
     """The moment is that of the first sample whose loop encloses less than 0.3 of the area at the release."""
+    _, softened_walk, _ = walks
     area = shoelace(softened_walk.frame_joints)
     first = np.flatnonzero(area / area[0] < 0.3)[0]
     assert 0 < first < len(area) - 20
     assert softened_walk.softened_at == softened_walk.frame_time[first]
 
 
-def test_nothing_changes_before_the_joints_soften(stiff_walk, softened_walk, loose_walk) -> None:
+def test_nothing_changes_before_the_joints_soften(walks) -> None:
     """Up to the switch all series are equal to the bit, whether joints soften then and to what tolerance."""
+    stiff_walk, softened_walk, loose_walk = walks
     switch = int(np.searchsorted(softened_walk.time, softened_walk.softened_at, side="right")) - 1
     for name in SERIES:
-        stiff, soft, loose = (getattr(walk, name) for walk in (stiff_walk, softened_walk, loose_walk))
+        stiff, soft, loose = (getattr(walk, name) for walk in walks)
         for one, other in ((stiff, soft), (soft, loose)):
             assert_array_equal(one[: switch + 1], other[: switch + 1], err_msg=name)
             assert name == "time" or not np.array_equal(one[switch + 1], other[switch + 1]), name
     assert np.isnan(stiff_walk.softened_at) and loose_walk.softened_at == softened_walk.softened_at
 
 
-def test_softened_walks_end_alike_with_fewer_steps(stiff_walk, softened_walk, loose_walk) -> None:
+def test_softened_walks_end_alike_with_fewer_steps(walks) -> None:
     """The chain comes to rest at the same place to a millimetre, in far fewer steps, fewer still if looser."""
+    stiff_walk, softened_walk, loose_walk = walks
     assert softened_walk.status == Status.AT_REST
     assert softened_walk.dx == pytest.approx(stiff_walk.dx, abs=1e-3)
     assert loose_walk.dx == pytest.approx(softened_walk.dx, abs=1e-3)
@@ -94,17 +82,3 @@ def test_ledger_of_a_softened_walk_closes(method: str) -> None:
     stiffness = walk.setup.parameters.joint_stiffness
     freed = 0.99 * stiffness * soft + 0.009 * stiffness * softest
     assert energy["softening"] == pytest.approx(freed / 2, rel=1e-6)
-
-
-def test_marks_too_far_apart_for_joints_to_stiffen_are_refused() -> None:
-    """Joints stiffen at marks of the record, which may be 2 ms apart at most."""
-    with pytest.raises(InputError, match=r"^options\.soften_drive: .* 0\.005 s .* at most 0\.002 s, or .*$"):
-        setup_walk("paper", {"soften_drive": True, "record_interval": 5e-3})
-
-
-@pytest.mark.parametrize("name", ["soften_pile", "soften_drive"])
-def test_simulate_does_not_soften(name: str) -> None:
-    """A given chain has neither release nor pile: asked to soften, `simulate` refuses."""
-    position, velocity = lay_chain(ellipse(1.0), 8, PAPER.link_length, 1.0)
-    with pytest.raises(InputError, match=rf"^options\.{name}: only a walk"):
-        warpchain.simulate("paper", position, velocity, 0.1, **{name: True})
