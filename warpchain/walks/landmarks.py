@@ -51,8 +51,6 @@ def bounces(time: Array, velocity: Array, setup: Setup) -> dict[str, Array]:
     scene, parameters = setup.scene, setup.parameters
     if scene.plane == "tilting" or scene.floor != "flat":
         raise InputError("bounces: the plane tilts, or the floor is a profile; give a walk on a flat floor or a slope")
-    if not len(time):
-        raise InputError("bounces: the walk was not released, or its series was not kept; see its status")
     free = time >= (scene.release[-1][0] if scene.release else 0.0)  # of a sprocket that moves on after the release
     time, speed = time[free], np.abs(velocity).max(initial=0.0)
     mass = link_values(scene, parameters).total_mass

@@ -264,10 +264,11 @@ class WalkResult:
         """The bounces off a flat or sloping floor: columns of equal length, for example for `pandas.DataFrame`.
 
         `start` and `end` of contact [s], to a sample; `impulse_x`, `impulse_y` of the floor on the chain [N s];
-        `sticks_at` [s], the first sample until which not all that touched slid one way (NaN: all did).
+        `sticks_at` [s], the first sample until which not all that touched slid one way (NaN: all did). A walk without
+        series, or that was never released, has none.
 
         Raises:
-            InputError: the walk has no series, its plane tilts, or its floor is a profile.
+            InputError: the plane tilts, or the floor is a profile.
         """
         return bounces(self.time, self.center_velocity, self.setup)
 
