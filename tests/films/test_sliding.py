@@ -62,6 +62,6 @@ def test_a_film_that_is_not_what_it_says_is_refused(
 @pytest.mark.parametrize("value", [0, np.nan, "240", None])
 @pytest.mark.parametrize("name", ["fps", "noise"])
 def test_a_camera_has_positive_numbers(name: str, value: Any) -> None:
-    """A rate or an error that is none is refused where it is given."""
+    """Frame rate and errors of a camera are positive numbers; others are refused by name."""
     with pytest.raises(InputError, match=f"^camera.{name}: "):
         films.Camera(**{name: value})

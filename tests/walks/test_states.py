@@ -157,7 +157,7 @@ def test_a_measured_outline_closes_and_moves_as_little_as_it_must() -> None:
 
 
 def test_the_clock_of_a_state_is_that_of_its_walk() -> None:
-    """No other time is taken, of a state that was measured none but 0."""
+    """Any other time is refused; a measured state has time 0."""
     state = State.of_joints(RING)
     for time in (-1.0, 1.0, math.nan, "a"):
         with pytest.raises(InputError, match=r"^time: .* is not that of its walk; give 0$"):

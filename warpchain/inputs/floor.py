@@ -159,7 +159,7 @@ class Floor:
             if (excess := room(high)) <= EXACT:
                 return float(high)
             high -= excess  # which brings nothing nearer to the floor than that
-        for _ in range(60):  # beside a steep face such steps are short; halves of kilometres are below EXACT by then
+        for _ in range(60):  # such steps are short beside a steep face; 60 halves of a kilometre are below EXACT
             middle = (low + high) / 2
             low, high = (middle, high) if room(middle) < 0 else (low, middle)
         return float(high)
