@@ -119,6 +119,22 @@ def test_a_failing_walk_stops_the_sweep_and_keeps_what_is_done(tmp_path, monkeyp
     assert data_of(tmp_path / "sweep") == uninterrupted
 
 
+def test_what_an_executor_loses_after_shards_are_written_is_done(tmp_path, uninterrupted):
+    """Dask fails a future whose result it lost with a killed worker."""
+
+    class Forgetful(concurrent.futures.ThreadPoolExecutor):
+        def submit(self, call, *arguments):
+            def lost():
+                call(*arguments)
+                raise TypeError("cannot unpack non-iterable NoneType object")
+
+            return super().submit(lost)
+
+    with Forgetful(1) as executor:
+        sweep(TINY, tmp_path / "sweep", executor=executor, workers=1)
+    assert data_of(tmp_path / "sweep") == uninterrupted
+
+
 @pytest.mark.slow
 def test_a_dask_worker_may_be_killed(tmp_path, uninterrupted):
     """With a worker of a Dask cluster killed in the middle, nothing is lost and the bytes are the same."""

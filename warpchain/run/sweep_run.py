@@ -234,7 +234,7 @@ def _run_in_folder(
         if missing:
             tasks = _tasks(planned, missing, at_once if pulse is None else 1)  # threads take turns on a GPU
             where = str(store.directory), stamp(store.directory)
-            submitted = (executor.submit(run_shards, planned, *where, tuple(task), pulse) for task in tasks)
+            submitted = ((executor.submit(run_shards, planned, *where, tuple(task), pulse), task) for task in tasks)
             _follow(submitted, 2 * at_once, pulse or Pulse(), store, progress, report)
         counts = counts_text(progress) or "nothing to do"
         store.log(f"complete after {progress.seconds:.1f} s: {counts}")
@@ -290,24 +290,34 @@ def run_shards(planned: Sweep, directory: str, seal: str, shards: Sequence[Shard
 
 
 def _follow(
-    tasks: Iterator[Task], at_once: int, pulse: Pulse, store: SweepFolder, progress: SweepProgress, report: OnProgress
+    tasks: Iterator[tuple[Task, list[Shard]]],
+    at_once: int,
+    pulse: Pulse,
+    store: SweepFolder,
+    progress: SweepProgress,
+    report: OnProgress,
 ) -> None:
-    """Ask for so many tasks at once, so that memory does not grow with the sweep, and count the shards they write."""
+    """Ask for so many tasks at once, so that memory does not grow with the sweep, and count the shards they write.
+
+    A task whose shards are written is done, whatever becomes of it: Dask fails one that a killed worker had finished.
+    """
     report(progress)
     began, written, blocks = time.perf_counter(), 0, store.manifest.sweep.blocks
     folder, left = store.directory / "shards", {shard.name: shard for shard in store.missing()}
     lengths = {name: np.concatenate([block.parameter(name).ravel() for block in blocks]) for name in LENGTHS}
-    pending: set[Task] = set()
+    pending: dict[Task, list[Shard]] = {}
     try:
         while True:
             with losses_named():
                 pending.update(itertools.islice(tasks, at_once - len(pending)))
                 if not pending:
                     break
-                finished, pending = wait(pending, 1.0, FIRST_COMPLETED)  # looks for shards every second
+                finished, _ = wait(pending, 1.0, FIRST_COMPLETED)  # looks for shards every second
+                there = set(os.listdir(folder))
                 for future in finished:
-                    future.result()
-            for name in left.keys() & set(os.listdir(folder)):
+                    if not there.issuperset(shard.name for shard in pending.pop(future)):
+                        future.result()
+            for name in left.keys() & there:
                 shard = left.pop(name)
                 with opened_shard(store.directory, name, shard.digest) as file:
                     rows = rows_of(file, shard.kind)
