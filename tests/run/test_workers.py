@@ -59,7 +59,7 @@ def test_a_missing_gpu_leaves_no_folder(given: list[str], monkeypatch: pytest.Mo
     """One line names the option and says that there is no GPU, before the folder is made."""
     monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
     answer = command("sweep", "figure6", "-o", "sweep", *given)
-    problem = "--gpus: no GPU is found on this machine; leave it out to run on the CPU"
+    problem = f"--gpus: {given[1]} wanted, but this machine has 0; leave it out to run on the CPU"
     if given[0] == "--device":
         problem = "options.device: there is no cuda on this machine; give one of cpu"
     assert answer.err == f"error: {problem}\n"

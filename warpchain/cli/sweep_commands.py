@@ -66,14 +66,9 @@ def sweep(
         if device not in (None, "cuda"):
             raise InputError(f"--device: {device} is given together with --gpus; give cuda, or leave one out")
         device = "cuda"
-        try:
-            there = gpu_count()
-        except InputError as error:
-            if not str(error).startswith("options.device"):
-                raise
-            raise InputError("--gpus: no GPU is found on this machine; leave it out to run on the CPU") from None
-        if gpus > there:
-            raise InputError(f"--gpus: {gpus} wanted, but this machine has {there}; give at most {there}")
+        if gpus > (there := gpu_count()):
+            remedy = f"give at most {there}" if there else "leave it out to run on the CPU"
+            raise InputError(f"--gpus: {gpus} wanted, but this machine has {there}; {remedy}")
     try:
         with contextlib.nullcontext() if gpus is None else gpu_workers(gpus) as executor:
             result = run(

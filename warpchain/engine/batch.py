@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -266,15 +266,13 @@ class Batch:
         """Attempts of each world in a launch, unless it is told another number."""
         return ATTEMPTS["cpu" if self._gpu is None else "gpu"]
 
-    def run(self, worlds: Sequence[int], features: Features, after_launch: Callable[[], None] | None = None) -> None:
-        """Carry worlds on until none of them is running; after each launch the record may be drained.
+    def run(self, worlds: Sequence[int], features: Features) -> None:
+        """Carry worlds on until none of them is running.
 
         Results do not depend on how a run is cut into launches.
         """
         while active := [world for world in worlds if self.statuses()[world] == Status.RUNNING]:
             self.launch(active, features)
-            if after_launch is not None:
-                after_launch()
 
     def launch(self, worlds: Sequence[int], features: Features, attempts: int | None = None) -> None:
         """Carry worlds on, see :meth:`start`, and wait for the end of the launch."""

@@ -100,7 +100,7 @@ class Scene(Section):
     """rate of tilt of a tilting plane at the release"""
     yaw_rate: float = number_field(0.0, "rad/s", ge=-FASTEST_TAP, le=FASTEST_TAP)
     """rate at which a tilting plane turns about its upright axis at the release, anticlockwise from above"""
-    charm_link: int = number_field(0, "1", ge=0, le=MOST_LINKS - 1)
+    charm_link: Whole = number_field(0, "1", ge=0, le=MOST_LINKS - 1)
     """link that carries a charm"""
     charm_mass: float = number_field(0.0, "kg", ge=0, le=1e6)
     """mass at the centre of charm_link, added to its own"""
@@ -108,7 +108,7 @@ class Scene(Section):
     """moment of inertia of the charm about that centre, added likewise"""
     charm_radius: float | None = number_field(None, "m", gt=0, le=1e3)
     """radius of circles of charm_link; null: its own"""
-    stiff_joint: int = number_field(0, "1", ge=0, le=MOST_LINKS - 1)
+    stiff_joint: Whole = number_field(0, "1", ge=0, le=MOST_LINKS - 1)
     """joint that is stiff: the one at the end of this link"""
     stiff_joint_factor: float = number_field(1.0, "1", ge=0, le=1e6)
     """by which viscous and Coulomb friction of stiff_joint are multiplied"""

@@ -296,6 +296,8 @@ def suggestion(given: object, known: Mapping[str, str] | Iterable[str]) -> str:
     close = difflib.get_close_matches(str(given)[:_LONGEST_VALUE], names, n=1) if isinstance(given, str) else []
     if close:
         return f"did you mean {names[close[0]]}?"
+    if not names:
+        return "there are none; leave it out"
     return f"give one of {textwrap.shorten(', '.join(names.values()), 125, placeholder=' ...')}"
 
 

@@ -187,19 +187,18 @@ class Chains:
         velocity, (worlds, links, _) = checked_array(velocity, "velocity", *position.shape), position.shape
         if not isinstance(parameters, list | tuple) or len(parameters) != worlds:
             raise InputError(f"parameters: {shown(parameters)} are not of {worlds} chains; give Parameters of each")
-        if worlds < 1 or links < 4 or links % 2:
-            raise InputError(f"position: {worlds} chains of {links} links; give chains of an even number of at least 4")
+        if not parameters:
+            raise InputError("parameters: no chains; give one at least")
         check_links_on_gpu(links, options.device, "position")
-        for place, rates, chain in zip(position, velocity, parameters, strict=True):
-            state = State.of_links(place, rates, chain)
-            if floor:
-                state.setup.floor.check_above(place, chain.link_length, "position")
+        states = [State.of_links(*given) for given in zip(position, velocity, parameters, strict=True)]
+        for state in states if floor else ():
+            state.setup.floor.check_above(state.position, state.parameters.link_length, "position")
         self.time, self._links = 0.0, links
         with gpu_turn([options.device]):
             self._batch = Batch(worlds, links, options)
-            for world, chain in enumerate(parameters):
-                self._batch.set_chain(world, chain, links)
-                self._batch.load(world, position[world], velocity[world], stop_time=0.0, stop_status=Status.FINISHED)
+            for world, state in enumerate(states):
+                self._batch.set_up(world, state.setup)
+                self._batch.load(world, state.position, state.velocity, stop_time=0.0, stop_status=Status.FINISHED)
             self._features = self._batch.features(fixed_body="floor" if floor else "none")
             self._batch.run(range(worlds), self._features)
 

@@ -70,7 +70,7 @@ def walk(
     """
     named = {"links": links, "frequency": frequency, "method": method, "tolerance": tolerance, "start": start}
     given = by_name({**{name: value for name, value in named.items() if value is not None}, **settings})
-    loads = checked(record_loads, "record_loads", bool)
+    loads, seed = checked(record_loads, "record_loads", bool), checked(seed, "seed", Seed | None)
     if isinstance(start, State) and setup is None:
         for name, value in {"preset": preset, "seed": seed}.items():
             if value is not None:
@@ -85,7 +85,6 @@ def walk(
             raise InputError(f"setup: {shown(setup)} is none; give that of a WalkResult, such as load_walk(…).setup")
         if others := [*["preset"] * (preset is not None), *given]:
             raise InputError(f"{', '.join(others)}: given together with setup, which is complete; leave one out")
-        checked(seed, "seed", Seed | None)
     with changing_line(in_terminals=False) as show:
         return run_walk(
             setup,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from warpchain.inputs.arrays import AnyArray
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.setup import Setup
-from warpchain.inputs.validation import InputError, InputWarning, checked, plain, shown, suggestion
+from warpchain.inputs.validation import InputError, InputWarning, by_name, checked, plain, shown, suggestion
 from warpchain.status import Status
 from warpchain.store.cell_statistics import CellStatistics
 from warpchain.sweeps.block import POINT, Block
@@ -141,9 +141,9 @@ class BlockResult:
 
     def place(self, sample: int, at: Mapping[str, float | str | None]) -> tuple[int, ...]:
         """Place along the axes and samples of a walk, see `series`."""
+        at = by_name(at)
         if unknown := [name for name in at if name not in self.axes]:
-            known = suggestion(unknown[0], tuple(self.axes)) if self.axes else "there are no axes"
-            raise InputError(f"{unknown[0]}: no axis of block {self.name}; {known}")
+            raise InputError(f"{unknown[0]}: no axis of block {self.name}; {suggestion(unknown[0], tuple(self.axes))}")
         place = []
         for name, values in self.axes.items():
             wanted = plain(at[name], name) if name in at else values[0]

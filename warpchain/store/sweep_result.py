@@ -23,7 +23,7 @@ import numpy as np
 from warpchain.files import AnyPath, Kind, checked_output, given_path, write_whole
 from warpchain.hdf5_files import hdf5_image, kind_of_hdf5, reading_hdf5
 from warpchain.inputs.arrays import AnyArray
-from warpchain.inputs.validation import InputError, InputWarning, shown, suggestion
+from warpchain.inputs.validation import InputError, InputWarning, full_name, shown, suggestion
 from warpchain.store.block_result import BlockResult, counted, located, status_counts
 from warpchain.store.cell_statistics import CellStatistics
 from warpchain.store.folder import read_rows
@@ -174,7 +174,7 @@ class SweepResult:
         """
         from warpchain.pictures.grid_figure import draw_grid
 
-        return draw_grid(self.cell_statistics(quantity), quantity_of(quantity), x=x, figure=figure)
+        return draw_grid(self.cell_statistics(quantity), quantity_of(quantity), x=full_name(x), figure=figure)
 
     def to_xarray(self) -> "xarray.Dataset | xarray.DataTree":
         """The only block as a data set, or several as a tree with one child each."""

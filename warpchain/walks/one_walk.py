@@ -8,7 +8,7 @@ from pydantic import Field
 
 from warpchain.engine.devices import gpu_turn, versions
 from warpchain.inputs.setup import Setup, check_has_joint_forces
-from warpchain.inputs.validation import InputError, checked, plain
+from warpchain.inputs.validation import InputError, checked
 from warpchain.walks.motion import LONGEST_INTERVAL, Keep
 from warpchain.walks.scheduler import compile_kernels, run_setups
 from warpchain.walks.walk_phases import Progress
@@ -58,7 +58,7 @@ def run_walk(
             **run.outcome(),
             **run.recorder.motion(),
             setup=setup,
-            seed=plain(seed),
+            seed=seed,
             versions=versions(),
             wall_time=time.perf_counter() - started,
         )
