@@ -22,7 +22,7 @@ LOADING_TIME = wp.constant(wp.float64(0.25))
 class Chain:
     """One world's constants; in a kernel also under its present loads and with its present softness.
 
-    The host fills a field from the parameter of its name, or as ``engine/constants.py`` says, or else with 0.
+    The host fills a field from the parameter of its name, or as ``Batch.set_chain`` says, or else with 0.
     """
 
     link_count: wp.int32  # n
@@ -62,10 +62,8 @@ def with_circles(chain: Chain, radius: wp.float64) -> Chain:
     return own
 
 
-CHAIN_NUMBERS: Any = Chain.numpy_dtype()  # type: ignore[attr-defined]
-"""Type of a world's constants in structured NumPy arrays."""
-CHAIN_DOUBLES: int = CHAIN_NUMBERS["itemsize"] // 8
-"""Their size, in doubles."""
+CHAIN_DOUBLES: int = Chain.numpy_dtype()["itemsize"] // 8  # type: ignore[attr-defined]
+"""Size of a world's constants, in doubles."""
 
 
 @wp.struct

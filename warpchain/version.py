@@ -11,7 +11,8 @@ FORMAT_VERSION: Final = 10
 
 
 def package_versions() -> dict[str, str]:
-    """Versions of warpchain and of the packages that may change a number; warpchain need not be installed."""
+    """Versions of all that may change a number, for the provenance of a result; warpchain need not be installed."""
     from importlib.metadata import version  # takes longer to import than the package does
+    from platform import python_version
 
-    return {"warpchain": VERSION, **{name: version(name) for name in ("warp-lang", "numpy")}}
+    return {"warpchain": VERSION, **{n: version(n) for n in ("warp-lang", "numpy")}, "python": python_version()}

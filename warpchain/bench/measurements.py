@@ -22,7 +22,7 @@ import numpy as np
 import warp as wp
 
 from warpchain.engine.batch import Batch
-from warpchain.engine.devices import gpu_turn, start_device, versions
+from warpchain.engine.devices import gpu_turn, start_device
 from warpchain.engine.processors import processors
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.options import FIBERS, Options, on_gpu
@@ -33,6 +33,7 @@ from warpchain.run.progress_bar import SweepProgress
 from warpchain.run.simulation import simulate
 from warpchain.run.sweep_run import sweep
 from warpchain.status import Status
+from warpchain.version import package_versions
 
 State = tuple[Array, Array]
 """Position (n, 3) and velocity (n, 3) of a chain."""
@@ -156,7 +157,7 @@ def machine(device: str) -> dict[str, str]:
     about = {"processor": processor, "processors": str(processors()), "system": platform.system()}
     if on_gpu(device) and device != FIBERS:
         about |= {"GPU": found.name, "CUDA driver": ".".join(map(str, wp.get_cuda_driver_version()))}
-    return about | versions() | {"scipy": version("scipy")}
+    return about | package_versions() | {"scipy": version("scipy")}
 
 
 def acceleration(position: Array, velocity: Array, parameters: Parameters) -> Array:

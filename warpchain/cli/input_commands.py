@@ -43,6 +43,7 @@ def parameters(
     from warpchain.inputs.scene import Scene
     from warpchain.inputs.setup import SECTIONS
     from warpchain.inputs.validation import FIELDS, SECTION_OF, SYMBOL_OF, dotted_name, field_limits, field_unit, shown
+    from warpchain.pictures.labels import value_text
 
     wanted = {name if name in SECTIONS else dotted_name(name, shown(name)) for name in names or SECTIONS}
     models = (parameter_preset(preset), Scene(), Options())
@@ -53,13 +54,13 @@ def parameters(
             continue
         extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
         words: Any = extra.get("enum", [word for word in get_args(field.annotation) if isinstance(word, str)])
-        bounds = ", ".join(map(_written, (True, False) if field.annotation is bool else words))
+        bounds = ", ".join(map(value_text, (True, False) if field.annotation is bool else words))
         if limits := field_limits(field):
-            lower = f"[{_written(limits['ge'])}" if "ge" in limits else f"({_written(limits.get('gt', '−∞'))}"
-            upper = f"{_written(limits['le'])}]" if "le" in limits else f"{_written(limits.get('lt', '∞'))})"
+            lower = f"[{value_text(limits['ge'])}" if "ge" in limits else f"({value_text(limits.get('gt', '−∞'))}"
+            upper = f"{value_text(limits['le'])}]" if "le" in limits else f"{value_text(limits.get('lt', '∞'))})"
             bounds = f"{lower}, {upper}"
         unit = field_unit(field).removeprefix("1")
-        rows.append((name, SYMBOL_OF.get(name, ""), _written(values[name]), unit, bounds, str(field.description)))
+        rows.append((name, SYMBOL_OF.get(name, ""), value_text(values[name]), unit, bounds, str(field.description)))
     headings = ("name", "symbol", "value", "unit", "bounds", "meaning")
     print_table(headings, rows, left=set(headings) - {"value"})
 
@@ -82,15 +83,6 @@ def schema(
         return
     write_whole(path, text)
     print(printable(str(path)))
-
-
-def _written(value: Any) -> str:
-    """A value as a sweep file has it."""
-    from warpchain.inputs.validation import short
-
-    if value is None or isinstance(value, bool):
-        return json.dumps(value)
-    return short(value) if isinstance(value, int | float) else str(value)
 
 
 def bench(

@@ -9,7 +9,6 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpchain.engine.constants import constants_of
 from warpchain.engine.control import control_of
 from warpchain.engine.devices import Gpu, start_device
 from warpchain.engine.kernel_choice import block_threads, step_kernel
@@ -20,7 +19,7 @@ from warpchain.inputs.floor import Floor
 from warpchain.inputs.link_values import LinkValues, alternating
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.scene import Scene, link_values
+from warpchain.inputs.scene import Scene, contact_radius, link_values
 from warpchain.inputs.state import Setup
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.list_layout import list_layout
@@ -47,20 +46,10 @@ CAPACITY_FRAMES = 64
 """Frames of a chain that a device can hold between two launches, if frames are kept."""
 
 
-_UNSET = (
-    *(layout.WINDOW_START, layout.STEADY_SINCE, layout.LOADED_SINCE, layout.UNLOADED_SINCE, layout.DRIFT),
-    *(layout.REST_SINCE, layout.SOFTENED_AT, layout.FELL_AT),
-    *(layout.SELF_CONTACT_AT, layout.SELF_CONTACT_BOUNCES, layout.SELF_CONTACT_FLIGHT),
-    *(layout.COLLAPSED_AT, layout.COLLAPSE_BOUNCES, layout.COLLAPSE_FLIGHT),
-    *(layout.STRANDS_MET_AT, layout.STRANDS_MET_BOUNCES, layout.STRANDS_MET_FLIGHT),
-)
-"""Entries of :attr:`State.watch` that are −1 until set."""
-
-
 def _beginning() -> dict[str, Any]:
     """Fields of :class:`State` of a chain whose clock is at zero."""
-    watch, sample = np.zeros(layout.WATCH_ROWS), np.zeros(layout.ALL_COLUMNS)
-    watch[list(_UNSET)], watch[layout.LAST_FLOOR_IMPULSE], sample[layout.TIME] = -1.0, -np.inf, -1.0
+    watch, sample = np.full(layout.WATCH_ROWS, -1.0), np.zeros(layout.ALL_COLUMNS)
+    watch[layout.GREATEST_LEAN], watch[layout.LAST_FLOOR_IMPULSE], sample[layout.TIME] = 0.0, -np.inf, -1.0
     zeros = ("time", "gap", "time_to_contact", "slack", "next_sample", "counts", "extremes", "losses", "closing_time")
     ones = ("load_factor", "is_fresh", "last_error")
     known = {"step": FIRST_STEP, "other_step": FIRST_STEP, "watch": watch, "last_sample": sample}
@@ -184,9 +173,20 @@ class Batch:
         self, world: int, parameters: Parameters, links: int, own: LinkValues | None = None, scene: Scene | None = None
     ) -> None:
         """Set a world's chain; without values of its own, links alternate, and without a scene there is no sprocket."""
-        own = own or alternating(parameters, links)
+        own, half, chains = own or alternating(parameters, links), parameters.link_length / 2, self.host["model/chains"]
+        values = vars(parameters) | {
+            "link_count": links,
+            "half_length": half,
+            "inverse_square": 1 / (half * half),
+            "mass": own.total_mass,
+            "circle_radius": own.radius.max(),
+            "inverse_smoothing": 1 / parameters.friction_smoothing,
+        }
+        if scene is not None:
+            values["sprocket_radius"] = contact_radius(scene, parameters)
+        for name in chains.dtype.names or ():
+            chains[name][world] = values.get(name, 0)
         self.links[world] = links
-        self.host["model/chains"][world] = constants_of(parameters, own, scene)
         self.host["model/links"][world, :, :links] = tuple(vars(own).values())  # in the order of the layout
 
     def set_floor(self, world: int, floor: Floor) -> None:

@@ -4,7 +4,6 @@ import concurrent.futures
 import contextlib
 import functools
 import os
-import platform
 import sys
 import tempfile
 import threading
@@ -18,7 +17,6 @@ from warpchain.engine.fibers import HeldStream
 from warpchain.engine.kernel_cache import cache_refusal
 from warpchain.inputs.options import FIBERS, on_gpu
 from warpchain.inputs.validation import InputError
-from warpchain.version import package_versions
 
 CONNECTIONS = "32"  # queues between host and GPU; with fewer than streams, streams wait for one another
 TURN_POLL = 0.2
@@ -220,8 +218,3 @@ def _without_driver_warning() -> Iterator[None]:
             for line in caught:
                 if b"NVIDIA CUDA driver" not in line:
                     os.write(2, line)
-
-
-def versions() -> dict[str, str]:
-    """Versions of the packages that may change a number, for the provenance of a result."""
-    return package_versions() | {"python": platform.python_version()}

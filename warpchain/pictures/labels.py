@@ -37,10 +37,10 @@ COUNTS: Final = ("count", "absent", "failed", "missing")
 
 
 def value_text(value: Any) -> str:
-    """A value of an axis: a number, a name, whether something is on, or null."""
-    if value is None:
-        return "null"
-    return str(value) if isinstance(value, str | bool | np.bool_) else short(value)
+    """A value as a sweep file has it: a number, a name, whether something is on, or null."""
+    if value is None or isinstance(value, bool | np.bool_):
+        return "null" if value is None else str(value).lower()
+    return value if isinstance(value, str) else short(value)
 
 
 def short_texts(values: Sequence[Any] | NDArray[Any]) -> list[str]:

@@ -18,11 +18,11 @@ from pydantic import AfterValidator, BaseModel, Field, ValidationError, Validati
 
 from warpchain.files import AnyPath, write_whole
 from warpchain.inputs import validation
-from warpchain.inputs.distributions import DRAWABLE, LARGEST_SEED, TABLE, Distribution, Gaussian, Uniform
+from warpchain.inputs.distributions import DRAWABLE, TABLE, Distribution, Gaussian, Seed, Uniform
 from warpchain.inputs.parameters import PRESETS
 from warpchain.inputs.scene import COMPOUND
 from warpchain.inputs.setup import SECTIONS
-from warpchain.inputs.validation import FIELDS, SECTION_OF, STRICT, SYMBOL_OF, InputError, ModelT, Whole, shown
+from warpchain.inputs.validation import FIELDS, SECTION_OF, STRICT, SYMBOL_OF, InputError, ModelT, shown
 from warpchain.inputs.yaml_files import read_yaml
 from warpchain.sweeps.block import CELL_LIMIT, POINT, Block, Name, Sections, Value, axis, list_of, named_axis
 from warpchain.sweeps.designs import SAMPLERS, check_design
@@ -221,7 +221,7 @@ class SweepFile(BlockKeys):
         max_length=validation.LONGEST_NAME,
         description="name of the sweep, in figures and pages; of a block, unique in its sweep",
     )
-    seed: Whole = Field(ge=0, le=LARGEST_SEED, description="whole number from which all random numbers follow")
+    seed: Seed = Field(description="whole number from which all random numbers follow")
     blocks: list[BlockOfFile] | None = Field(
         None, min_length=1, description="list of blocks; what a block does not say is taken from the file"
     )

@@ -6,9 +6,10 @@ from typing import Annotated
 
 from pydantic import Field
 
-from warpchain.engine.devices import gpu_turn, versions
+from warpchain.engine.devices import gpu_turn
 from warpchain.inputs.setup import Setup, check_has_joint_forces
 from warpchain.inputs.validation import InputError, checked
+from warpchain.version import package_versions
 from warpchain.walks.motion import LONGEST_INTERVAL, Keep
 from warpchain.walks.scheduler import compile_kernels, run_setups
 from warpchain.walks.walk_phases import Progress
@@ -59,6 +60,6 @@ def run_walk(
             **run.recorder.motion(),
             setup=setup,
             seed=seed,
-            versions=versions(),
+            versions=package_versions(),
             wall_time=time.perf_counter() - started,
         )

@@ -175,22 +175,6 @@ class WalkRun:
         before = self._before["counts"] if self._released else 0
         return dict(zip(COUNTS, (before + self._batch.host["state/counts"][self._world]).tolist(), strict=True))
 
-    @property
-    def walk_time(self) -> float:
-        """Time [s] since the release."""
-        return self._batch.time(self._world) if self._released else 0.0
-
-    @property
-    def simulated_time(self) -> float:
-        """Time [s] simulated so far."""
-        return self.drive_time + self._batch.time(self._world)
-
-    @property
-    def hold_time(self) -> float:
-        """Time [s] for which the loop was held at full frequency; NaN if it was not."""
-        end = self.drive_time if self._released else self._batch.time(self._world)
-        return max(0.0, end - self._at_full_speed) if self._has_sprocket else math.nan
-
     def progress(self) -> Progress:
         """Where the walk is."""
         now, sample = self._batch.time(self._world), self._batch.last_sample(self._world)
@@ -252,6 +236,8 @@ class WalkRun:
     def outcome(self) -> dict[str, Any]:
         """Results of the walk apart from its motion, by the names of the fields of `WalkResult`."""
         counts, greatest = self.counts, self._batch.host["state/extremes"][self._world]
+        now = self._batch.time(self._world)
+        held = (self.drive_time if self._released else now) - self._at_full_speed
         if self._released:
             greatest = np.fmax(self._before["extremes"], greatest)
         extremes = dict(zip(EXTREMES, greatest.tolist(), strict=True))
@@ -263,9 +249,9 @@ class WalkRun:
         return {
             "status": self.status,
             "dx": float(last[layout.CENTER_X]) / self._level if is_at_rest else math.nan,
-            "walk_time": self.walk_time,
-            "simulated_time": self.simulated_time,
-            "hold_time": self.hold_time,
+            "walk_time": now if self._released else 0.0,
+            "simulated_time": self.drive_time + now,
+            "hold_time": max(0.0, held) if self._has_sprocket else math.nan,
             "drift": self.drift,
             "softened_at": self._batch.watched(self._world, layout.SOFTENED_AT),
             "bounces": counts["bounces"],
