@@ -90,7 +90,7 @@ def test_one_axis_is_a_line_with_bars_and_failures(tmp_path: Path) -> None:
             {"soften_drive": [True, False], "frequency": [10, 20]},
             "soften_drive",
             "frequency",
-            "soften drive|True|False",
+            "soften drive|true|false",
         ),
         ({"links": [60, 90, 120], "frequency": [10, 20]}, "frequency", "links", "$ν$ / Hz|10|20"),
     ],

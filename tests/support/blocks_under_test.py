@@ -11,7 +11,7 @@ from tests.support.arrays import Array
 from tests.support.folded_chains import folded_chain
 from tests.support.presets import SOFT
 from tests.support.unlike_links import UnlikeLinks
-from warpchain.engine.batch import Batch
+from warpchain.engine.batch import Batch, Recorded
 from warpchain.inputs.floor import Floor, floor_from
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
@@ -29,6 +29,15 @@ HILLS = np.array([[-1.0, -0.002], [-0.02, 0.003], [0.0, -0.001], [0.015, 0.002],
 def floor_with(points: Array, parameters: Parameters | UnlikeLinks) -> Floor:
     """A profile all of whose faces have the coefficients of the parameters."""
     return floor_from(points.tolist(), 0.0, (parameters.floor_restitution, parameters.floor_friction))
+
+
+def run_recorded(batch: Batch, features: Features) -> list[Recorded]:
+    """Carry the first chain on until it stops: what each launch has recorded."""
+    pieces = []
+    while batch.status(0) == Status.RUNNING:
+        batch.launch([0], features)
+        pieces.append(batch.drain(0))
+    return pieces
 
 
 @contextmanager

@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 
 from tests.support.arrays import Array
+from tests.support.blocks_under_test import run_recorded
 from tests.support.setups import setup_walk
-from warpchain.engine.batch import Batch, Recorded
+from warpchain.engine.batch import Batch
 from warpchain.inputs.link_values import LinkValues
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import loop_speed
@@ -72,8 +73,7 @@ def hold(
         loaded_softness=softness,
         push_rate=5e3,
     )
-    pieces: list[Recorded] = []
-    batch.run([0], batch.features(fixed_body="sprocket"), lambda: pieces.append(batch.drain(0)))
+    pieces = run_recorded(batch, batch.features(fixed_body="sprocket"))
     assert batch.status(0) == Status.NOT_STEADY
     rows, times, joints, _, _ = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
     since = duration - period_of(setup)

@@ -31,7 +31,7 @@ LONGEST_LINE: Final = 200
 LONGEST_NAME: Final = 255
 """Most characters of a name that a user gives to something; a folder's name has no more."""
 _LONGEST_PATH: Final = 120
-"""Characters at the beginning of a line that stay if it is too long; one can go to a path only if it is whole."""
+"""Most characters of a path with which a line begins that is too long; one can go to a path only if it is whole."""
 _LONGEST_VALUE: Final = 60
 """Most characters of a value in a message."""
 MOST_PROBLEMS: Final = 20
@@ -317,10 +317,15 @@ def printable(text: str) -> str:
 def one_line(text: str, kind: str = "") -> str:
     """A message as one printable line of at most `LONGEST_LINE` characters, behind its kind, such as `error: `.
 
-    What is too long lacks its middle, for its end says what to do.
+    What is too long lacks its end, and the middle of a path of more than `_LONGEST_PATH` characters at its beginning.
     """
-    text, room = printable(" ".join(text.split())), LONGEST_LINE - len(kind)
-    return kind + (text if len(text) <= room else f"{text[:_LONGEST_PATH]}...{text[_LONGEST_PATH + 3 - room :]}")
+    ends = text if len(text) < 10 * LONGEST_LINE else text[: 5 * LONGEST_LINE] + text[-5 * LONGEST_LINE :]
+    text, room = printable(" ".join(ends.split())), LONGEST_LINE - len(kind)
+    where, colon, rest = text.partition(": ")
+    longest = max(_LONGEST_PATH, room - len(colon + rest))
+    if len(text) > room and len(where) > longest:
+        text = f"{where[: longest // 3]}...{where[longest // 3 + 3 - longest :]}{colon}{rest}"
+    return kind + (text if len(text) <= room else f"{text[: room - 3]}...")
 
 
 def json_value(value: Any) -> Any:

@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose
 from tests.oracle_model import motion_equations, tilting_plane
 from tests.oracle_model.circular_loop import circular_loop
 from tests.oracle_model.tilting_plane import tilted_plane
+from tests.support.blocks_under_test import run_recorded
 from tests.support.tilting_under_test import end_of, tilting_batch
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
@@ -48,14 +49,12 @@ def let_go(start, parameters, duration, longest_step=None):
     """Times [s] and tilts [rad] of samples until the end, the loop's shape still being what it was."""
     options = Options(method="dp5", tolerance=1e-6, rest_time=100.0)
     batch = tilting_batch([start], [parameters], options, duration, longest_step=longest_step, keeps_samples=True)
-    rows = []
-    features = batch.features(fixed_body="floor", tilts=True)
-    batch.run([0], features, lambda: rows.append(batch.drain(0).samples))
+    pieces = run_recorded(batch, batch.features(fixed_body="floor", tilts=True))
     assert batch.status(0) == Status.FINISHED
     position, _, plane = end_of(batch)
     assert_allclose(position[:, 2], start[0][:, 2], atol=0.02)
     assert abs(plane.turn[1]) < 0.02
-    samples = np.concatenate(rows)
+    samples = np.concatenate([piece.samples for piece in pieces])
     return samples[:, layout.TIME], np.arcsin(samples[:, layout.PLANE_COLUMN + layout.UP + 2])
 
 

@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.oracle_model import tilting_plane
 from tests.oracle_model.tilting_plane import tilt_of, tilted_plane
+from tests.support.blocks_under_test import run_recorded
 from tests.support.presets import SOFT
 from tests.support.tilted_chains import mirrored
 from tests.support.tilting_under_test import end_of, row_of, tilting_batch
@@ -47,10 +48,8 @@ def released(links=30, parameters=SOFT, tilt=0.0, **tap):
 
 def run(batch, tilts):
     """Runs the only chain to its end; samples (t, columns)."""
-    rows = []
-    features = batch.features(fixed_body="floor", tilts=tilts)
-    batch.run([0], features, lambda: rows.append(batch.drain(0).samples))
-    return np.concatenate(rows)
+    pieces = run_recorded(batch, batch.features(fixed_body="floor", tilts=tilts))
+    return np.concatenate([piece.samples for piece in pieces])
 
 
 def fall(start, parameters=SOFT, tolerance=1e-4):
