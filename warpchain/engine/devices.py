@@ -113,8 +113,8 @@ def start_device(device: str) -> Device:
 
 
 @functools.cache
-def _started(device: str) -> Device:
-    """The device, see `start_device`; two threads at once would start Warp twice and mix up stderr."""
+def _start_warp() -> None:
+    """Start Warp; two threads at once would start it twice and mix up stderr."""
     wp.config.log_level = wp.LOG_ERROR
     os.environ.setdefault("CUDA_DEVICE_MAX_CONNECTIONS", CONNECTIONS)  # CUDA reads both when it starts
     os.environ.setdefault("CUDA_MODULE_LOADING", "EAGER")  # else a kernel's first launch waits for those under way
@@ -123,6 +123,12 @@ def _started(device: str) -> Device:
             wp.init()
         except OSError as error:
             raise cache_refusal(error) from None
+
+
+@functools.cache
+def _started(device: str) -> Device:
+    """The device, see `start_device`."""
+    _start_warp()
     if device == FIBERS:
         return Fibers(wp.get_device("cpu"))
     name = "cuda:0" if device == "cuda" else device
@@ -148,7 +154,8 @@ def start_early(device: str) -> None:
 
 def gpu_count() -> int:
     """Number of GPUs that this process may use."""
-    start_device("cpu")
+    with _start_lock:
+        _start_warp()
     return int(wp.get_cuda_device_count())
 
 
