@@ -4,7 +4,7 @@ from typing import Final
 
 VERSION: Final = "0.2.0.dev0"
 
-NUMERICS_VERSION: Final = 16
+NUMERICS_VERSION: Final = 17
 """Raised by every change that changes a number of any walk; shards of two versions never mix."""
 FORMAT_VERSION: Final = 10
 """Of all files of results: sweep.h5, shards, merged files and walks."""

@@ -27,8 +27,11 @@ def on_scale(own: wp.float64, soft: wp.float64, softest: wp.float64, softness: w
 def softened(own: Chain, control: Control, softness: wp.float64) -> Chain:
     """A chain whose joints have this softness; ``own`` has its own values."""
     chain = own
-    chain.joint_stiffness = on_scale(own.joint_stiffness, control.soft_stiffness, control.softest_stiffness, softness)
-    chain.joint_damping = on_scale(own.joint_damping, control.soft_damping, control.softest_damping, softness)
+    heavier = wp.max(ONE, own.mass / (wp.float64(own.link_count) * control.soft_mass))
+    soft = heavier * control.soft_stiffness
+    chain.joint_stiffness = on_scale(own.joint_stiffness, soft, heavier * control.softest_stiffness, softness)
+    soft = heavier * control.soft_damping
+    chain.joint_damping = on_scale(own.joint_damping, soft, heavier * control.softest_damping, softness)
     chain.inverse_smoothing = between(own.inverse_smoothing, ONE / control.soft_smoothing, softness)
     chain.push_rate = wp.where(softness >= ONE, control.pile_push, ZERO)
     return chain

@@ -9,17 +9,19 @@ from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import AfterValidator, Discriminator, Field, Strict, Tag
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Strict, Tag
 
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.parameters import FRACTION, FRICTION
-from warpchain.inputs.validation import InputError
+from warpchain.inputs.validation import InputError, shown
 from warpchain.kernels import layout
 
 MOST_POINTS: Final = 256
 """Most points of a profile; each takes time where a chain is near it."""
 SHORTEST: Final = 1e-5
 """Least length of a face [m], a thousandth of a link of Table 1."""
+THINNEST: Final = 1e-3
+"""Least thickness of an upright wall [m]: circles that have sunk in by more, in a pile, touch its other side, too."""
 FARTHEST: Final = 1e4
 """Greatest coordinate of a point, where numbers still tell a thousandth of a nanometre [m]."""
 EXACT: Final = 1e-11
@@ -45,6 +47,11 @@ def _without_overhang(points: tuple[tuple[float, ...], ...]) -> tuple[tuple[floa
             raise ValueError("the first and the last face go on without end; let x rise along them")
         if number > 1 and points[number - 2][0] == next_x:
             raise ValueError(f"point {number} is the third above one another; leave the middle one out")
+    for k, ((x, low, *_), (left, high, *_), (right, top, *_), (end, deep, *_)) in enumerate(
+        zip(points, points[1:], points[2:], points[3:], strict=False), start=1
+    ):
+        if x == left and right == end and right - left < THINNEST and low < high and deep < top:
+            raise ValueError(f"the wall on points {k} and {k + 1} is thinner than {THINNEST} m; make it thicker")
     return points
 
 
@@ -59,8 +66,15 @@ _Point = Annotated[
 Points = Annotated[tuple[_Point, ...], Strict(False), Field(max_length=MOST_POINTS), AfterValidator(_without_overhang)]
 """A profile: points x, y [m], and e and μ of the line that begins there, if it has its own."""
 
+
+def _known_word(word: str) -> str:
+    if word != "flat":
+        raise ValueError(f"{shown(word)} is no floor; give flat, or points such as [[0, 0], [1, 0.1]]")
+    return word
+
+
 FloorField = Annotated[
-    Annotated[Literal["flat"], Tag("(flat)")] | Annotated[Points, Tag("(points)")],
+    Annotated[Literal["flat"], BeforeValidator(_known_word), Tag("(flat)")] | Annotated[Points, Tag("(points)")],
     Discriminator(lambda given: "(flat)" if isinstance(given, str) else "(points)"),
 ]
 """What the field `floor` of a scene may be."""

@@ -87,7 +87,7 @@ class Scene(Section):
     slope: float = number_field(0.0, "°", ge=-STEEPEST, le=STEEPEST)
     """of an endless floor; positive: it falls the way the chain walks"""
     distance_limit: float | None = number_field(None, "m", gt=0, le=HIGHEST)
-    """distance along the floor at which a walk ends as distance_limit; null: none"""
+    """distance along the floor, from x = 0 on, at which a walk ends as distance_limit; null: none"""
     walk_until: float | None = number_field(None, "s", gt=0, le=LONGEST)
     """time from the release after which a walk that is not at rest is finished, as planned, without Δx; null: none"""
     plane: Literal["fixed", "tilting"] = "fixed"

@@ -90,6 +90,7 @@ class State:
     Attributes:
         position: x, y [m] and θ [rad] of each link's centre, (n, 3). Link i's right end meets link i + 1's left end,
             the last link's the first one's. Links 0, 2, … are inner ones. If the plane tilts, places are in the plane.
+            Δx and `distance_limit` count from x = 0.
         velocity: their rates [m/s, m/s, rad/s], (n, 3).
         setup: of its walk: parameters of the chain, scene, options.
         time: since the release [s]; 0 unless it is a state of a walk.

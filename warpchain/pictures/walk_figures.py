@@ -356,8 +356,13 @@ def _moments(walk: Walk) -> list[tuple[int, str, Array]]:
             frame = min(int(np.searchsorted(walk.frame_time, moment)), last)
             found[frame] = title, spot_of(joints[frame])
     middle = np.median(joints[last, :, 0])
-    title = "rest" if walk.status is Status.AT_REST else "end"
-    found[last] = title, np.array([middle, walk.setup.floor.heights(middle)])
+    spot, half = (
+        np.array([middle, walk.setup.floor.heights(middle)]),
+        _CLOSE_UP_LINKS * walk.setup.parameters.link_length / 2,
+    )
+    if (np.abs(joints[last] - spot) < half).all(axis=1).sum() < _CLOSE_UP_LINKS / 2:  # it is in the air, or in a pit
+        spot = joints[last, np.argmin(above[last])]
+    found[last] = "rest" if walk.status is Status.AT_REST else "end", spot
     return [(frame, *found[frame]) for frame in sorted(found)]
 
 

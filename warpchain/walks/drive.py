@@ -2,10 +2,9 @@
 
 import math
 
-from warpchain.engine.control import SOFT, SOFTEST
+from warpchain.engine.control import SOFT, SOFT_MASS, SOFTEST
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.link_values import LinkValues, mean_value
-from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import joint_radius, loop_speed, settling_time
 from warpchain.inputs.setup import Setup
@@ -50,11 +49,15 @@ def drive_of(setup: Setup, links: LinkValues) -> tuple[tuple[Array, Array], dict
     side = max(0.0, scene.links * parameters.link_length / 2 - math.pi * radius)
     weight = density * parameters.gravity * side / 2  # the tension that it causes in the middle of the sides
     alternates = links.alternates  # else the loop under load is another
-    load_factor = scene.load_factor or (_suitable_load(parameters, links, options, weight) if alternates else 1.0)
+    own = parameters.joint_stiffness
+    soft, softest = (_as_soft_as(each, own, links) for each in (SOFT, SOFTEST))
+    suitable = _suitable_load(parameters, links, soft if options.soften_drive else own, weight) if alternates else 1.0
+    load_factor = scene.load_factor or suitable
     softness = loaded_softness = 0.0
     if options.soften_drive:
-        softness = _softness(parameters, tension, HOLD_STRAIN)
-        loaded_softness = _softness(parameters, tension + load_factor * weight, LOADED_STRAIN)
+        stretch = parameters.link_length * HOLD_STRAIN, parameters.link_length * LOADED_STRAIN
+        softness = _softness(own, soft, softest, tension / stretch[0])
+        loaded_softness = _softness(own, soft, softest, (tension + load_factor * weight) / stretch[1])
     period = scene.links * parameters.link_length / speed if speed > 0 else STILL_PERIOD
     window = min(max(period / 2, SHORTEST_WINDOW), LONGEST_WINDOW)
     if not alternates:  # the loop swings as it turns: only over whole turns does its mean stay
@@ -81,21 +84,22 @@ def drive_of(setup: Setup, links: LinkValues) -> tuple[tuple[Array, Array], dict
     return lay_chain(stadium(radius), scene.links, parameters.link_length, 0.0 if from_rest else speed), drive
 
 
-def _softness(parameters: Parameters, tension: float, strain: float) -> float:
-    """Softness of joints, from 1 for soft ones to 2 for the softest, that a tension [N] strains by so many lengths."""
-    wanted = tension / (strain * parameters.link_length)
-    soft = min(parameters.joint_stiffness, SOFT.joint_stiffness)  # as no joint becomes stiffer than its own
-    softest = SOFTEST.joint_stiffness
-    if soft <= softest:
+def _as_soft_as(joints: Parameters, own: float, links: LinkValues) -> float:
+    """Stiffness [N/m] of a chain's joints that are as soft as these; none becomes stiffer than its own."""
+    return min(own, max(1.0, mean_value(links.mass) / SOFT_MASS) * joints.joint_stiffness)
+
+
+def _softness(own: float, soft: float, softest: float, wanted: float) -> float:
+    """Softness of joints as stiff as wanted: from 0, their own stiffness, over 1, soft, to 2, softest, all in N/m."""
+    if softest == own or wanted <= softest:
         return 2.0
-    return 1.0 + max(0.0, math.log(soft / max(wanted, softest)) / math.log(soft / softest))
+    if wanted > soft:
+        return math.log(own / min(wanted, own)) / math.log(own / soft) if own > soft else 1.0
+    return 1.0 + math.log(soft / wanted) / math.log(soft / softest)
 
 
-def _suitable_load(parameters: Parameters, links: LinkValues, options: Options, weight: float) -> float:
+def _suitable_load(parameters: Parameters, links: LinkValues, stiffness: float, weight: float) -> float:
     """Factor by which loads are multiplied while a loop of two kinds of links becomes stationary."""
-    stiffness = parameters.joint_stiffness
-    if options.soften_drive:
-        stiffness = min(stiffness, SOFT.joint_stiffness)
     bearable = LOADED_STRAIN * stiffness * parameters.link_length
     limit = min(GREATEST_LOAD, links.greatest_load(parameters.link_length))
     return max(1.0, min(limit, bearable / weight) if weight > 0 else limit)

@@ -71,8 +71,8 @@ def bounces(time: Array, velocity: Array, setup: Setup) -> dict[str, Array]:
 
 def energy_error(at_release: ArrayLike, residual: ArrayLike) -> NDArray[np.float64]:
     """Size of the energy unaccounted for [J], relative to kinetic and potential energy at release; NaN before it."""
-    energy = np.asarray(at_release, np.float64)
-    return np.abs(residual) / np.where(energy > 0, energy, np.nan)
+    with np.errstate(divide="ignore", invalid="ignore"):  # infinite if there was none
+        return np.asarray(np.abs(residual) / np.maximum(at_release, 0.0))
 
 
 def least(value: Any) -> float:

@@ -57,7 +57,7 @@ def run_walk(
         ((_, run),) = run_setups([setup], keeps=[keep], watch=lambda run: report(run.progress()))
         return WalkResult(
             **run.outcome(),
-            **run.recorder.motion(),
+            **run.recorder.motion(run.datum),
             setup=setup,
             seed=seed,
             versions=package_versions(),

@@ -89,10 +89,11 @@ class Recorder:
             self._pieces.append(nothing._replace(samples=last[None, : nothing.samples.shape[1]].copy()))
             self._after = time
 
-    def motion(self) -> dict[str, Any]:
-        """The arrays of a `WalkResult` by name, and its `before_release`."""
+    def motion(self, datum: float = 0.0) -> dict[str, Any]:
+        """The arrays of a `WalkResult` by name, and its `before_release`; `datum`: of potential energies [J]."""
         samples, times, frames, loads, planes = self._joined(self._pieces)
         samples = even_rows(samples, (self.keep.series_every or 1) * self._batch.options.record_interval, self._after)
+        samples[:, layout.GRAVITATIONAL] -= datum
         tilting = samples if self._tilts else np.empty((0, layout.ALL_COLUMNS))
         tilt, yaw = angles(tilting[:, layout.PLANE_COLUMN :])
         return {

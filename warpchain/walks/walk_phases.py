@@ -185,15 +185,22 @@ class WalkRun:
         phase = "settle" if now < self._settled else "spin up" if now < self._at_full_speed else "hold"
         return Progress(phase, now, float(sample[layout.LOOP_SPEED]), attempts)
 
+    @property
+    def datum(self) -> float:
+        """Energy [J] of the chain's mass on the floor below the release, from which potential energies count."""
+        x = self._batch.first_sample(self._world)[layout.CENTER_X]
+        return self._links.total_mass * self.setup.parameters.gravity * float(self.setup.floor.heights(x))
+
     def energy(self) -> dict[str, float]:
         """Where the energy of the walk went [J]; NaN before the release. Keys: `walk_result.ENERGIES`."""
         first, last = self._batch.first_sample(self._world), self._batch.last_sample(self._world)
+        datum = self.datum
         lost = {name: loss for name, loss in self._batch.losses(self._world).items() if name in LOST}
         ledger = {
             "kinetic_at_release": float(first[layout.KINETIC]),
-            "potential_at_release": float(first[layout.GRAVITATIONAL] + first[layout.SPRING]),
+            "potential_at_release": float(first[layout.GRAVITATIONAL] + first[layout.SPRING]) - datum,
             "kinetic_at_end": float(last[layout.KINETIC]),
-            "potential_at_end": float(last[layout.GRAVITATIONAL] + last[layout.SPRING]),
+            "potential_at_end": float(last[layout.GRAVITATIONAL] + last[layout.SPRING]) - datum,
             **lost,
         }
         at_release = ledger["kinetic_at_release"] + ledger["potential_at_release"]
@@ -358,7 +365,8 @@ def state_at(setup: Setup, t: object, end: float) -> State:
     if np.isnan(end):
         raise InputError("t: the walk ended before its release, and has no such time; see its status")
     if setup.start is None and 0 <= time < first:
-        raise InputError(f"t: {time:g} s: the sprocket is there until {first:g} s, and a state has none; give more")
+        remedy = "give more" if end >= first else f"but the walk ends at {end:g} s: it has no state"
+        raise InputError(f"t: {time:g} s: the sprocket is there until {first:g} s, and a state has none; {remedy}")
     if not first <= time <= end:
         raise InputError(f"t: {time:g} s is not in the walk; give a time from {first:g} to {end:.6g}")
     with gpu_turn([setup.options.device]):

@@ -49,7 +49,7 @@ _NEVER: Final = "NaN if it never was"
 
 ENERGIES: Final = {
     "kinetic_at_release": "kinetic energy at release",
-    "potential_at_release": "energy of gravity and joint springs at release",
+    "potential_at_release": "energy of gravity, from the floor below the release, and joint springs at release",
     "kinetic_at_end": "kinetic energy at the end",
     "potential_at_end": "energy of gravity and joint springs at the end",
     **LOST,
@@ -81,7 +81,9 @@ class WalkResult:
     status: Status
     dx: Annotated[
         float,
-        Stored("m", "x of the centre of mass less x of the sprocket, on a slope along the floor; NaN unless at rest"),
+        Stored(
+            "m", "x of the centre of mass from the sprocket (x = 0) on, on a slope along the floor; NaN unless at rest"
+        ),
     ]
     walk_time: Annotated[float, Stored("s", "from the release to the end")]
     simulated_time: Annotated[float, Stored("s", "simulated, the phases before the release included")]
@@ -142,7 +144,7 @@ class WalkResult:
     center: Annotated[Array, Stored("m", "centre of mass x, y", "t 2")]
     center_velocity: Annotated[Array, Stored("m/s", "velocity of the centre of mass x, y", "t 2")]
     kinetic_energy: Annotated[Array, Stored("J", "kinetic energy", "t")]
-    gravitational_energy: Annotated[Array, Stored("J", "energy in the field of gravity", "t")]
+    gravitational_energy: Annotated[Array, Stored("J", "energy of gravity, from the floor below the release", "t")]
     spring_energy: Annotated[Array, Stored("J", "energy of the joint springs", "t")]
     lowest: Annotated[Array, Stored("m", "height of the lowest point of all circles", "t")]
     rms_speed: Annotated[Array, Stored("m/s", "root mean square speed of the links", "t")]
