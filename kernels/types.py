@@ -174,7 +174,7 @@ class Control:
     soft_smoothing: wp.float64  # ω_c [rad/s]
     softest_stiffness: wp.float64  # k of the softest joints, whose ω_c is that of soft ones
     softest_damping: wp.float64  # b of the softest joints [N s/m]
-    soft_mass: wp.float64  # mean mass of links [kg] above which these k and b grow with it
+    soft_mass: wp.float64  # mean mass of links [kg] that these k and b are for
     soft_contact_step: wp.float64  # contact_step of the softest joints, in the drive also of soft ones [s]
     pile_push: wp.float64  # push_rate of a chain with soft or softer joints [1/s]
     soften_area: wp.float64  # joints soften when the area falls below this fraction of the first

@@ -10,27 +10,12 @@ from warpchain.kernels.methods.explicit_tableaus import HYBRID, HYBRID_SPRINGS, 
 
 @dataclass(frozen=True)
 class Method:
-    """One method."""
+    """One method. Rigid flights run on CPUs only, have no joint forces to be read, and keep planes fixed."""
 
     name: str  # what a user writes for ``method``
     title: str  # one line for help texts
     tableau: Tableau  # of its steps on springs
-    has_rigid_flight: bool  # whether joints are rigid between impulses
-
-    @property
-    def runs_on_gpus(self) -> bool:
-        """Whether it has a GPU kernel. That of rigid flights was written, and saved no time."""
-        return not self.has_rigid_flight
-
-    @property
-    def has_joint_forces(self) -> bool:
-        """Whether a force stands in every joint at any time: rigid flights have no springs that could be read."""
-        return not self.has_rigid_flight
-
-    @property
-    def can_tilt(self) -> bool:
-        """Whether it carries chains whose plane tilts: rigid flights know nothing of the plane."""
-        return not self.has_rigid_flight
+    has_rigid_flight: bool  # whether joints are rigid between impulses; a GPU kernel of them saved no time
 
 
 def method_names() -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from warpchain.kernels.physics.elementary import ONE, ZERO
+from warpchain.kernels.physics.elementary import ONE, TWO, ZERO
 from warpchain.kernels.types import Chain, Control
 
 
@@ -27,7 +27,8 @@ def on_scale(own: wp.float64, soft: wp.float64, softest: wp.float64, softness: w
 def softened(own: Chain, control: Control, softness: wp.float64) -> Chain:
     """A chain whose joints have this softness; ``own`` has its own values."""
     chain = own
-    heavier = wp.max(ONE, own.mass / (wp.float64(own.link_count) * control.soft_mass))
+    heavier = own.mass / (wp.float64(own.link_count) * control.soft_mass)
+    heavier = wp.where(heavier > TWO, heavier, ONE)  # so that no bit depends on small differences
     soft = heavier * control.soft_stiffness
     chain.joint_stiffness = on_scale(own.joint_stiffness, soft, heavier * control.softest_stiffness, softness)
     soft = heavier * control.soft_damping

@@ -10,7 +10,7 @@ from warpchain.kernels.methods.method import find_method
 def test_words_mean_methods_that_the_device_has() -> None:
     """`standard` on a GPU is `explicit`; a word's tolerance of soft joints goes with the word's own tolerance only."""
     for word in METHODS_BY_NEED:
-        assert find_method(Options(method=word, device="cuda").method).runs_on_gpus
+        assert not find_method(Options(method=word, device="cuda").method).has_rigid_flight
     assert Options(device="cuda") == Options(method="explicit", device="cuda")
 
 

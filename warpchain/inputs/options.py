@@ -123,7 +123,7 @@ class Options(Section):
 
     @model_validator(mode="after")
     def _goes_together(self) -> Self:
-        if on_gpu(self.device) and not find_method(self.method).runs_on_gpus:
+        if on_gpu(self.device) and find_method(self.method).has_rigid_flight:
             raise InputError(f"method: {shown(self.method)} runs on a CPU only; give explicit, or device: cpu")
         if self.smallest_step >= self.contact_step:
             raise InputError(f"smallest_step: {self.smallest_step} s is not below contact_step; give less")

@@ -72,13 +72,13 @@ def combined(preset: str, parameters: Parameters, scene: Scene, options: Options
 
 def _check_can_tilt(scene: Scene, options: Options) -> None:
     """Check that the method carries chains whose plane tilts, if that of the scene does; else an `InputError`."""
-    if scene.plane == "tilting" and not find_method(options.method).can_tilt:
+    if scene.plane == "tilting" and find_method(options.method).has_rigid_flight:
         raise InputError(f"options.method: {shown(options.method)} keeps planes fixed; give explicit, or plane: fixed")
 
 
 def check_has_joint_forces(options: Options) -> None:
     """Check that the method has forces in the joints that can be recorded; else an `InputError`."""
-    if not find_method(options.method).has_joint_forces:
+    if find_method(options.method).has_rigid_flight:
         raise InputError(f"options.method: {shown(options.method)} has rigid joints, without forces; give explicit")
 
 

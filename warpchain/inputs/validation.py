@@ -46,8 +46,8 @@ MOST_VALUES: Final = 100_000
 class InputError(ValueError):
     """Input that the user can correct; its text is `path.of.field: what is wrong; what to do`, in one line.
 
-    A call that checks several values at once, `warpchain.sweep`, has a line for each. A line has at most
-    `LONGEST_LINE` characters, all of them printable, whatever was given.
+    Several refused values of a sweep have a line each. A line has at most `LONGEST_LINE` characters, all of them
+    printable, whatever was given.
     """
 
     def __init__(self, *problems: str) -> None:

@@ -28,10 +28,8 @@ GROUND: Final = "#E3E3E3"
 """The floor, and shaded areas."""
 
 DASHES: Final[Any] = (0, (4, 3))
-"""A dashed line, as matplotlib takes it."""
-
 DOTS: Final[Any] = (0, (1, 1.5))
-"""A dotted line, as matplotlib takes it."""
+"""A dashed and a dotted line, as matplotlib takes them."""
 
 
 class NothingToShow(InputError):  # noqa: N818 - no error of the program: the sweep was made for something else

@@ -9,12 +9,12 @@ import math
 import os
 import re
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Final, TypeVar
+from typing import Annotated, Any, Final
 
 import numpy as np
 from pydantic import Field
@@ -50,8 +50,8 @@ from warpchain.walks.landmarks import LENGTHS
 from warpchain.walks.rows import MISSING, derived_columns, faults_of_columns, fill_row, missing_rows
 from warpchain.walks.scheduler import compile_kernels, run_setups
 
-T = TypeVar("T")
-Task = Future[None]
+Tasks = Iterator[tuple[Future[None], list[Shard]]]
+"""Work that is handed out, and the shards that it writes."""
 
 KEYS: Final = (*BlockKeys.model_fields, "same_samples_along", "record", "name", "seed")
 """Keys of a sweep file that are keywords."""
@@ -64,10 +64,8 @@ GPU_TASK_WALKS = 262144
 PASSES = 8
 """Times that a sweep on a CPU is gone through."""
 SHARDS = 32
-"""Least number of shards of a sweep, about, if it has as many walks: the grain of a restart.
-
-With 128 the 504 walks of Figure 6 took 5.7 s on an H200, with 20 4.9 s: files of three walks take longer than walks.
-"""
+"""Least number of shards of a sweep, about, if it has as many walks: the grain of a restart. Files of very few walks
+would take longer than the walks."""
 
 
 @takes_fields("scene", "parameters", "options", beside=KEYS)
@@ -141,31 +139,16 @@ def sweep(
 def _checked_call(
     source: Source | None, out: AnyPath | None, given: Values, device: str | None, workers: int | None, part: str | None
 ) -> tuple[Sweep, Path, Part, int | None]:
-    """The sweep on its device, its folder, its part, and the number of workers; an `InputError` for all refused."""
-    problems: list[str] = []
-
-    def gathered(check: Callable[[], T]) -> T | None:
-        try:
-            return check()
-        except InputError as error:
-            problems.extend(error.args)
-            return None
-
-    def plan() -> Sweep:
-        found = sweep_of_keywords(settings, folder) if source is None else load_sweep(source, **replaced)
-        return found if device is None else on_device(found, device)
-
+    """The sweep on its device, its folder, its part, and the number of workers; an `InputError` if one is refused."""
     settings = {name: value for name, value in given.items() if value is not None or name not in (*KEYS, *OF_WALKS)}
     replaced = {name: plain(settings[name], name) for name in ("seed", "samples") if name in settings}
     if source is not None and (others := [name for name in settings if name not in replaced]):
         names = ", ".join(others)
-        problems.append(f"{names}: given together with a source; leave one out, or write it into the source")
-    folder = gathered(lambda: checked_path(out, "out"))
-    count = gathered(lambda: checked(workers, "workers", Annotated[Whole, Field(ge=1)] | None))
-    own, planned = gathered(lambda: checked_part(part)), gathered(plan)
-    if problems or planned is None or folder is None or own is None:
-        raise InputError(*problems)
-    return planned, folder, own, count
+        raise InputError(f"{names}: given together with a source; leave one out, or write it into the source")
+    folder, own = checked_path(out, "out"), checked_part(part)
+    count = checked(workers, "workers", Annotated[Whole, Field(ge=1)] | None)
+    planned = sweep_of_keywords(settings, folder) if source is None else load_sweep(source, **replaced)
+    return planned if device is None else on_device(planned, device), folder, own, count
 
 
 def sweep_of_keywords(given: Values, out: AnyPath | None) -> Sweep:
@@ -290,12 +273,7 @@ def run_shards(planned: Sweep, directory: str, seal: str, shards: Sequence[Shard
 
 
 def _follow(
-    tasks: Iterator[tuple[Task, list[Shard]]],
-    at_once: int,
-    pulse: Pulse,
-    store: SweepFolder,
-    progress: SweepProgress,
-    report: OnProgress,
+    tasks: Tasks, at_once: int, pulse: Pulse, store: SweepFolder, progress: SweepProgress, report: OnProgress
 ) -> None:
     """Ask for so many tasks at once, so that memory does not grow with the sweep, and count the shards they write.
 
@@ -305,7 +283,7 @@ def _follow(
     began, written, blocks = time.perf_counter(), 0, store.manifest.sweep.blocks
     folder, left = store.directory / "shards", {shard.name: shard for shard in store.missing()}
     lengths = {name: np.concatenate([block.parameter(name).ravel() for block in blocks]) for name in LENGTHS}
-    pending: dict[Task, list[Shard]] = {}
+    pending: dict[Future[None], list[Shard]] = {}
     try:
         while True:
             with losses_named():

@@ -86,7 +86,8 @@ def drive_of(setup: Setup, links: LinkValues) -> tuple[tuple[Array, Array], dict
 
 def _as_soft_as(joints: Parameters, own: float, links: LinkValues) -> float:
     """Stiffness [N/m] of a chain's joints that are as soft as these; none becomes stiffer than its own."""
-    return min(own, max(1.0, mean_value(links.mass) / SOFT_MASS) * joints.joint_stiffness)
+    heavier = mean_value(links.mass) / SOFT_MASS
+    return min(own, (heavier if heavier > 2 else 1.0) * joints.joint_stiffness)
 
 
 def _softness(own: float, soft: float, softest: float, wanted: float) -> float:

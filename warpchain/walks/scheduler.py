@@ -27,9 +27,8 @@ SHARED_THREADS = 192
 SHARED_WALKS = 2000
 """Most walks that share such blocks; of more, each has a block of its own size.
 
-Kernels for blocks of different sizes compete for the instruction cache of a multiprocessor. With older kernels the 504
-walks of Figure 6 (60 to 180 links, os32, one H200) took 6.4 s in blocks of five sizes and 5.3 s in blocks of 192
-threads, some of them idle; 1008 walks 10.8 and 8.5 s, 2016 walks 15.8 and 15.5 s.
+Kernels for blocks of different sizes compete for the instruction cache of a multiprocessor: the 504 walks of Figure 6
+took a fifth longer in blocks of five sizes than in blocks of 192 threads, some of them idle; 2016 walks took as long.
 """
 BATCHES_PER_GPU = 4
 """While the host handles one of them, the others go on and fill the device."""
