@@ -83,7 +83,7 @@ REFUSED: dict[Callable[..., object], list[tuple[dict[str, Any], str]]] = {
         ({"times": []}, "times: give rising instants between 0 and the duration of 1.0 s"),
         ({"times": [0.0, 1.5]}, "times: give rising instants .*"),
         ({"times": [0.5, 0.5]}, "times: give rising instants .*"),
-        ({"floor": "no"}, r"floor: Input should be 'flat'; given 'no'"),
+        ({"floor": "no"}, r"floor: 'no' is no floor; give flat, or points .*"),
         ({"gravity": 0.0}, "gravity: Input should be a valid boolean; given 0.0"),
     ],
     walk: [

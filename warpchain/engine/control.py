@@ -9,11 +9,9 @@ from warpchain.kernels.types import Control
 SOFT = preset("soft")
 """Parameters of soft joints, see :mod:`warpchain.kernels.events.softening`."""
 SOFTEST = SOFT.with_values({"joint_stiffness": 1e6, "joint_damping": 30.0})
-"""Parameters of the softest joints.
-
-From half of the loop's first area on, walks on them end within 0.01 ± 0.04 mm (60 links at 15 Hz) and 1.5 ± 1.5 mm (150
-at 20 Hz) of those on joints of their own, in 2.7 times fewer attempts. On k = 3e5 N/m circles sink 2 mm into the floor;
-from 0.9 of the area on, 1e6 N/m may shift Δx, by 8 ± 4 mm of 1 m.
+"""Parameters of the softest joints. From half of the loop's first area on, walks on them end within 0.01 ± 0.04 mm (60
+links at 15 Hz) and 1.5 ± 1.5 mm (150 at 20 Hz) of those on joints of their own, in 2.7 times fewer attempts. On k = 3e5
+N/m circles sink 2 mm into the floor; from 0.9 of the area on, 1e6 N/m may shift Δx, by 8 ± 4 mm of 1 m.
 """
 SOFT_MASS = (SOFT.inner_mass + SOFT.outer_mass) / 2
 """Mean mass of links [kg] for which these k and b are meant. From twice as much on they grow with it: else a chain with

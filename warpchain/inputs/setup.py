@@ -8,13 +8,13 @@ from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import replace
 from typing import Any, Final, TypeVar
 
-from warpchain.inputs.distributions import TABLE, draw, placed, random_generator
+from warpchain.inputs.distributions import TABLE, Seed, draw, placed, random_generator
 from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL, Options, replaced_by
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.parameters import preset as parameter_preset
 from warpchain.inputs.scene import OF_LINKS, Scene, check_links, check_links_on_gpu, check_parity, check_scene
 from warpchain.inputs.state import DEFAULT_PRESET, Setup, State
-from warpchain.inputs.validation import InputError, Section, shown, validated
+from warpchain.inputs.validation import InputError, Section, checked, shown, validated
 from warpchain.kernels.methods.method import find_method
 
 __all__ = ["DEFAULT_PRESET", "Setup", "Values", "combined", "continued", "options_beside", "resolve"]
@@ -40,13 +40,13 @@ def resolve(
     From the seed's generator come first the parameters, then phase and clearance, of what is not given, as in the first
     walk of a sweep. An `InputError` has one line with the field's path and the remedy.
     """
-    checked = validated(Scene, scene, "scene")
+    whole = validated(Scene, scene, "scene")
     changed = parameter_preset(preset).with_values(parameters)
-    setup = combined(preset, changed, checked, options_beside(checked.plane, options, loads))
+    setup = combined(preset, changed, whole, options_beside(whole.plane, options, loads))
     if seed is None:
         return setup
     drawn = {name: distribution for name, distribution in TABLE.items() if name not in {*scene, *parameters}}
-    return setup.with_drawn(draw(placed(drawn, setup), random_generator(seed)))
+    return setup.with_drawn(draw(placed(drawn, setup), random_generator(checked(seed, "seed", Seed))))
 
 
 def options_beside(plane: str, options: Values, loads: bool = False) -> Options:
@@ -74,12 +74,6 @@ def _check_can_tilt(scene: Scene, options: Options) -> None:
     """Check that the method carries chains whose plane tilts, if that of the scene does; else an `InputError`."""
     if scene.plane == "tilting" and find_method(options.method).has_rigid_flight:
         raise InputError(f"options.method: {shown(options.method)} keeps planes fixed; give explicit, or plane: fixed")
-
-
-def check_has_joint_forces(options: Options) -> None:
-    """Check that the method has forces in the joints that can be recorded; else an `InputError`."""
-    if find_method(options.method).has_rigid_flight:
-        raise InputError(f"options.method: {shown(options.method)} has rigid joints, without forces; give explicit")
 
 
 def continued(state: State, sections: Mapping[str, Values]) -> Setup:

@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -51,7 +52,6 @@ from warpchain.walks.rows import MISSING, derived_columns, faults_of_columns, fi
 from warpchain.walks.scheduler import compile_kernels, run_setups
 
 Tasks = Iterator[tuple[Future[None], list[Shard]]]
-"""Work that is handed out, and the shards that it writes."""
 
 KEYS: Final = (*BlockKeys.model_fields, "same_samples_along", "record", "name", "seed")
 """Keys of a sweep file that are keywords."""
@@ -64,8 +64,7 @@ GPU_TASK_WALKS = 262144
 PASSES = 8
 """Times that a sweep on a CPU is gone through."""
 SHARDS = 32
-"""Least number of shards of a sweep, about, if it has as many walks: the grain of a restart. Files of very few walks
-would take longer than the walks."""
+"""Least number of shards of a sweep, about, if it has as many walks: the grain of a restart."""
 
 
 @takes_fields("scene", "parameters", "options", beside=KEYS)
@@ -139,16 +138,28 @@ def sweep(
 def _checked_call(
     source: Source | None, out: AnyPath | None, given: Values, device: str | None, workers: int | None, part: str | None
 ) -> tuple[Sweep, Path, Part, int | None]:
-    """The sweep on its device, its folder, its part, and the number of workers; an `InputError` if one is refused."""
+    """The sweep on its device, its folder, its part, and the number of workers; an `InputError` for all refused."""
+
+    def plan() -> Sweep:
+        planned = load_sweep(source, **replaced) if source is not None else sweep_of_keywords(settings, out)
+        return planned if device is None else on_device(planned, device)
+
+    problems, found = list[str](), list[Any]()
     settings = {name: value for name, value in given.items() if value is not None or name not in (*KEYS, *OF_WALKS)}
     replaced = {name: plain(settings[name], name) for name in ("seed", "samples") if name in settings}
     if source is not None and (others := [name for name in settings if name not in replaced]):
         names = ", ".join(others)
-        raise InputError(f"{names}: given together with a source; leave one out, or write it into the source")
-    folder, own = checked_path(out, "out"), checked_part(part)
-    count = checked(workers, "workers", Annotated[Whole, Field(ge=1)] | None)
-    planned = sweep_of_keywords(settings, folder) if source is None else load_sweep(source, **replaced)
-    return planned if device is None else on_device(planned, device), folder, own, count
+        problems.append(f"{names}: given together with a source; leave one out, or write it into the source")
+    at_least_one = Annotated[Whole, Field(ge=1)] | None
+    checks = plan, partial(checked_path, out, "out"), partial(checked_part, part)
+    for check in (*checks, partial(checked, workers, "workers", at_least_one)):
+        try:
+            found.append(check())
+        except InputError as error:
+            problems += error.args
+    if problems:
+        raise InputError(*problems)
+    return found[0], found[1], found[2], found[3]
 
 
 def sweep_of_keywords(given: Values, out: AnyPath | None) -> Sweep:
@@ -157,7 +168,8 @@ def sweep_of_keywords(given: Values, out: AnyPath | None) -> Sweep:
     They are `KEYS`, and fields of a walk by name or symbol; a list or a range is an axis of the grid, behind those
     given. Left out, the name is that of the folder, the seed 0, and the preset that of a walk, unless it is an axis.
     """
-    usual = {"name": (Path(out).absolute().name if out is not None else "") or "sweep", "seed": 0, "version": VERSION}
+    name = Path(out).absolute().name if isinstance(out, str | os.PathLike) else ""
+    usual = {"name": name or "sweep", "seed": 0, "version": VERSION}
     values = plain(given, "sweep")
     content: dict[str, Any] = usual | {key: values.pop(key) for key in KEYS if key in values}
     by_section(values)  # refuses unknown names

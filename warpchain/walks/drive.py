@@ -24,10 +24,7 @@ makes it stationary in two thirds of the time, in steps that are shorter by as m
 PUSH = 0.25
 """Part of its depth by which the sprocket pushes a circle out in the longest step near a contact."""
 FASTEST_PUSH = 5e3
-"""Greatest rate [1/s] of that push.
-
-With it circles of 60 to 180 links at 5 to 30 Hz sink in by 0.1 mm at most under load, without it by 0.3 mm and more.
-"""
+"""Greatest rate [1/s] of that push, with which circles sink in by 0.1 mm at most, without it by 0.3 mm and more."""
 STILL_PERIOD = 0.25
 """Loop period [s] that is assumed when the sprocket stands still."""
 SHORTEST_WINDOW, LONGEST_WINDOW = 0.05, 0.25
@@ -55,9 +52,9 @@ def drive_of(setup: Setup, links: LinkValues) -> tuple[tuple[Array, Array], dict
     load_factor = scene.load_factor or suitable
     softness = loaded_softness = 0.0
     if options.soften_drive:
-        stretch = parameters.link_length * HOLD_STRAIN, parameters.link_length * LOADED_STRAIN
-        softness = _softness(own, soft, softest, tension / stretch[0])
-        loaded_softness = _softness(own, soft, softest, (tension + load_factor * weight) / stretch[1])
+        pull, length = tension + load_factor * weight, parameters.link_length
+        softness = _softness(own, soft, softest, tension / (HOLD_STRAIN * length))
+        loaded_softness = _softness(own, soft, softest, pull / (LOADED_STRAIN * length))
     period = scene.links * parameters.link_length / speed if speed > 0 else STILL_PERIOD
     window = min(max(period / 2, SHORTEST_WINDOW), LONGEST_WINDOW)
     if not alternates:  # the loop swings as it turns: only over whole turns does its mean stay

@@ -7,8 +7,9 @@ from typing import Annotated
 from pydantic import Field
 
 from warpchain.engine.devices import gpu_turn
-from warpchain.inputs.setup import Setup, check_has_joint_forces
+from warpchain.inputs.setup import Setup
 from warpchain.inputs.validation import InputError, checked
+from warpchain.kernels.methods.method import find_method
 from warpchain.version import package_versions
 from warpchain.walks.motion import LONGEST_INTERVAL, Keep
 from warpchain.walks.scheduler import compile_kernels, run_setups
@@ -19,8 +20,6 @@ _INTERVAL = Annotated[float, Field(ge=1e-6, lt=LONGEST_INTERVAL)]  # as between 
 _BEFORE = Annotated[float, Field(ge=0, le=LONGEST_INTERVAL)]
 RECORD_BEFORE = 0.5
 """Time [s] before the release that is kept if frames are, unless told otherwise."""
-
-
 OnProgress = Callable[[Progress], None]
 
 
@@ -39,8 +38,9 @@ def run_walk(
     if interval is None and (before or record_loads):
         name = "record_before" if before else "record_loads"
         raise InputError(f"{name}: kept with frames, but frame_interval is None; give a frame_interval as well")
-    if record_loads:
-        check_has_joint_forces(setup.options)
+    method = setup.options.method
+    if record_loads and find_method(method).has_rigid_flight:
+        raise InputError(f"options.method: {method!r} has rigid joints, without forces; give explicit")
     samples = 0.0 if interval is None else interval / setup.options.record_interval
     keep = Keep(
         series_every=1,
