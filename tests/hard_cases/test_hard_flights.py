@@ -234,13 +234,7 @@ def test_any_smoothing_of_friction(method, smoothing):
 
 @pytest.mark.parametrize(
     ("method", "tolerance", "bound"),
-    [
-        ("rkf78", 1e-8, 1e-5),
-        ("dp5", 1e-8, 5e-5),
-        ("bs32", 1e-7, 3e-3),
-        ("os32", 1e-7, 3e-3),
-        ("hybrid", 1e-7, 3e-3),
-    ],
+    [("rkf78", 1e-8, 1e-5), ("dp5", 1e-8, 5e-5), ("bs32", 1e-7, 3e-3), ("os32", 1e-7, 3e-3), ("hybrid", 1e-7, 3e-3)],
 )
 def test_elastic_bouncing_keeps_the_energy_for_a_second(method, tolerance, bound):
     """Without any dissipation a bouncing chain keeps its energy and its momentum along the floor over 1 s.

@@ -97,10 +97,7 @@ STILL = [0.1, 0, 0, 0]
             "most 0.002 s, or ",
         ),
         ({"contact_step": 1e-13}, "options.smallest_step: 1e-12 s is not below contact_step; give less"),
-        (
-            {"circle_radius": 0.007},
-            "parameters.circle_radius: 0.007 is not below half a link, 0.00634; give less",
-        ),
+        ({"circle_radius": 0.007}, "parameters.circle_radius: 0.007 is not below half a link, 0.00634; give less"),
         ({"ell": 12.68, "r": 5e-3}, "parameters.link_length: 1000 times Table 1's; give 0.01268 m"),
         ({"m_inner": 3.7}, "parameters.inner_mass: 1000 times Table 1's; give 0.0037 kg"),
         # links that are unlike

@@ -112,12 +112,7 @@ def resolve_contacts(
     counts = {"floor": 0, "sprocket": 0, "self": 0}
 
     def collide(
-        a: int | None,
-        b: int,
-        point: Array,
-        normal: Array,
-        law: tuple[float, float],
-        surface: Array | None = None,
+        a: int | None, b: int, point: Array, normal: Array, law: tuple[float, float], surface: Array | None = None
     ) -> bool:
         """Resolve one contact of link b with link a, or with a surface of the given velocity (at rest if None)."""
         lever_a, lever_b = np.zeros(2), point - position[b, :2]

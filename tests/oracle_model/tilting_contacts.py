@@ -56,12 +56,7 @@ class FloorPass:
 
 
 def tilting_collision_impulse(
-    v: Array,
-    normal: Array,
-    w: Array,
-    restitution: float,
-    friction: float,
-    tangential_restitution: float,
+    v: Array, normal: Array, w: Array, restitution: float, friction: float, tangential_restitution: float
 ) -> Array:
     """Chatterjee–Ruina law in three dimensions: the impulse P on the body that meets the floor.
 
@@ -110,13 +105,7 @@ def plane_share(point: Array) -> Array:
 
 
 def touching_point(
-    centre: Array,
-    position: Array,
-    velocity: Array,
-    plane: Plane,
-    rates: Array,
-    radius: float,
-    half_width: float,
+    centre: Array, position: Array, velocity: Array, plane: Plane, rates: Array, radius: float, half_width: float
 ) -> Array | None:
     """Where the floor pushes a roller, (X, Y, ζ) in m, or None if it doesn't touch.
 

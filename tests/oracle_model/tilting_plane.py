@@ -167,12 +167,7 @@ def plane_force(position: Array, velocity: Array, plane: Plane, parameters: Para
 
 
 def tilting_acceleration(
-    position: Array,
-    velocity: Array,
-    plane: Plane,
-    parameters: Parameters,
-    *,
-    half_width: float,
+    position: Array, velocity: Array, plane: Plane, parameters: Parameters, *, half_width: float
 ) -> tuple[Array, Array]:
     """Equations of motion of the free chain and its plane, not split.
 
@@ -250,12 +245,7 @@ def tilting_kinetic_energy(
 
 
 def tilting_energy(
-    position: Array,
-    velocity: Array,
-    plane: Plane,
-    parameters: Parameters,
-    *,
-    half_width: float,
+    position: Array, velocity: Array, plane: Plane, parameters: Parameters, *, half_width: float
 ) -> float:
     """Kinetic, spring and gravitational energy (zero on the floor), J."""
     energy = tilting_kinetic_energy(position, velocity, plane, parameters, half_width=half_width)

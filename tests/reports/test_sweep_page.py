@@ -169,11 +169,7 @@ def test_walk_is_run_again(folder: Path, tmp_path: Path, monkeypatch: pytest.Mon
 
 @pytest.mark.parametrize(
     ("index", "dx", "text"),
-    [
-        (0, 9.0, "another result, Δx = "),
-        (1, 9.0, "another result, time_limit"),
-        (17, 9.0, "has not run it yet"),
-    ],
+    [(0, 9.0, "another result, Δx = "), (1, 9.0, "another result, time_limit"), (17, 9.0, "has not run it yet")],
 )
 @pytest.mark.usefixtures("no_figures")
 def test_another_result_is_admitted(

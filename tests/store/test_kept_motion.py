@@ -17,10 +17,7 @@ from warpchain.walks.motion import Keep
 from warpchain.walks.scheduler import run_setups
 
 OFTEN = {"method": "dp5", "record_interval": 1e-4}
-RECORD: dict[str, Any] = {
-    "series": {"interval": 1e-4, "samples": [0, 3]},
-    "frames": {"interval": 5e-4, "samples": [3]},
-}
+RECORD: dict[str, Any] = {"series": {"interval": 1e-4, "samples": [0, 3]}, "frames": {"interval": 5e-4, "samples": [3]}}
 KEPT: dict[str, Any] = TINY | {"samples": 5, "options": OFTEN, "record": RECORD}
 
 

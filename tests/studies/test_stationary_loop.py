@@ -16,12 +16,7 @@ from studies.stationary_loop.theory import bending_inertia, catenary_between, im
 def held_walk() -> warpchain.WalkResult:
     """60 links, held on their sprocket at 20 Hz for 25 s."""
     return warpchain.walk(
-        frequency=20.0,
-        preset="soft",
-        start="spinning",
-        steady_time=25.0,
-        steady_tolerance=1.0,
-        walk_limit=1e-3,
+        frequency=20.0, preset="soft", start="spinning", steady_time=25.0, steady_tolerance=1.0, walk_limit=1e-3
     )
 
 

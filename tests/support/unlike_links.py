@@ -36,11 +36,6 @@ class UnlikeLinks:
 def unlike_links(links: int, parameters: Parameters, seed: int = 1) -> UnlikeLinks:
     """Links and joints with 0.3 to 3 times the values of the inner ones, and circles of 0.4 to 1 times the radius."""
     generator = np.random.default_rng(seed)
-    usual = (
-        parameters.inner_mass,
-        parameters.inner_inertia,
-        parameters.viscous_friction,
-        parameters.coulomb_friction,
-    )
+    usual = (parameters.inner_mass, parameters.inner_inertia, parameters.viscous_friction, parameters.coulomb_friction)
     values = [value * generator.uniform(0.3, 3.0, links) for value in usual]
     return UnlikeLinks(parameters, LinkValues(*values, parameters.circle_radius * generator.uniform(0.4, 1.0, links)))

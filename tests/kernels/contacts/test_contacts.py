@@ -15,15 +15,7 @@ TURNING = -90.0
 HUB = (np.zeros(2), PAPER.sprocket_radius, TURNING)
 
 # n, seed, tilt: from the shortest chain to the paper's, in random walks and in flat piles
-HEAPS = [
-    (4, 1, np.pi),
-    (6, 2, np.pi),
-    (8, 3, np.pi),
-    (8, 4, 0.2),
-    (60, 5, np.pi),
-    (60, 6, 0.2),
-    (150, 7, np.pi),
-]
+HEAPS = [(4, 1, np.pi), (6, 2, np.pi), (8, 3, np.pi), (8, 4, 0.2), (60, 5, np.pi), (60, 6, 0.2), (150, 7, np.pi)]
 
 
 def placed_heap(n, seed, tilt, parameters=PAPER):
@@ -67,11 +59,7 @@ def test_each_kind_alone_equals_reference(kind):
     heaps = [placed_heap(n, n + i, np.pi, with_random_coefficients(i)) for i in range(12) for n in (8, 20)]
     contact_pass = ContactPass(heaps, sprocket_speed=TURNING)
     results = contact_pass.run({"floor": FLOOR, "sprocket": SPROCKET, "self": LIST | SELF}[kind])
-    chosen = {
-        "floor": kind == "floor",
-        "sprocket": HUB if kind == "sprocket" else None,
-        "self_contact": kind == "self",
-    }
+    chosen = {"floor": kind == "floor", "sprocket": HUB if kind == "sprocket" else None, "self_contact": kind == "self"}
     for world, (heap, result) in enumerate(zip(heaps, results, strict=True)):
         expected, counts = contact_equations.resolve_contacts(heap.position, heap.velocity, heap.parameters, **chosen)
         assert result[kind] == counts[kind]

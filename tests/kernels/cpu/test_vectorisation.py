@@ -52,12 +52,7 @@ def remarks_by_function(folder: Path, method: str, fixed_body: str, tilts: bool 
     reason="widths are known for x86 processors with AVX2",
 )
 @pytest.mark.parametrize(
-    ("method", "fixed_body", "tilts"),
-    [
-        ("dp5", "sprocket", False),
-        ("hybrid", "floor", False),
-        ("dp5", "floor", True),
-    ],
+    ("method", "fixed_body", "tilts"), [("dp5", "sprocket", False), ("hybrid", "floor", False), ("dp5", "floor", True)]
 )
 def test_hot_loops_are_vectorised(tmp_path: Path, method: str, fixed_body: str, tilts: bool) -> None:
     """Every loop over links that runs once per stage or step is vectorised, to at least four doubles."""

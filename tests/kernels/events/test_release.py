@@ -36,11 +36,7 @@ FALL = float(LOADING_TIME)
 
 @wp.kernel(module="unique", enable_backward=False)
 def _watch(
-    model: Model,
-    drive: Drive,
-    state: State,
-    samples: wp.array2d(dtype=wp.float64),
-    loads: wp.array(dtype=wp.float64),
+    model: Model, drive: Drive, state: State, samples: wp.array2d(dtype=wp.float64), loads: wp.array(dtype=wp.float64)
 ):
     """Feeds one made-up sample after the other to the release rule, as `events.sample` does."""
     for i in range(samples.shape[0]):

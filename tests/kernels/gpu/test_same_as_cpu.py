@@ -41,11 +41,7 @@ pytestmark = pytest.mark.usefixtures("without_fused_operations")
 
 @pytest.mark.parametrize(
     ("method", "fixed_body", "self_contact", "block_dim"),
-    [
-        ("bs32", "floor", False, LINKS),
-        ("os32", "sprocket", True, 5 * LINKS),
-        ("os32", "terrain", False, LINKS),
-    ],
+    [("bs32", "floor", False, LINKS), ("os32", "sprocket", True, 5 * LINKS), ("os32", "terrain", False, LINKS)],
 )
 def test_fixed_steps_equal_a_cpu_kernel(method: str, fixed_body: str, self_contact: bool, block_dim: int) -> None:
     """Forty steps with dozens of impulses of every kind end in the same state, to the bit."""

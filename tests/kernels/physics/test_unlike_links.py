@@ -161,9 +161,7 @@ def test_a_stationary_loop_of_unlike_inertias_stays_as_it_is_under_load() -> Non
     """Every third link has 1.6 times the inertia, others 0.7: 15 times the loads leave its shape and its place."""
     loop_on_sprocket = released_loop(links=60, frequency=20.0, start="spinning")
     usual = alternating(SOFT, 60)
-    own = LinkValues(
-        **{**vars(usual), "inertia": usual.inertia * np.resize([1.6, 0.7, 0.7], 60)},
-    )
+    own = LinkValues(**{**vars(usual), "inertia": usual.inertia * np.resize([1.6, 0.7, 0.7], 60)})
     free, loaded = (
         hold(loop_on_sprocket, SOFT, duration, load_factor=factor, own=own)
         for duration, factor in ((0.5, 1.0), (1.0, 15.0))
