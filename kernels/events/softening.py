@@ -1,20 +1,21 @@
 """Softer joints where no fast motion matters: on the sprocket, just after the release, in the collapsed loop.
 
 Stiff joints make steps short. Softness s is 0 for the model's own k, b and 1/ω_c, 1 for SOFT and 2 for SOFTEST
-(engine/control.py), which has less k and b; in between values are interpolated geometrically. No value ever becomes
-stiffer than the model's own. Softness changes at samples only, so that a run does not depend on how it is cut into
-launches. On the softest joints, and in the drive on soft ones, steps near a contact may be longer too: otherwise
-contacts would limit the step.
+(engine/control.py), which has less k and b; in between values are interpolated geometrically. Both have more k and b
+where links are heavy, see :func:`physics.softness.softened`. No value ever becomes stiffer than the model's own.
+Softness changes at samples only, so that a run does not depend on how it is cut into launches. On the softest joints,
+and in the drive on soft ones, steps near a contact may be longer too: otherwise contacts would limit the step.
 
 *Drive.* Joints are softest while the chain settles and the sprocket spins up. Afterwards, while the loop becomes
 stationary, they are as soft as its tension T allows. Openings C = T/k stretch the loop by the strain T/kℓ, with ℓ the
-length of a link. On the softest joints it is 0.3 % at 30 Hz. k is chosen so that the strain is at most 0.03 %, but
-never above that of SOFT. Under multiplied loads (:mod:`physics.scaled_loads`) 0.1 % is allowed. With ten times the ω_c
-of soft joints another loop becomes stationary, because friction determines its width. *Release.* Soft joints return to
-their own values before the chain reaches the floor. *Pile.* Joints become soft for good when the loop begins to
-collapse, and softest when its area is below half of that at which it began. Softest at once shifts Δx of long chains.
-From soft joints on, floor and links push out circles that have sunk in (:attr:`Chain.push_rate`): soft joints press on
-them for long, and an impulse stops a circle only after a step in which it has sunk in.
+length of a link. On the softest joints it is 0.3 % at 30 Hz. k is chosen so that the strain is at most 0.03 %, which
+loops above 32 Hz have on joints stiffer than SOFT. Under multiplied loads (:mod:`physics.scaled_loads`) 0.1 % is
+allowed. With ten times the ω_c of soft joints another loop becomes stationary, because friction determines its width.
+*Release.* Soft joints return to their own values before the chain reaches the floor. *Pile.* Joints become soft for
+good when the loop begins to collapse, and softest when its area is below half of that at which it began. Softest at
+once shifts Δx of long chains. From soft joints on, floor and links push out circles that have sunk in
+(:attr:`Chain.push_rate`): soft joints press on them for long, and an impulse stops a circle only after a step in which
+it has sunk in.
 
 A change of k at openings C releases the energy ½ (k_before − k_after) Σ C², which is booked. Softening is one jump: C
 grows to T/k_after within a few periods of the soft springs. When joints stiffen, C must shrink by a factor of 100 to
