@@ -2,9 +2,9 @@
 
 Stiff joints make steps short. Softness s is 0 for the model's own k, b and 1/ω_c, 1 for SOFT and 2 for SOFTEST
 (engine/control.py), which has less k and b; in between values are interpolated geometrically. Both have more k and b
-where links are heavy, see :func:`physics.softness.softened`. No value ever becomes stiffer than the model's own.
-Softness changes at samples only, so that a run does not depend on how it is cut into launches. On the softest joints,
-and in the drive on soft ones, steps near a contact may be longer too: otherwise contacts would limit the step.
+where links are heavy. No value ever becomes stiffer than the model's own. Softness changes at samples only, so that a
+run does not depend on how it is cut into launches. On the softest joints, and in the drive on soft ones, steps near a
+contact may be longer too: otherwise contacts would limit the step.
 
 *Drive.* Joints are softest while the chain settles and the sprocket spins up. Afterwards, while the loop becomes
 stationary, they are as soft as its tension T allows. Openings C = T/k stretch the loop by the strain T/kℓ, with ℓ the

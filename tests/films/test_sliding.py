@@ -48,13 +48,14 @@ def test_slow_loops_are_known_less() -> None:
         ({"time": np.where(EXACT.time > 0.3, np.nan, EXACT.time)}, films.Camera(), r"film\.time: .* not finite"),
         ({"center": np.where(EXACT.center < 0, np.inf, EXACT.center)}, films.Camera(), r"film\.center: .* not finite"),
         ({"center": EXACT.center[1:]}, films.Camera(), r"film\.center: its shape is"),
+        ({"links": 120}, films.Camera(), r"film\.links: 120 are too many for a line; give 100 or less"),
         ({"speed": 754.0}, films.Camera(), r"speed/\(2πf\) is 6 m, no sprocket's; check speed \(m/s\) and frequency"),
     ],
 )
 def test_a_film_that_is_not_what_it_says_is_refused(
     changes: dict[str, np.ndarray], camera: films.Camera, wrong: str
 ) -> None:
-    """Noise, frame rate, times, a mirrored picture, numbers that are not finite, and speed in another unit."""
+    """Noise, frame rate, times, a mirrored picture, numbers that are not finite, links, and speed in another unit."""
     with pytest.raises(InputError, match=wrong):
         films.friction_line(dataclasses.replace(EXACT, **changes), camera)
 

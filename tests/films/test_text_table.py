@@ -34,7 +34,7 @@ def write(folder: Path, text: str) -> Path:
         TRACKER.format("nan\t0\t0\n" + table(FILM.time, FILM.center) + "\n9.0\tnan\t0\n9.1\t-inf\t0\n9.2\t0\t1e999\n"),
         "t;x;y\n" + table(FILM.time, FILM.center, ";").replace(".", ","),
         "frame,t,x,y\n" + "\n".join(f"7,{line}" for line in table(FILM.time, FILM.center, ",").splitlines()),
-        '"t (s)" "x (mm)" "y (mm)"\n'.replace(" (", "(") + table(FILM.time, 1e3 * FILM.center, " "),
+        't (s)  "x (mm)" y [mm]\n' + table(FILM.time, 1e3 * FILM.center, " "),
         "t (s);x [cm];y [cm];v_x (m/s)\n" + table(FILM.time, 1e2 * FILM.center, ";"),
         "\ufeffy,x,t\n" + table(FILM.center[:, 1], np.column_stack([FILM.center[:, 0], FILM.time]), ","),
     ],

@@ -29,7 +29,7 @@ LOSSES: Final = {
     "floor": "energy lost in impacts on the floor, and to a sprocket that moves after the release",
     "sprocket": "energy lost in impacts on the sprocket",
     "self_contact": "energy lost in impacts of links on one another",
-    "softening": "energy taken out of the joint springs by softening them in the pile",
+    "softening": "energy taken out of joint springs by softening them in the pile, less that put in after the release",
     "joint_switch": "energy lost where joints go from springs to rigid, less that gained where they go back",
 }
 """Losses of energy [J], positive."""

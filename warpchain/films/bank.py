@@ -20,6 +20,7 @@ from pydantic import InstanceOf
 from warpchain.films.film import CAREFUL, CLOCK, Camera, Film, edges, summary
 from warpchain.inputs.arrays import Array, checked_array
 from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.scene import loop_speed
 from warpchain.inputs.validation import InputError, checked
 from warpchain.store.block_result import BlockResult
 from warpchain.store.sweep_result import SweepResult
@@ -90,14 +91,15 @@ class Bank:
         walks, end = {}, CLOCK[-1] + 0.03
         for place, group in result.kept_motions(np.flatnonzero(result.kept)):  # in the order of the files
             if "frames/joints" in group and (time := group["series/time"][()])[-1] >= end:  # else it failed early
-                links, frequency, *_ = np.unravel_index(place, shape)
+                links, frequency, *_ = at = tuple(map(int, np.unravel_index(place, shape)))
+                setup = result.setup_at(at)
                 walks[place] = Film(
                     time=time[time < end],
                     center=group["series/center"][time < end],
                     links=int(result.axes["links"][links]),
                     frequency=float(result.axes["frequency"][frequency]),
                     outline=edges(group["frames/joints"][0].astype(float)),
-                    speed=float(group["series/rms_speed"][0]),
+                    speed=loop_speed(setup.scene, setup.parameters),
                 )
         places = np.moveaxis(np.arange(drawn[..., 0].size).reshape(shape[0] * shape[1], -1, shape[-1]), 2, 0)
         chains = np.flatnonzero(np.isin(places, list(walks)).all(axis=(1, 2)))

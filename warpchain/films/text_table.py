@@ -42,7 +42,7 @@ def read(
         direction: to which side the chain walks in the picture.
         origin: x of the sprocket's axis and y of the floor in the file.
         fps: true frames a second, if the times of the file are those of slow motion.
-        release: time of the release in the file, with `fps` since the first frame [s]; None: it is fitted to the fall.
+        release: time of the release in the file, with `fps` since the first marked frame [s]; None: fitted to the fall.
         outline: left and rightmost x, lowest and highest y of joints before the release, as seen; None: unknown.
         speed: of the loop before the release [m/s], such as n ℓ over the period of a painted link; None: unknown.
 
@@ -65,7 +65,8 @@ def read(
     for line in file.read_text(encoding="utf-8-sig", errors="replace").splitlines():
         mark = next((mark for mark in "\t;," if mark in line), None)
         line = line if mark == "," else line.replace(",", ".")  # numbers with decimal points
-        lines.append([cell.strip(' "') for cell in line.split(mark)])
+        cells = line.split(mark) if mark else re.split(r"\s+(?![(\[])", line.strip())  # a unit stays with its head
+        lines.append([cell.strip(' "') for cell in cells])
     heads = [[re.sub(r"[\s(\[].*", "", cell) for cell in cells] for cells in lines]  # without units
     first = next((number for number, names in enumerate(heads) if {"t", "x", "y"} <= set(names)), None)
     if first is None:

@@ -1,8 +1,8 @@
 """The longest step that cannot miss a contact.
 
 On springs it follows from a margin and the greatest speed. Steps on rigid joints are long and are bounded by actual
-distances: of each circle from the floor at its speed of approach, of each listed pair at its relative speed. What
-gravity adds within a step counts if it is more than ``FALL``.
+distances: of each circle from the floor at its speed of approach, of each listed pair at its relative speed. They are
+never so long that gravity adds more than ``FALL``.
 """
 
 import functools
@@ -26,18 +26,10 @@ LEAST_SLACK = wp.constant(wp.float64(0.25))
 """A flight builds its list anew when less than this part of that skin is left: short steps would cost more."""
 
 FALL = wp.constant(wp.float64(1e-4))
-"""Way [m] that gravity may add in one step to that at the speed of approach. Turns make nearly all steps shorter."""
+"""Way [m] that gravity may add in one step; steps of a loop that turns are shorter by themselves."""
 
 SMALLEST_GAP = wp.constant(wp.float64(1e-9))
 """Least distance [m]; overlaps count as this."""
-
-
-@wp.func
-def approach_rate(chain: Chain, speed: wp.float64, gap: wp.float64):
-    """1/t [1/s] for the time in which a circle crosses its gap at its speed of approach, and falls by FALL or less."""
-    distance = wp.max(gap, SMALLEST_GAP)
-    falling = (speed + wp.sqrt(speed * speed + TWO * chain.gravity * distance)) / (TWO * distance)
-    return wp.max(wp.max(speed, ZERO) / distance, wp.min(falling, wp.sqrt(HALF * chain.gravity / FALL)))
 
 
 @wp.func
@@ -54,13 +46,13 @@ def meeting_of(K: Rows, chain: Chain, p: int, q: int):
 
 @functools.cache
 def fastest_approach(fixed_body: str):
-    """Warp function: greatest :func:`approach_rate` of all circles."""
+    """Warp function: greatest (speed of approach) / (gap to the body) [1/s] of all circles; 0 if none approaches."""
     surface = BODIES[fixed_body].surface
 
     @wp.func
     def approach(chain: Chain, face: Face, x: wp.float64, y: wp.float64, u: wp.float64, v: wp.float64):
         gap, nx, ny, _u, _v, _e, _mu = surface(chain, face, x, y)
-        return approach_rate(chain, -(nx * u + ny * v), gap)
+        return wp.max(-(nx * u + ny * v), ZERO) / wp.max(gap, SMALLEST_GAP)
 
     @wp.func
     def fastest(K: Rows, chain: Chain, face: Face):
@@ -128,10 +120,11 @@ def step_bound(features: Features, has_flight: bool):
                     approach = approaching(K, chain, face)
                 elif wp.static(has_fixed):
                     # what a circle approaches may be another face than that which is nearest to it
-                    approach = approach_rate(chain, greatest_speed(K, chain), gap)
+                    approach = greatest_speed(K, chain) / wp.max(gap, SMALLEST_GAP)
                 if wp.static(has_self):
                     approach = wp.max(approach, meeting(K, L, chain))
                     approach = wp.max(approach, greatest_speed(K, chain) / wp.max(slack, SMALLEST_GAP))
+                approach = wp.max(approach, wp.sqrt(HALF * chain.gravity / FALL))
                 return wp.max(longest, ONE / approach)
         distance = control.skin
         is_near = bool(False)
