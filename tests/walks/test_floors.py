@@ -47,10 +47,9 @@ def test_energies_count_from_the_floor_below_the_release():
         assert 0.01 < walk.energy["potential_at_release"] < 0.1
 
 
-@pytest.mark.parametrize("floor", ["flat", [[-1, 0], [0.5, 0], [0.5, -0.1], [1, -0.1]]], ids=["plane", "profile"])
-def test_what_falls_without_turning_stops_on_the_floor(floor):
+def test_what_falls_without_turning_stops_on_the_floor():
     """The error of a flight that only falls is zero: its steps are bounded by the time of the fall."""
-    walk = warpchain.walk(links=60, frequency=0, start="ellipse", clearance=0.2, self_contact=False, floor=floor)
+    walk = warpchain.walk(links=60, frequency=0, start="ellipse", gravity=1.6)
     assert walk.status == Status.AT_REST and walk.greatest_penetration["floor"] < 2e-4
 
 
