@@ -53,7 +53,7 @@ def friction_line(film: Film, camera: Camera = CAREFUL) -> FrictionLine:
     the last four within their errors. The fit ends early for slow loops, whose links soon stick, and its error grows.
 
     Raises:
-        InputError: the film is too short or of more than 100 links, not as the camera says, or does not fall and go on.
+        InputError: the film is too short, of more than 100 links, not as the camera says, or not of a free fall.
     """
     if film.links > MOST_LINKS:
         raise InputError(f"film.links: {film.links} are too many for a line; give {MOST_LINKS} or less, or a bank")

@@ -356,10 +356,8 @@ def _moments(walk: Walk) -> list[tuple[int, str, Array]]:
             frame = min(int(np.searchsorted(walk.frame_time, moment)), last)
             found[frame] = title, spot_of(joints[frame])
     middle = np.median(joints[last, :, 0])
-    spot, half = (
-        np.array([middle, walk.setup.floor.heights(middle)]),
-        _CLOSE_UP_LINKS * walk.setup.parameters.link_length / 2,
-    )
+    spot = np.array([middle, walk.setup.floor.heights(middle)])
+    half = _CLOSE_UP_LINKS * walk.setup.parameters.link_length / 2
     if (np.abs(joints[last] - spot) < half).all(axis=1).sum() < _CLOSE_UP_LINKS / 2:  # it is in the air, or in a pit
         spot = joints[last, np.argmin(above[last])]
     found[last] = "rest" if walk.status is Status.AT_REST else "end", spot

@@ -100,7 +100,7 @@ class WalkResult:
         float, Stored("m", "z of the centre of mass at rest, to the right; NaN unless the plane tilts")
     ]
     final_tilt: Annotated[float, Stored("rad", f"tilt of the plane at the end, positive to the left; NaN {_FIXED}")]
-    final_yaw: Annotated[float, Stored("rad", f"heading of its x axis then, within ±π, anticlockwise; NaN {_FIXED}")]
+    final_yaw: Annotated[float, Stored("rad", f"heading of the plane at the end, as yaw but within ±π; NaN {_FIXED}")]
     greatest_tilt: Annotated[float, Stored("rad", f"greatest size of the tilt in the walk; NaN {_FIXED}")]
     fell_at: Annotated[float, Stored("s", f"from the release until the plane was first tilted by 45°; {_NEVER}")]
     fell_over: Annotated[int, Stored("1", "1 if the plane was ever tilted by 45°, 0 if not; −1 if the plane is fixed")]
@@ -165,7 +165,7 @@ class WalkResult:
     ]
     center_z: Annotated[Array, Stored("m", "centre of mass z, to the right", "t", _FIXED)]
     tilt: Annotated[Array, Stored("rad", "tilt of the plane", "t", _FIXED)]
-    yaw: Annotated[Array, Stored("rad", "heading of the plane's x axis, turns of the series counted", "t", _FIXED)]
+    yaw: Annotated[Array, Stored("rad", "heading of the plane's x axis, anticlockwise, turns counted", "t", _FIXED)]
     frame_origin: Annotated[Array, Stored("m", "origin of the plane's coordinates in the room", "f 3", _FIXED)]
     frame_axes: Annotated[Array, Stored("1", "axes of x and y of the plane in the room", "f 2 3", _FIXED)]
     before_release: BeforeRelease | None = None
