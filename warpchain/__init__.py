@@ -39,9 +39,9 @@ from warpchain import version as _version
 
 if TYPE_CHECKING:
     from warpchain import films as films
+    from warpchain.chain.setup import State as State
     from warpchain.inputs.parameters import Parameters as Parameters
     from warpchain.inputs.parameters import preset as preset
-    from warpchain.inputs.state import State as State
     from warpchain.inputs.validation import InputError as InputError
     from warpchain.run.simulation import Chains as Chains
     from warpchain.run.simulation import Trajectory as Trajectory
@@ -59,7 +59,7 @@ __version__ = _version.VERSION
 _NAMES = {
     "films": "films",
     "inputs.parameters": "Parameters preset",
-    "inputs.state": "State",
+    "chain.setup": "State",
     "inputs.validation": "InputError",
     "run.simulation": "Chains Trajectory simulate",
     "run.single_walk": "walk",

@@ -6,10 +6,10 @@ from typing import Any
 import pytest
 
 from tests.run.test_sweep_run import brief_setup, outcomes
+from warpchain.chain.setup import Setup
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import Fibers
 from warpchain.inputs.options import Options
-from warpchain.inputs.setup import Setup
 from warpchain.walks import scheduler
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.support.setups import setup_walk
-from warpchain.inputs.setup import Setup
+from warpchain.chain.setup import Setup
 from warpchain.run.sweep_run import run_shards, sweep
 from warpchain.run.workers import LostWorkersError
 from warpchain.status import Status

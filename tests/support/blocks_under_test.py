@@ -11,8 +11,8 @@ from tests.support.arrays import Array
 from tests.support.folded_chains import folded_chain
 from tests.support.presets import SOFT
 from tests.support.unlike_links import UnlikeLinks
+from warpchain.chain.floor import Floor, floor_from
 from warpchain.engine.batch import Batch, Recorded
-from warpchain.inputs.floor import Floor, floor_from
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels.contacts.list_layout import list_layout

@@ -8,11 +8,11 @@ import numpy as np
 from tests.support.arrays import Array
 from tests.support.blocks_under_test import run_recorded
 from tests.support.setups import setup_walk
+from warpchain.chain.link_values import LinkValues
+from warpchain.chain.setup import Setup
 from warpchain.engine.batch import Batch
-from warpchain.inputs.link_values import LinkValues
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import loop_speed
-from warpchain.inputs.setup import Setup
 from warpchain.kernels import layout
 from warpchain.status import Status
 from warpchain.walks.walk_phases import WalkRun

@@ -14,9 +14,9 @@ import warp as wp
 from tests.support.arrays import Array
 from tests.support.blocks_under_test import floor_with
 from tests.support.unlike_links import UnlikeLinks
+from warpchain.chain.floor import Floor
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import start_device
-from warpchain.inputs.floor import Floor
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout

@@ -7,7 +7,7 @@ import numpy as np
 
 from tests.support.arrays import Array
 from tests.support.made_walks import make_walk
-from warpchain.inputs.setup import resolve
+from warpchain.chain.resolution import resolve
 from warpchain.walks.walk_result import WalkResult
 
 

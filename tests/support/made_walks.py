@@ -6,8 +6,9 @@ from typing import Any, get_args
 
 import numpy as np
 
+from warpchain.chain.resolution import resolve
+from warpchain.chain.setup import Setup
 from warpchain.engine.tallies import CONTACTS
-from warpchain.inputs.setup import Setup, resolve
 from warpchain.loop.stationary_loop import BeforeRelease
 from warpchain.status import Status
 from warpchain.walks.landmarks import RELEASE

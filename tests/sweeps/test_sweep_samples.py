@@ -11,10 +11,10 @@ from scipy import stats
 
 from tests.support.setups import setup_walk
 from tests.support.sweep_content import TABLE_1, UNIFORM, blocks, content, drawn
+from warpchain.chain.resolution import resolve
 from warpchain.inputs.distributions import TABLE, Gaussian, Uniform, draw, placed, random_generator
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import check_scene, fewest_links
-from warpchain.inputs.setup import resolve
 from warpchain.inputs.validation import InputError
 from warpchain.sweeps.designs import design_points, sobol_indices
 from warpchain.sweeps.plan import load_sweep

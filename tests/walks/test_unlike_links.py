@@ -10,7 +10,7 @@ import warpchain
 from tests.support.presets import SOFT
 from tests.support.setups import setup_walk
 from warpchain import Status
-from warpchain.inputs.link_values import alternating
+from warpchain.chain.link_values import alternating
 from warpchain.inputs.scene import link_values, riding_radius
 from warpchain.pictures.chain import circle_radii, link_outlines
 

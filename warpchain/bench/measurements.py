@@ -21,13 +21,13 @@ from typing import Any, Final
 import numpy as np
 import warp as wp
 
+from warpchain.chain.start_shapes import ellipse, lay_chain
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import gpu_turn, start_device
 from warpchain.engine.processors import processors
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.options import FIBERS, Options, on_gpu
 from warpchain.inputs.parameters import Parameters, preset
-from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels.methods.method import find_method, method_names
 from warpchain.run.progress_bar import SweepProgress
 from warpchain.run.simulation import simulate

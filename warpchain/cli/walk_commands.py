@@ -69,10 +69,11 @@ def walk(
     as_json: Annotated[bool, JSON] = False,
 ) -> None:
     """Spin up one chain, drop it, and follow it until it rests."""
+    from warpchain.chain.resolution import SECTIONS, continued, resolve
+    from warpchain.chain.setup import DEFAULT_PRESET
     from warpchain.cli.output import print_walk, saved, try_walk_folder, write_walk
     from warpchain.inputs.distributions import Seed
     from warpchain.inputs.options import replaced_by
-    from warpchain.inputs.setup import DEFAULT_PRESET, SECTIONS, continued, resolve
     from warpchain.inputs.validation import InputError, checked, printable
     from warpchain.inputs.yaml_files import parse_yaml
     from warpchain.run.progress_bar import changing_line, walk_progress_text

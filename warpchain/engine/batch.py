@@ -9,18 +9,18 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpchain.chain.floor import Floor
+from warpchain.chain.link_values import LinkValues, alternating
+from warpchain.chain.setup import Setup
 from warpchain.engine.control import control_of
 from warpchain.engine.devices import Gpu, start_device
 from warpchain.engine.kernel_choice import block_threads, step_kernel
 from warpchain.engine.mirror import Mirror
 from warpchain.engine.tallies import COUNTS, EXTREMES, LOSSES
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.floor import Floor
-from warpchain.inputs.link_values import LinkValues, alternating
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene, contact_radius, link_values
-from warpchain.inputs.state import Setup
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.cpu.implicit.rigid_layout import scratch_rows

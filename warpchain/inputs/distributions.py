@@ -16,9 +16,9 @@ from typing import Annotated, Final
 import numpy as np
 from pydantic import Field
 
+from warpchain.chain.setup import Setup
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene, link_values
-from warpchain.inputs.state import Setup
 from warpchain.inputs.validation import FIELDS, SECTION_OF, InputError, Whole, field_bounds
 
 DRAW_LIMIT: Final = 1000

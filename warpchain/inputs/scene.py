@@ -6,11 +6,11 @@ from typing import Annotated, Final, Literal, Self
 import numpy as np
 from pydantic import Field, Strict, model_validator
 
-from warpchain.inputs.floor import FloorField
-from warpchain.inputs.link_values import LinkValues, alternating
+from warpchain.chain.floor import FloorField
+from warpchain.chain.link_values import LinkValues, alternating
+from warpchain.chain.sprocket_motion import Rows
 from warpchain.inputs.options import on_gpu
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.sprocket_motion import Rows
 from warpchain.inputs.validation import InputError, Section, Whole, number_field
 
 MOST_LINKS: Final = 100_000

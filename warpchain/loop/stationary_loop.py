@@ -17,12 +17,12 @@ from typing import Annotated, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.chain.link_values import mean_value
+from warpchain.chain.setup import Setup
 from warpchain.hdf5_files import Stored, stored_fields
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.link_values import mean_value
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import joint_radius, link_values
-from warpchain.inputs.setup import Setup
 
 BEFORE: Final = "before_release"
 """Name of the motion before the release, among the arrays of a walk and in its file."""

@@ -14,9 +14,9 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_hex
 from matplotlib.patches import Circle, Patch, Polygon
 
+from warpchain.chain.sprocket_motion import sprocket_places
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.scene import link_values
-from warpchain.inputs.sprocket_motion import sprocket_places
 from warpchain.pictures.labels import Walk
 from warpchain.pictures.style import DASHES, FAINT, GROUND, INK
 

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from warpchain.chain.resolution import takes_fields
+from warpchain.chain.setup import State
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import gpu_turn
 from warpchain.engine.tallies import LOST
@@ -15,8 +17,6 @@ from warpchain.inputs.arrays import Array, checked_array
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene, check_links_on_gpu
-from warpchain.inputs.setup import takes_fields
-from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError, checked, plain, shown, validated
 from warpchain.status import Status
 

@@ -2,9 +2,9 @@
 
 from typing import Any, Literal
 
+from warpchain.chain.resolution import continued, resolve, takes_fields
+from warpchain.chain.setup import DEFAULT_PRESET, Setup, State
 from warpchain.inputs.distributions import Seed
-from warpchain.inputs.setup import DEFAULT_PRESET, Setup, continued, resolve, takes_fields
-from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError, by_name, by_section, checked, shown
 from warpchain.run.progress_bar import changing_line, walk_progress_text
 from warpchain.walks.one_walk import OnProgress, run_walk

@@ -20,11 +20,12 @@ from typing import Annotated, Any, Final
 import numpy as np
 from pydantic import Field
 
+from warpchain.chain.resolution import Values, takes_fields
+from warpchain.chain.setup import DEFAULT_PRESET, Setup
 from warpchain.engine.devices import gpu_turn, has_gpu_turn, start_device
 from warpchain.engine.processors import processors
 from warpchain.files import AnyPath
 from warpchain.inputs.options import Options, on_gpu
-from warpchain.inputs.setup import DEFAULT_PRESET, Setup, Values, takes_fields
 from warpchain.inputs.validation import (
     SECTION_OF,
     InputError,

@@ -19,12 +19,13 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.chain.resolution import SECTIONS
+from warpchain.chain.setup import Setup
 from warpchain.files import AnyPath
 from warpchain.inputs.distributions import DRAW_LIMIT, Distribution, draw, placed, random_generator
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS
 from warpchain.inputs.scene import Scene
-from warpchain.inputs.setup import SECTIONS, Setup
 from warpchain.inputs.validation import InputError
 from warpchain.sweeps.block import Block
 from warpchain.sweeps.designs import design_points, walks_per_sample

@@ -2,13 +2,13 @@
 
 import math
 
+from warpchain.chain.link_values import LinkValues, mean_value
+from warpchain.chain.setup import Setup
+from warpchain.chain.start_shapes import lay_chain, stadium
 from warpchain.engine.control import SOFT, SOFT_MASS, SOFTEST
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.link_values import LinkValues, mean_value
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import joint_radius, loop_speed, settling_time
-from warpchain.inputs.setup import Setup
-from warpchain.inputs.start_shapes import lay_chain, stadium
 
 HOLD_STRAIN = 3e-4
 """Greatest strain of a held loop on softened joints by its speed."""

@@ -6,10 +6,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpchain.chain.floor import slope_points
+from warpchain.chain.setup import Setup
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.floor import slope_points
 from warpchain.inputs.scene import link_values
-from warpchain.inputs.setup import Setup
 from warpchain.inputs.validation import InputError
 
 RELEASE: Final = {

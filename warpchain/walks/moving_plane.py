@@ -9,9 +9,9 @@ import math
 
 import numpy as np
 
+from warpchain.chain.setup import Setup
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.scene import link_values
-from warpchain.inputs.setup import Setup
 from warpchain.kernels import layout
 
 

@@ -6,8 +6,8 @@ from typing import Annotated
 
 from pydantic import Field
 
+from warpchain.chain.setup import Setup
 from warpchain.engine.devices import gpu_turn
-from warpchain.inputs.setup import Setup
 from warpchain.inputs.validation import InputError, checked
 from warpchain.kernels.methods.method import find_method
 from warpchain.version import package_versions

@@ -14,17 +14,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.chain.floor import circles_of
+from warpchain.chain.setup import Setup, State
+from warpchain.chain.sprocket_motion import motion_rows
+from warpchain.chain.start_shapes import ellipse, lay_chain
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import gpu_turn
 from warpchain.engine.snapshot import CACHES, change, restore, take_snapshot
 from warpchain.engine.tallies import CONTACTS, COUNTS, EXTREMES, LOST
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.floor import circles_of
 from warpchain.inputs.scene import joint_radius, link_values, settling_time
-from warpchain.inputs.setup import Setup
-from warpchain.inputs.sprocket_motion import motion_rows
-from warpchain.inputs.start_shapes import ellipse, lay_chain
-from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError, checked
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features

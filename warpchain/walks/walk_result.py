@@ -18,14 +18,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
 
+from warpchain.chain.resolution import SECTIONS
+from warpchain.chain.setup import Setup, State
 from warpchain.engine.tallies import COUNTS, DEPTHS, EXTREMES, IMPULSES, LOST
 from warpchain.files import write_whole
 from warpchain.hdf5_files import Stored, hdf5_image, put, read_fields, reading_hdf5, stored_fields, write_fields
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import contact_radius
-from warpchain.inputs.setup import SECTIONS, Setup
-from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError, json_value, validated
 from warpchain.kernels import layout
 from warpchain.loop.stationary_loop import BEFORE, FIELDS, BeforeRelease

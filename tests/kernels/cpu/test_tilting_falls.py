@@ -13,9 +13,9 @@ from tests.support.blocks_under_test import run_recorded
 from tests.support.presets import SOFT
 from tests.support.tilted_chains import mirrored
 from tests.support.tilting_under_test import end_of, row_of, tilting_batch
+from warpchain.chain.start_shapes import ellipse, lay_chain
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
-from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels import layout
 from warpchain.status import Status
 

@@ -10,8 +10,8 @@ import warpchain
 from tests.support.presets import SOFT
 from tests.support.setups import setup_walk
 from warpchain import InputError, Status
+from warpchain.chain.link_values import alternating
 from warpchain.engine.batch import ATTEMPTS
-from warpchain.inputs.link_values import alternating
 from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL
 from warpchain.inputs.scene import Scene, fewest_links
 from warpchain.walks import scheduler

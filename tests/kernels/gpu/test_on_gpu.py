@@ -19,9 +19,9 @@ from tests.kernels.methods.test_flight import FLIGHTS, exact_flight, greatest
 from tests.run.test_sweep_run import brief_setup, data_of, outcomes
 from tests.support.blocks_under_test import FIXED_STEP, HILLS, SOFT, floor_with, heap
 from warpchain import simulate, sweep, walk
+from warpchain.chain.sprocket_motion import motion_rows
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
-from warpchain.inputs.sprocket_motion import motion_rows
 from warpchain.run.workers import gpu_workers
 from warpchain.status import Status
 from warpchain.walks import scheduler

@@ -24,9 +24,9 @@ from tests.support.blocks_under_test import (
     launch_chains,
 )
 from tests.support.unlike_links import unlike_links
+from warpchain.chain.start_shapes import ellipse, lay_chain
 from warpchain.engine.batch import Batch
 from warpchain.engine.kernel_choice import most_registers
-from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu import functions

@@ -7,9 +7,9 @@ import pytest
 
 from tests.kernels.gpu.test_same_as_cpu import compiles_for_gpus
 from tests.support.blocks_under_test import SOFT, launch_blocks, launch_chains
+from warpchain.chain.start_shapes import ellipse, lay_chain
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
-from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.status import Status

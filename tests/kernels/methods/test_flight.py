@@ -11,9 +11,9 @@ from tests.oracle_model import motion_equations
 from tests.oracle_model.circular_loop import circular_loop, circular_loop_force
 from tests.support.presets import PAPER, SOFT
 from warpchain import Status, preset
+from warpchain.chain.start_shapes import ellipse, lay_chain
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
-from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels.methods.method import find_method, method_names
 
 METHODS = [name for name in method_names() if not find_method(name).has_rigid_flight]

@@ -6,10 +6,10 @@ import warp as wp
 from numpy.testing import assert_allclose
 
 from tests.oracle_model import motion_equations
+from warpchain.chain.start_shapes import ellipse, lay_chain
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
-from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels import layout
 from warpchain.kernels.physics.geometry import Link
 from warpchain.kernels.physics.load import LOADS, Load

@@ -15,10 +15,10 @@ from tests.support.presets import PAPER, SOFT
 from tests.support.rigid_chains import exact_rigid_flight, loop
 from tests.support.unlike_links import UnlikeLinks, unlike_links
 from warpchain import Status
+from warpchain.chain.link_values import LinkValues, alternating
+from warpchain.chain.start_shapes import ellipse, lay_chain
 from warpchain.engine.batch import Batch
-from warpchain.inputs.link_values import LinkValues, alternating
 from warpchain.inputs.options import Options
-from warpchain.inputs.start_shapes import ellipse, lay_chain
 
 
 def fly(chain: UnlikeLinks, start: tuple[Array, Array], duration: float, fixed_body: str, **options: Any) -> Batch:

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from tests.oracle_model import motion_equations
 from tests.support.presets import PAPER
-from warpchain.inputs.start_shapes import ellipse, lay_chain, stadium
+from warpchain.chain.start_shapes import ellipse, lay_chain, stadium
 
 LENGTH = PAPER.link_length
 RADIUS = PAPER.sprocket_radius + PAPER.circle_radius

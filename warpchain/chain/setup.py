@@ -8,12 +8,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpchain.chain.floor import Floor, circles_of, floor_from
+from warpchain.chain.start_shapes import links_between
 from warpchain.inputs.arrays import Array, checked_array
-from warpchain.inputs.floor import Floor, circles_of, floor_from
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import Scene, check_parity, check_scene
-from warpchain.inputs.start_shapes import links_between
 from warpchain.inputs.validation import SECTION_OF, InputError, validated
 
 DEFAULT_PRESET: Final = "paper"
