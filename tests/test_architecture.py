@@ -28,6 +28,7 @@ STOREYS = (
     ("engine", "pictures"),
     ("loop",),
     ("hdf5_files",),
+    ("chain",),
     ("inputs",),
     ("files", "status", "version"),
     ("kernels/cpu", "kernels/gpu"),

@@ -1,6 +1,6 @@
 """Loops on their sprocket: driven up to their release, and held on from there."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,6 @@ from warpchain.chain.link_values import LinkValues
 from warpchain.chain.setup import Setup
 from warpchain.engine.batch import Batch
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.scene import loop_speed
 from warpchain.kernels import layout
 from warpchain.status import Status
 from warpchain.walks.walk_phases import WalkRun
@@ -32,7 +31,7 @@ class Loop:
 
 def period_of(setup: Setup) -> float:
     """Time [s] in which a loop goes round, a quarter of a second if it stands still."""
-    speed = loop_speed(setup.scene, setup.parameters)
+    speed = setup.loop_speed
     return setup.scene.links * setup.parameters.link_length / speed if speed > 0 else 0.25
 
 
@@ -58,13 +57,14 @@ def hold(
     setup = loop.setup
     scene = setup.scene
     batch = Batch(1, scene.links, setup.options, keeps_samples=True, frame_every=1)
-    batch.set_chain(0, parameters, scene.links, own, scene)
+    other = replace(setup, parameters=parameters)
+    batch.set_chain(0, parameters, scene.links, own, other.contact_radius)
     softness = 1.0 if setup.options.soften_drive else 0.0
     batch.load(0, loop.position, loop.velocity, stop_time=duration, stop_status=Status.NOT_STEADY, softness=softness)
     batch.set_drive(
         0,
         sprocket_speed=-2 * np.pi * scene.frequency,
-        loop_speed=loop_speed(scene, parameters),
+        loop_speed=other.loop_speed,
         loop_period=period_of(setup),
         load_factor=load_factor,
         steady_window=period_of(setup),

@@ -20,7 +20,6 @@ from warpchain.engine.tallies import COUNTS, EXTREMES, LOSSES
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.scene import Scene, contact_radius, link_values
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.cpu.implicit.rigid_layout import scratch_rows
@@ -165,14 +164,13 @@ class Batch:
 
     def set_up(self, world: int, setup: Setup) -> None:
         """Set chain and floor of a world, which stay the same through a walk."""
-        scene, parameters = setup.scene, setup.parameters
-        self.set_chain(world, parameters, scene.links, link_values(scene, parameters), scene)
+        self.set_chain(world, setup.parameters, setup.scene.links, setup.link_values, setup.contact_radius)
         self.set_floor(world, setup.floor)
 
     def set_chain(
-        self, world: int, parameters: Parameters, links: int, own: LinkValues | None = None, scene: Scene | None = None
+        self, world: int, parameters: Parameters, links: int, own: LinkValues | None = None, sprocket: float = 0.0
     ) -> None:
-        """Set a world's chain; without values of its own, links alternate, and without a scene there is no sprocket."""
+        """Set a world's chain, and the radius of its sprocket [m]; without values of its own, links alternate."""
         own, half, chains = own or alternating(parameters, links), parameters.link_length / 2, self.host["model/chains"]
         values = vars(parameters) | {
             "link_count": links,
@@ -181,9 +179,8 @@ class Batch:
             "mass": own.total_mass,
             "circle_radius": own.radius.max(),
             "inverse_smoothing": 1 / parameters.friction_smoothing,
+            "sprocket_radius": sprocket,
         }
-        if scene is not None:
-            values["sprocket_radius"] = contact_radius(scene, parameters)
         for name in chains.dtype.names or ():
             chains[name][world] = values.get(name, 0)
         self.links[world] = links

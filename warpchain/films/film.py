@@ -7,7 +7,6 @@ import numpy as np
 from pydantic import Field
 
 from warpchain.inputs.arrays import Array, checked_array
-from warpchain.inputs.scene import loop_speed
 from warpchain.inputs.validation import InputError, checked
 from warpchain.walks.walk_result import WalkResult
 
@@ -138,7 +137,7 @@ def film_of(walk: WalkResult, camera: Camera | None = CAREFUL, seed: int = 0) ->
         links=scene.links,
         frequency=scene.frequency,
         outline=edges(walk.frame_joints[0]),
-        speed=loop_speed(scene, walk.setup.parameters),
+        speed=walk.setup.loop_speed,
     )
     return exact if camera is None else exact.seen(camera, camera.errors(random), random)
 

@@ -16,7 +16,6 @@ from matplotlib.patches import Circle, Patch, Polygon
 
 from warpchain.chain.sprocket_motion import sprocket_places
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.scene import link_values
 from warpchain.pictures.labels import Walk
 from warpchain.pictures.style import DASHES, FAINT, GROUND, INK
 
@@ -48,7 +47,7 @@ def center_in_room(walk: Walk) -> Array:
 
 def circle_radii(walk: Walk) -> Array:
     """Radius of the circles of each link [m], shape (n,)."""
-    return link_values(walk.setup.scene, walk.setup.parameters).radius
+    return walk.setup.link_values.radius
 
 
 def link_outlines(joints: Array, radius: Array | float) -> Array:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, Field, ValidationError, ValidationInfo, WrapValidator
 
-from warpchain.chain.resolution import SECTIONS, combined, options_beside
+from warpchain.chain.resolution import SECTIONS, options_beside
 from warpchain.chain.setup import Setup
 from warpchain.inputs import validation
 from warpchain.inputs.distributions import Distribution, Gaussian
@@ -130,7 +130,7 @@ class Block:
                     at[SECTION_OF[field]] += ((field, column[place]),)
             try:
                 own, parameters = scene(at["scene"]), changed(preset, at["parameters"])
-                yield combined(preset, parameters, own, options(own.plane, at["options"]))
+                yield Setup(preset, parameters, own, options(own.plane, at["options"])).checked()
             except InputError as error:
                 raise InputError(self._located(error, cell)) from None
 

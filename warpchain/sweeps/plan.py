@@ -13,7 +13,7 @@ import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Final
 
 import numpy as np
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from warpchain.chain.resolution import SECTIONS
 from warpchain.chain.setup import Setup
 from warpchain.files import AnyPath
-from warpchain.inputs.distributions import DRAW_LIMIT, Distribution, draw, placed, random_generator
+from warpchain.inputs.distributions import DRAW_LIMIT, Distribution, draw, random_generator
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS
 from warpchain.inputs.scene import Scene
@@ -101,13 +101,13 @@ class Sweep:
         if not block.drawn:
             return walk
         row, member = divmod(walk.sample, walks_per_sample(block.sampler, len(block.drawn)))
-        distributions, designed = placed(block.distributions, fixed), block.sampler != "random"
+        distributions, designed = fixed.placed(block.distributions), block.sampler != "random"
         points, setups = self._first_possible(block, walk.cell, fixed, distributions, row, designed=designed)
         return replace(walk, setup=setups[member], drawn=points[member])
 
     def undrawn(self, indices: Iterable[int]) -> Iterator[PlannedWalk]:
         """Walks without their draws, which take most of the time; options and number of links never depend on them."""
-        before: tuple[int, Cell] | None = None
+        fixed = lru_cache(2**12)(lambda number, cell: self.blocks[number].fixed(cell))  # for all samples of a cell
         for index in map(int, indices):
             sample, place = divmod(index, self.blocks[0].stride)
             number = bisect.bisect_right(self.blocks, place, key=lambda block: block.first_cell) - 1
@@ -115,9 +115,7 @@ class Sweep:
             if not 0 <= sample < block.samples:
                 raise IndexError(f"walk {index} of a sweep of {self.walk_count} walks")
             cell = tuple(map(int, np.unravel_index(place - block.first_cell, block.shape[:-1])))
-            if (number, cell) != before:
-                before, fixed = (number, cell), block.fixed(cell)
-            yield PlannedWalk(index, number, cell, sample, fixed, {})
+            yield PlannedWalk(index, number, cell, sample, fixed(number, cell), {})
 
     def keep(self, walk: PlannedWalk) -> Keep:
         """What is kept of the motion of a walk."""
@@ -141,7 +139,7 @@ class Sweep:
                 if fixed.options is not before:
                     before = fixed.options
                     self._check_options(block, first, before)
-                distributions = placed(block.distributions, fixed)
+                distributions = fixed.placed(block.distributions)
                 for name, distribution in distributions.items():
                     if distribution != checked.get(name) and distribution.share() < LEAST_SHARE:
                         path, law = f"{block.path}.distributions.{name}", distribution.canonical()

@@ -23,7 +23,6 @@ from warpchain.engine.devices import gpu_turn
 from warpchain.engine.snapshot import CACHES, change, restore, take_snapshot
 from warpchain.engine.tallies import CONTACTS, COUNTS, EXTREMES, LOST
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.scene import joint_radius, link_values, settling_time
 from warpchain.inputs.validation import InputError, checked
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
@@ -87,7 +86,7 @@ class WalkRun:
 
     def __init__(self, batch: Batch, world: int, setup: Setup, keep: Keep = NOTHING) -> None:
         """Prepare a walk; the batch has its options, and records what is to be kept."""
-        scene, parameters = setup.scene, setup.parameters
+        scene = setup.scene
         self.setup = setup
         self.recorder = Recorder(batch, world, keep, scene.plane == "tilting")
         self.status = Status.RUNNING
@@ -97,9 +96,7 @@ class WalkRun:
         self.is_free = self._released = False
         self._batch, self._world = batch, world
         self._hold_softness = 0.0
-        self._links = link_values(scene, parameters)
         self._has_sprocket = setup.has_drive
-        self._settled = settling_time(scene)
         self._tilts = scene.plane == "tilting"
         self._level = math.cos(math.radians(scene.slope))  # of a distance along the floor
         self._walk_end = min(scene.walk_limit, scene.walk_until or math.inf)  # since the release, if it is not at rest
@@ -128,7 +125,7 @@ class WalkRun:
                 batch.resume(world, self._walk_end, Status.TIME_LIMIT)
         elif not setup.has_drive:
             scene, length = setup.scene, setup.parameters.link_length
-            speed = 2 * math.pi * scene.frequency * joint_radius(scene, setup.parameters)
+            speed = 2 * math.pi * scene.frequency * setup.joint_radius
             try:
                 laid = lay_chain(ellipse(scene.ellipse_aspect), scene.links, length, speed, scene.phase)
             except ValueError:
@@ -137,11 +134,11 @@ class WalkRun:
             self._release(*laid)
         else:
             hanging = math.nan
-            (position, velocity), drive = drive_of(setup, self._links)
+            (position, velocity), drive = drive_of(setup)
             self._at_full_speed, self._hold_softness = drive["hold_start"], drive["hold_softness"]
             batch.set_drive(world, **drive)
             load = partial(batch.load, world, position, velocity, softness=self._hold_softness)
-            load(stop_time=self._settled, stop_status=Status.FINISHED)
+            load(stop_time=self.setup.settling_time, stop_status=Status.FINISHED)
             if setup.scene.start == "rest":
                 yield features["driven"]
                 if batch.status(world) != Status.FINISHED:
@@ -181,14 +178,14 @@ class WalkRun:
         if self._released:
             speed = math.hypot(sample[layout.CENTER_U], sample[layout.CENTER_V])
             return Progress("walk", now or self.drive_time, speed, attempts)
-        phase = "settle" if now < self._settled else "spin up" if now < self._at_full_speed else "hold"
+        phase = "settle" if now < self.setup.settling_time else "spin up" if now < self._at_full_speed else "hold"
         return Progress(phase, now, float(sample[layout.LOOP_SPEED]), attempts)
 
     @property
     def datum(self) -> float:
         """Energy [J] of the chain's mass on the floor below the release, from which potential energies count."""
         x = self._batch.first_sample(self._world)[layout.CENTER_X]
-        return self._links.total_mass * self.setup.parameters.gravity * float(self.setup.floor.heights(x))
+        return self.setup.link_values.total_mass * self.setup.parameters.gravity * float(self.setup.floor.heights(x))
 
     def energy(self) -> dict[str, float]:
         """Where the energy of the walk went [J]; NaN before the release. Keys: `walk_result.ENERGIES`."""
@@ -325,7 +322,7 @@ class WalkRun:
 
     def _raise(self, position: Array, clearance: float) -> float:
         """How far a chain at this position must be raised to a clearance [m]."""
-        length, radius = self.setup.parameters.link_length, self._links.radius
+        length, radius = self.setup.parameters.link_length, self.setup.link_values.radius
         return self.setup.floor.raised_by(circles_of(position, length), np.tile(radius, 2), clearance)
 
     def _release(self, position: Array, velocity: Array, hanging: float = math.nan) -> None:

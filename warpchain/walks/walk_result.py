@@ -25,7 +25,6 @@ from warpchain.files import write_whole
 from warpchain.hdf5_files import Stored, hdf5_image, put, read_fields, reading_hdf5, stored_fields, write_fields
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.scene import contact_radius
 from warpchain.inputs.validation import InputError, json_value, validated
 from warpchain.kernels import layout
 from warpchain.loop.stationary_loop import BEFORE, FIELDS, BeforeRelease
@@ -179,7 +178,7 @@ class WalkResult:
     def sprocket_radius(self) -> float:
         """Radius of the sprocket that links touch [m]; NaN without one."""
         scene, had_none = self.setup.scene, self.setup.start is not None and np.isnan(self.sprocket_height)
-        return np.nan if had_none or scene.start == "ellipse" else contact_radius(scene, self.setup.parameters)
+        return np.nan if had_none or scene.start == "ellipse" else self.setup.contact_radius
 
     @property
     def joints_in_room(self) -> Array | None:

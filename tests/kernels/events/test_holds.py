@@ -13,7 +13,6 @@ from warpchain import InputError, Status
 from warpchain.chain.link_values import alternating
 from warpchain.engine.batch import ATTEMPTS
 from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL
-from warpchain.inputs.scene import Scene, fewest_links
 from warpchain.walks import scheduler
 
 CELL = {"links": 60, "frequency": 15.0}
@@ -94,7 +93,7 @@ def test_loops_do_not_sink_into_their_sprocket(links: int, frequency: float) -> 
 # --- hard cases ---
 
 
-FEWEST = fewest_links(Scene(), SOFT)
+FEWEST = setup_walk("soft", {}).fewest_links
 TENTH, TENFOLD = (
     {name: part * getattr(SOFT, name) for name in ("inner_inertia", "outer_inertia")} for part in (0.1, 10.0)
 )
