@@ -78,7 +78,9 @@ class Parameters(Section):
     """
 
     link_length: float = _row("ℓ", "m", 1.268e-2, 1e-5, LENGTH, "distance between the two joints of a link")
-    sprocket_radius: float = _row("R", "m", 5.56e-2, 5e-4, LENGTH, "radius of the sprocket; sprocket_radius_is says which")
+    sprocket_radius: float = _row(
+        "R", "m", 5.56e-2, 5e-4, LENGTH, "radius of the sprocket; sprocket_radius_is says which"
+    )
     inner_mass: float = _row("m_inner", "kg", 3.700e-3, 2e-6, MASS, "mass of an inner link")
     outer_mass: float = _row("m_outer", "kg", 3.147e-3, 2e-6, MASS, "mass of an outer link")
     inner_inertia: float = _row("I_inner", "kg m²", 1.69e-7, 1e-9, INERTIA, "moment of inertia of an inner link")
@@ -104,7 +106,9 @@ class Parameters(Section):
     tangential_restitution: float = _row(
         "e_t", "1", 0.0, 0.0, SIGNED_FRACTION, "tangential restitution, all pairs", "adjusted"
     )
-    circle_radius: float = _row("r", "m", 4.2e-3, 0.0, LENGTH, "radius of the contact circle at a link end", "chosen here")
+    circle_radius: float = _row(
+        "r", "m", 4.2e-3, 0.0, LENGTH, "radius of the contact circle at a link end", "chosen here"
+    )
     """Not in the paper: between the roller (3.9 mm) and the plates (about 5 mm) of a half-inch chain."""
     half_width: float = _row("h", "m", 4e-3, 0.0, WIDTH, "half width of a link (tilting plane only)", "chosen here")
     """Not in the paper: a half-inch chain is about 8 mm wide over its pins."""
