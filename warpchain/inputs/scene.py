@@ -117,7 +117,7 @@ class Scene(Section):
     stiff_joint_factor: float = number_field(1.0, "1", ge=0, le=1e6)
     """factor applied to the viscous and Coulomb friction of stiff_joint; its stiffness does not change"""
     mass_gradient: float = number_field(0.0, "1", gt=-1, lt=1)
-    """relative change of mass and inertia along the chain; both grow linearly, from 1 − this to 1 + this times their own"""
+    """relative change of mass and inertia along the chain, linear from 1 − this to 1 + this times their own values"""
     link_masses: _Numbers = number_field(None, "kg")
     """mass of each link; null: that of inner and outer links"""
     link_inertias: _Numbers = number_field(None, "kg m²")
