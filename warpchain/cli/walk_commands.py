@@ -73,7 +73,6 @@ def walk(
     from warpchain.chain.setup import DEFAULT_PRESET
     from warpchain.cli.output import print_walk, saved, try_walk_folder, write_walk
     from warpchain.inputs.distributions import Seed
-    from warpchain.inputs.options import replaced_by
     from warpchain.inputs.validation import InputError, checked, printable
     from warpchain.inputs.yaml_files import parse_yaml
     from warpchain.run.progress_bar import changing_line, walk_progress_text
@@ -98,8 +97,8 @@ def walk(
         else:
             block, place = found.located(parse_yaml(index, "--index"))
             base, number = block.setup_at(place), block.origin.seed
-        replaced = replaced_by(given["options"])
-        preset, own = base.preset, {name: getattr(base, name).model_dump(exclude=replaced) for name in SECTIONS}
+        preset, kept = base.preset, base.options.beside(given["options"])
+        own = {name: getattr(base, name).model_dump() for name in SECTIONS} | {"options": kept}
     elif config is not None:
         from warpchain.sweeps.sweep_file import read_walk_file  # its grammar takes long to build
 

@@ -4,8 +4,8 @@ import math
 
 from warpchain.chain.link_values import LinkValues, mean_value
 from warpchain.chain.setup import Setup
+from warpchain.chain.softened_joints import SOFT, SOFT_MASS, SOFTEST, Joints
 from warpchain.chain.start_shapes import lay_chain, stadium
-from warpchain.engine.control import SOFT, SOFT_MASS, SOFTEST
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.parameters import Parameters
 
@@ -77,10 +77,10 @@ def drive_of(setup: Setup) -> tuple[tuple[Array, Array], dict[str, float]]:
     return lay_chain(stadium(radius), scene.links, parameters.link_length, 0.0 if from_rest else speed), drive
 
 
-def _as_soft_as(joints: Parameters, own: float, links: LinkValues) -> float:
+def _as_soft_as(joints: Joints, own: float, links: LinkValues) -> float:
     """Stiffness [N/m] of a chain's joints that are as soft as these; none becomes stiffer than its own."""
     heavier = mean_value(links.mass) / SOFT_MASS
-    return min(own, (heavier if heavier > 2 else 1.0) * joints.joint_stiffness)
+    return min(own, (heavier if heavier > 2 else 1.0) * joints.stiffness)
 
 
 def _softness(own: float, soft: float, softest: float, wanted: float) -> float:
