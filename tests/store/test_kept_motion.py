@@ -8,12 +8,12 @@ import pytest
 
 import warpchain
 from tests.run.test_sweep_run import TINY, brief_setup, data_of, outcome, outcomes
+from warpchain.chain.keep import Keep
 from warpchain.engine.batch import CAPACITY_SAMPLES
 from warpchain.inputs.validation import InputError, InputWarning
 from warpchain.reports.sweep_page import write_report
 from warpchain.run.sweep_run import sweep
 from warpchain.store.sweep_result import load
-from warpchain.walks.motion import Keep
 from warpchain.walks.scheduler import run_setups
 
 OFTEN = {"method": "dp5", "record_interval": 1e-4}

@@ -39,9 +39,8 @@ def resolve(
     """
     whole = validated(Scene, scene, "scene")
     changed = parameter_preset(preset).with_values(parameters)
-    setup = Setup(
-        preset, changed, whole, Options.chosen(options, tilts=whole.plane == "tilting", loads=loads)
-    ).checked()
+    chosen = Options.chosen(options, tilts=whole.plane == "tilting", loads=loads)
+    setup = Setup(preset, changed, whole, chosen).checked()
     if seed is None:
         return setup
     drawn = {name: distribution for name, distribution in TABLE.items() if name not in {*scene, *parameters}}

@@ -19,6 +19,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.chain.keep import Keep
 from warpchain.chain.resolution import SECTIONS
 from warpchain.chain.setup import Setup
 from warpchain.files import AnyPath
@@ -31,7 +32,6 @@ from warpchain.sweeps.block import Block
 from warpchain.sweeps.designs import design_points, walks_per_sample
 from warpchain.sweeps.recording import Recording
 from warpchain.sweeps.sweep_file import VERSION, read_sweep
-from warpchain.walks.motion import Keep
 
 Point = dict[str, float]
 """Drawn values by name."""
@@ -119,10 +119,7 @@ class Sweep:
 
     def keep(self, walk: PlannedWalk) -> Keep:
         """What is kept of the motion of a walk."""
-        chosen = {name: choice for name, choice in self.recording.choices.items() if choice.includes(walk.sample)}
-        every = {name: choice.steps(walk.setup.options, f"sweep.record.{name}") for name, choice in chosen.items()}
-        before = getattr(chosen.get("frames"), "before", None) or 0.0
-        return Keep(series_every=every.get("series"), frame_every=every.get("frames"), before=before)
+        return self.recording.keep(walk.sample, walk.setup.options)
 
     def check(self) -> None:
         """Check every cell: its fixed values, its distributions, and that a random sample makes a possible walk."""
