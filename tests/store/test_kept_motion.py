@@ -12,8 +12,8 @@ from warpchain.chain.keep import Keep
 from warpchain.engine.batch import CAPACITY_SAMPLES
 from warpchain.inputs.validation import InputError, InputWarning
 from warpchain.reports.sweep_page import write_report
+from warpchain.results.sweep_result import load
 from warpchain.run.sweep_run import sweep
-from warpchain.store.sweep_result import load
 from warpchain.walks.scheduler import run_setups
 
 OFTEN = {"method": "dp5", "record_interval": 1e-4}
@@ -154,7 +154,7 @@ def test_report_and_pictures_use_kept_frames(kept: Path, tmp_path: Path, monkeyp
     def refuse(*arguments: object, **settings: object) -> None:
         raise AssertionError("run again")
 
-    monkeypatch.setattr("warpchain.walks.one_walk.run_walk", refuse)
+    monkeypatch.setattr("warpchain.results.one_walk.run_walk", refuse)
     write_report(kept, tmp_path / "page.html", animation_of=12)
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "Its frames were kept by the sweep" in page and "run again" not in page

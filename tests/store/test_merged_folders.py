@@ -13,8 +13,8 @@ from tests.support.made_sweeps import make_sweep
 from tests.support.made_walks import assert_same
 from tests.support.sweep_content import blocks, content
 from warpchain.inputs.validation import InputError, InputWarning
+from warpchain.results.sweep_result import load, merge
 from warpchain.run.sweep_run import sweep
-from warpchain.store.sweep_result import load, merge
 
 
 @pytest.mark.parametrize(

@@ -11,12 +11,12 @@ import xarray
 from tests.support.command_line import Command
 from tests.support.synthetic_sweep import SHARD_SIZE, SWEEP, run, synthetic_rows, synthetic_sweep, write
 from warpchain.inputs.validation import InputError, InputWarning
+from warpchain.results.sweep_result import load, merge
+from warpchain.results.walk_result import load_walk
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
 from warpchain.store.shards import Manifest
-from warpchain.store.sweep_result import load, merge
 from warpchain.walks.rows import COLUMNS, STORED_COLUMNS, drawn_column
-from warpchain.walks.walk_result import load_walk
 
 SINGLE = synthetic_sweep(
     {

@@ -9,8 +9,8 @@ import pytest
 
 from tests.support.made_walks import assert_same, make_unreleased, make_walk
 from warpchain.hdf5_files import hdf5_image
+from warpchain.results.walk_result import WalkResult, load_walk
 from warpchain.status import Status
-from warpchain.walks.walk_result import WalkResult, load_walk
 
 # Status
 

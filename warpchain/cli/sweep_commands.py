@@ -102,7 +102,7 @@ def info(
     Of a merged file the checksum is compared first.
     """
     from warpchain.cli.output import print_sweep
-    from warpchain.store.sweep_result import load
+    from warpchain.results.sweep_result import load
 
     print_sweep(load(directory), as_json)
 
@@ -129,7 +129,7 @@ def plot(
     from warpchain.inputs.validation import InputError, printable
     from warpchain.pictures.labels import kinds_of
     from warpchain.reports.sweep_figures import figures
-    from warpchain.walks.walk_result import WalkResult
+    from warpchain.results.walk_result import WalkResult
 
     found = saved(path, "give the folder of a sweep, a merged file, or the file of a saved walk")
     folder = folder or (path.parent if path.is_file() else path)
@@ -184,7 +184,7 @@ def merge(
 ) -> None:
     """Put the results of a folder, or of all parts of a sweep, into one file, which xarray opens."""
     from warpchain.inputs.validation import printable
-    from warpchain.store.sweep_result import merge as merge_shards
+    from warpchain.results.sweep_result import merge as merge_shards
 
     merge_shards(directories, path)
     print(printable(str(path)))

@@ -75,9 +75,9 @@ def walk(
     from warpchain.inputs.distributions import Seed
     from warpchain.inputs.validation import InputError, checked, printable
     from warpchain.inputs.yaml_files import parse_yaml
+    from warpchain.results.one_walk import run_walk
+    from warpchain.results.walk_result import WalkResult
     from warpchain.run.progress_bar import changing_line, walk_progress_text
-    from warpchain.walks.one_walk import run_walk
-    from warpchain.walks.walk_result import WalkResult
 
     named = {"links": links, "frequency": frequency, "start": start}
     given = _given_values(named | {"method": method, "tolerance": tolerance, "device": device}, assignments or [])
@@ -153,7 +153,7 @@ def animate(
     """Write a film of a saved walk: GIF, MP4 or HTML with a player."""
     from warpchain.cli.output import RECORD
     from warpchain.inputs.validation import InputError, printable
-    from warpchain.walks.walk_result import load_walk
+    from warpchain.results.walk_result import load_walk
 
     record = walk / RECORD if walk.is_dir() else walk
     result, path = load_walk(walk), path or record.with_suffix(".gif")

@@ -21,8 +21,8 @@ from warpchain.films.film import CAREFUL, CLOCK, Camera, Film, edges, summary
 from warpchain.inputs.arrays import Array, checked_array
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import InputError, checked
-from warpchain.store.block_result import BlockResult
-from warpchain.store.sweep_result import SweepResult
+from warpchain.results.block_result import BlockResult
+from warpchain.results.sweep_result import SweepResult
 from warpchain.walks.rows import MISSING
 
 FOUND: Final = (

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from warpchain.inputs.arrays import Array, checked_array
 from warpchain.inputs.validation import InputError, checked
-from warpchain.walks.walk_result import WalkResult
+from warpchain.results.walk_result import WalkResult
 
 GRAVITY: Final = 9.809
 """As of Table 1 [m/s²]."""

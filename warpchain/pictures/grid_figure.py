@@ -24,7 +24,7 @@ from warpchain.pictures.labels import math_symbol, short_texts, unit_text, with_
 from warpchain.pictures.style import BLUE, FAINT, GROUND, LINE_COLORS, RED, AnyFigure, NothingToShow, panel_grid, tidy
 
 if TYPE_CHECKING:
-    from warpchain.store.cell_statistics import CellStatistics
+    from warpchain.walks.cell_statistics import CellStatistics
 
 MOST_LINES: Final = len(LINE_COLORS)
 """Greatest number of lines in a panel, unless lines are asked for."""

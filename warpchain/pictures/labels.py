@@ -11,8 +11,8 @@ from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import DIMENSIONLESS, FIELDS, SECTION_OF, field_unit, short
 
 if TYPE_CHECKING:
-    from warpchain.store.cell_statistics import CellStatistics
-    from warpchain.walks.walk_result import WalkResult
+    from warpchain.results.walk_result import WalkResult
+    from warpchain.walks.cell_statistics import CellStatistics
 
     Walk = WalkResult
 else:

@@ -20,9 +20,9 @@ from warpchain.pictures import labels
 from warpchain.pictures.grid_figure import draw_grid
 from warpchain.pictures.labels import cell_values, quantity_name, quantity_text
 from warpchain.pictures.style import BLUE, FAINT, GREEN, INK, LINE_COLORS, RED, NothingToShow, Picture, panel_grid, tidy
+from warpchain.results.block_result import BlockResult
+from warpchain.results.sweep_result import SweepResult
 from warpchain.status import Status
-from warpchain.store.block_result import BlockResult
-from warpchain.store.sweep_result import SweepResult
 from warpchain.sweeps.designs import sobol_indices, walks_per_sample
 from warpchain.walks.rows import quantity_of
 

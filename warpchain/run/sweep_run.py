@@ -38,13 +38,13 @@ from warpchain.inputs.validation import (
     shown,
     validated,
 )
+from warpchain.results.sweep_result import SweepResult, load
 from warpchain.run import progress_bar
 from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text
 from warpchain.run.workers import Pulse, losses_named, pulsing_threads
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
 from warpchain.store.shards import Part, Shard, opened_shard, rows_of, stamp, write_shard
-from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.block import is_axis
 from warpchain.sweeps.plan import PlannedWalk, Source, Sweep, load_sweep
 from warpchain.sweeps.sweep_file import VERSION, BlockKeys

@@ -24,13 +24,13 @@ from warpchain.files import AnyPath, Kind, checked_output, given_path, write_who
 from warpchain.hdf5_files import hdf5_image, kind_of_hdf5, reading_hdf5
 from warpchain.inputs.arrays import AnyArray
 from warpchain.inputs.validation import InputError, InputWarning, full_name, shown, suggestion
-from warpchain.store.block_result import BlockResult, counted, located, status_counts
-from warpchain.store.cell_statistics import CellStatistics
+from warpchain.results.block_result import BlockResult, counted, located, status_counts
+from warpchain.results.walk_result import WalkResult
 from warpchain.store.folder import read_rows
 from warpchain.store.shards import read_manifest, stamp, stored_sweep
 from warpchain.sweeps.plan import Sweep
+from warpchain.walks.cell_statistics import CellStatistics
 from warpchain.walks.rows import COLUMNS, STORED_COLUMNS, derived_columns, drawn_column, quantity_of
-from warpchain.walks.walk_result import WalkResult
 
 if TYPE_CHECKING:
     import h5py

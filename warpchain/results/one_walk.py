@@ -11,10 +11,10 @@ from warpchain.chain.setup import Setup
 from warpchain.engine.devices import gpu_turn
 from warpchain.inputs.validation import InputError, checked
 from warpchain.kernels.methods.method import find_method
+from warpchain.results.walk_result import WalkResult
 from warpchain.version import package_versions
 from warpchain.walks.scheduler import compile_kernels, run_setups
 from warpchain.walks.walk_phases import Progress
-from warpchain.walks.walk_result import WalkResult
 
 _INTERVAL = Annotated[float, Field(ge=1e-6, lt=LONGEST_INTERVAL)]  # as between two samples
 _BEFORE = Annotated[float, Field(ge=0, le=LONGEST_INTERVAL)]
