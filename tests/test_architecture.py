@@ -22,11 +22,11 @@ STOREYS = (
     ("bench",),
     ("films", "reports"),
     ("run",),
-    ("store",),
+    ("results",),
+    ("pictures", "store"),
     ("sweeps",),
     ("walks",),
-    ("engine", "pictures"),
-    ("loop",),
+    ("engine", "loop"),
     ("hdf5_files",),
     ("chain",),
     ("inputs",),
@@ -62,12 +62,9 @@ MODULES = {module_of(path): path for path in (*HOST, *KERNELS)}
 def imports(source: str) -> set[str]:
     """Absolute names of all that a text imports, wherever in it: modules, and names out of modules.
 
-    What is imported for type checkers alone is no arrow: nothing of it is there when the program runs.
+    What is imported for type checkers alone counts: a reader follows it, too.
     """
     found, tree = set(), ast.parse(source)
-    for branch in [node for node in ast.walk(tree) if isinstance(node, ast.If)]:
-        if ast.unparse(branch.test) == "TYPE_CHECKING":
-            branch.body = [ast.Pass()]
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}

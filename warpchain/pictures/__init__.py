@@ -1,1 +1,1 @@
-"""Figures and moving pictures of one walk; they know the shape of a walk, not its class."""
+"""Figures and moving pictures of one walk; of a quantity over a grid; they draw numbers of `walks`, and know no result."""

@@ -14,7 +14,7 @@ from warpchain.chain.setup import Setup
 from warpchain.inputs.arrays import AnyArray
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import InputError, InputWarning, by_name, checked, plain, shown, suggestion
-from warpchain.results.walk_result import WalkResult, read_motion
+from warpchain.results.walk_result import WalkResult
 from warpchain.status import Status
 from warpchain.sweeps.block import POINT, Block
 from warpchain.sweeps.plan import Sweep
@@ -22,6 +22,7 @@ from warpchain.walks import rows
 from warpchain.walks.cell_statistics import CellStatistics
 from warpchain.walks.landmarks import LENGTHS
 from warpchain.walks.rows import COLUMNS, MISSING, Column, quantity_of
+from warpchain.walks.walk_numbers import read_motion
 
 if TYPE_CHECKING:
     import h5py

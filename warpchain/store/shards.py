@@ -29,12 +29,12 @@ from numpy.typing import NDArray
 from warpchain.files import AnyPath, naming, write_whole
 from warpchain.hdf5_files import hdf5_image, open_regular, reading_hdf5
 from warpchain.inputs.validation import InputError
-from warpchain.results.walk_result import write_motion
 from warpchain.sweeps.designs import EXTENSIBLE
 from warpchain.sweeps.plan import Sweep
 from warpchain.sweeps.sweep_file import fields_of
 from warpchain.version import NUMERICS_VERSION, package_versions
 from warpchain.walks.rows import KEYS, MISSING, Rows, row_type
+from warpchain.walks.walk_numbers import write_motion
 
 if TYPE_CHECKING:
     import h5py
