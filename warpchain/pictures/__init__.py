@@ -1,1 +1,1 @@
-"""Figures and moving pictures of one walk; of a quantity over a grid; they draw numbers of `walks`, and know no result."""
+"""Figures and moving pictures of one walk, and of a quantity over a grid: they draw what `walks` knows."""
