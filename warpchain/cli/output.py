@@ -119,11 +119,11 @@ def _walk_rows(result: WalkResult) -> Iterator[tuple[str, str]]:
 def saved(path: Path, wanted: str) -> "WalkResult | SweepResult":
     """The walk or the sweep of a file or a folder; else an `InputError` says what is `wanted` in its place."""
     from warpchain.hdf5_files import kind_of_hdf5
-    from warpchain.results.sweep_result import KIND, load
+    from warpchain.results.sweep_result import MERGED, load
 
     record = path / RECORD if os.path.isfile(path / RECORD) else path
     is_sweep = record.is_dir() or (record.suffix != ".h5" and not record.exists())
-    return load(record) if is_sweep or kind_of_hdf5(record, wanted) == KIND else load_walk(record)
+    return load(record) if is_sweep or kind_of_hdf5(record, wanted) == MERGED.kind else load_walk(record)
 
 
 def try_walk_folder(folder: Path) -> None:

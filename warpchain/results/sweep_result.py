@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from warpchain.files import AnyPath, Kind, checked_output, given_path, write_whole
-from warpchain.hdf5_files import hdf5_image, kind_of_hdf5, reading_hdf5
+from warpchain.hdf5_files import Format, hdf5_image, kind_of_hdf5, reading_hdf5
 from warpchain.inputs.arrays import AnyArray
 from warpchain.inputs.validation import InputError, InputWarning, full_name, shown, suggestion
 from warpchain.results.block_result import BlockResult, counted, located, status_counts
@@ -31,6 +31,7 @@ from warpchain.store.shards import read_manifest, stamp, stored_sweep
 from warpchain.sweeps.plan import Sweep
 from warpchain.walks.cell_statistics import CellStatistics
 from warpchain.walks.rows import COLUMNS, STORED_COLUMNS, derived_columns, drawn_column, quantity_of
+from warpchain.walks.walk_numbers import MOTION
 
 if TYPE_CHECKING:
     import h5py
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure, SubFigure
 
-KIND: Final = "warpchain sweep result"
+MERGED: Final = Format.of("warpchain sweep result", COLUMNS, MOTION)
 REMEDY: Final = "merge the folders again, or fetch another copy of the file"
 WANTED: Final = "give a folder of a sweep or a merged file; a saved walk is for plot, animate and load_walk"
 
@@ -231,8 +232,8 @@ def _load_folder(directory: AnyPath) -> SweepResult:
 
 
 def _load_merged(path: AnyPath) -> SweepResult:
-    opened = partial(reading_hdf5, Path(path).absolute(), KIND, REMEDY, WANTED)
-    with reading_hdf5(path, KIND, REMEDY, WANTED) as file:
+    opened = partial(reading_hdf5, Path(path).absolute(), MERGED, REMEDY, WANTED)
+    with reading_hdf5(path, MERGED, REMEDY, WANTED) as file:
         sweep = stored_sweep(path, json.loads(file.attrs["sweep"]))
         provenance = {"digest": file.attrs["digest"], "numerics_version": int(file.attrs["numerics_version"])}
         provenance["versions"] = json.loads(file.attrs["versions"])
@@ -295,7 +296,7 @@ def merge(sources: AnyPath | Sequence[AnyPath], path: AnyPath) -> None:
             columns = {key: np.where(there, values, other.columns[key]) for key, values in block.columns.items()}
             blocks[block.name] = replace(block, columns=columns, motions=np.where(there, block.motions, other.motions))
         whole = replace(whole, blocks=blocks)
-    write_whole(target, hdf5_image(KIND, partial(_fill, whole=whole)), _MERGED)
+    write_whole(target, hdf5_image(MERGED, partial(_fill, whole=whole)), _MERGED)
     if missing := whole.missing_count:
         problem = f"{missing:,} of {whole.walk_count:,} walks are missing"
         remedy = "merge again with all parts, once they have run"
@@ -305,7 +306,7 @@ def merge(sources: AnyPath | Sequence[AnyPath], path: AnyPath) -> None:
 def _is_merged(path: Path) -> bool:
     """Whether `merge` has written this file, and nothing has damaged it since; an `OSError` if it cannot be read."""
     try:
-        return not path.is_symlink() and path.is_file() and kind_of_hdf5(path, WANTED) == KIND
+        return not path.is_symlink() and path.is_file() and kind_of_hdf5(path, WANTED) == MERGED.kind
     except InputError:
         return False
 

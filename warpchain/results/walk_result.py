@@ -19,21 +19,21 @@ import numpy as np
 from warpchain.chain.resolution import SECTIONS
 from warpchain.chain.setup import Setup, State
 from warpchain.files import write_whole
-from warpchain.hdf5_files import hdf5_image, put, read_fields, reading_hdf5, write_fields
+from warpchain.hdf5_files import Format, hdf5_image, put, read_fields, reading_hdf5, write_fields
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import InputError, json_value, validated
+from warpchain.loop.stationary_loop import FIELDS
 from warpchain.pictures.labels import Kind
 from warpchain.status import Status
 from warpchain.walks.landmarks import MOST_ENERGY_ERROR
 from warpchain.walks.restart import state_at
-from warpchain.walks.walk_numbers import NUMBERS, WalkNumbers, read_motion, write_motion
+from warpchain.walks.walk_numbers import NUMBERS, STORED, WalkNumbers, read_motion, write_motion
 
 if TYPE_CHECKING:
     import h5py
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-KIND: Final = "warpchain walk"
 WANTED: Final = "give a saved walk; `walk --like SWEEP --index I` saves one"
 
 _GROUP: Final = "start"
@@ -45,6 +45,7 @@ _STATE: Final = {
     "axes": ("1", "axes of x and y of the plane in the room"),
     "plane_rates": ("m/s, rad/s, rad/s", "speed across the plane, and its turning rates about x and y"),
 }
+_FORMAT: Final = Format.of("warpchain walk", STORED, FIELDS, {name: unit for name, (unit, _) in _STATE.items()})
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -158,7 +159,7 @@ class WalkResult(WalkNumbers):
         Raises:
             OSError: the file cannot be written, or something else than a regular file is there; one line that names it.
         """
-        write_whole(path, hdf5_image(KIND, self._fill))
+        write_whole(path, hdf5_image(_FORMAT, self._fill))
 
     def _fill(self, file: "h5py.File") -> None:
         """Fill an empty file."""
@@ -188,7 +189,7 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
             raise InputError(f"{path}: the folder of a sweep, not of a saved walk; {WANTED}")
         path = record
     remedy = "run the walk again, or fetch another copy of the file"
-    with reading_hdf5(path, KIND, remedy, WANTED) as file:
+    with reading_hdf5(path, _FORMAT, remedy, WANTED) as file:
         given = json.loads(file.attrs["setup"])
         try:
             sections: Any = {name: validated(model, given[name], name) for name, model in SECTIONS.items()}

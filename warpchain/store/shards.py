@@ -27,14 +27,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.files import AnyPath, naming, write_whole
-from warpchain.hdf5_files import hdf5_image, open_regular, reading_hdf5
+from warpchain.hdf5_files import Format, hdf5_image, open_regular, reading_hdf5
 from warpchain.inputs.validation import InputError
 from warpchain.sweeps.designs import EXTENSIBLE
 from warpchain.sweeps.plan import Sweep
 from warpchain.sweeps.sweep_file import fields_of
 from warpchain.version import NUMERICS_VERSION, package_versions
-from warpchain.walks.rows import KEYS, MISSING, Rows, row_type
-from warpchain.walks.walk_numbers import write_motion
+from warpchain.walks.rows import KEYS, MISSING, STORED_COLUMNS, Rows, row_type
+from warpchain.walks.walk_numbers import MOTION, write_motion
 
 if TYPE_CHECKING:
     import h5py
@@ -45,8 +45,8 @@ OWN: Final = ("sweep.h5", "sweep.yaml", "shards", "log.txt")
 """What a sweep has in its folder, beside the lock."""
 EARLIER: Final = "sweep.json"
 """What earlier versions have there instead of sweep.h5."""
-MANIFEST: Final = "warpchain sweep"
-KIND: Final = "warpchain shard"
+MANIFEST: Final = Format.of("warpchain sweep")
+SHARD: Final = Format.of("warpchain shard", STORED_COLUMNS, MOTION, dict(KEYS.fields or {}))
 _NAME: Final = re.compile(r"\d{6,}\.h5")
 FOREIGN: Final = "a shard of another sweep; move it out of this folder"
 
@@ -212,7 +212,7 @@ def write_shard(
         for row in sorted(motions):
             write_motion(file.create_group(f"motion/{row}", track_order=True), motions[row], np.float32)
 
-    write_whole(Path(directory) / "shards" / shard.name, hdf5_image(KIND, fill))
+    write_whole(Path(directory) / "shards" / shard.name, hdf5_image(SHARD, fill))
 
 
 def rows_of(file: "h5py.File", kind: np.dtype[np.void]) -> Rows:
@@ -240,7 +240,7 @@ def shard_files(directory: AnyPath) -> list[str]:
 def opened_shard(directory: AnyPath, name: str, digest: str) -> "Iterator[h5py.File]":
     """The shard of this name and digest; an `OSError` if it is unreadable, an `InputError` if damaged or foreign."""
     path = Path(directory) / "shards" / name
-    with reading_hdf5(path, KIND, "delete it and run the sweep again, which computes only its walks") as file:
+    with reading_hdf5(path, SHARD, "delete it and run the sweep again, which computes only its walks") as file:
         if (file.attrs["name"], file.attrs["digest"]) != (name, digest):
             raise InputError(f"{path}: {FOREIGN}")
         yield file
