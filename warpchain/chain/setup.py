@@ -49,7 +49,7 @@ class Setup:
     @property
     def has_drive(self) -> bool:
         """Whether the walk begins on a sprocket."""
-        return self.start is None and self.scene.start != "ellipse"
+        return self.start is None and self.scene.is_on_sprocket
 
     @cached_property
     def link_values(self) -> LinkValues:

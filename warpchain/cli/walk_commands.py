@@ -10,11 +10,12 @@ import typer
 
 from warpchain.cli.words import JSON, argument, option, output
 from warpchain.inputs.methods import METHODS
+from warpchain.inputs.starts import STARTS
 
 FAILED: Final = 1
 """Exit status of a command whose walks failed."""
 
-_STARTS: Final = "rest: spin up on the sprocket; spinning: circulate on it; ellipse: without a sprocket. Default: rest."
+_STARTS: Final = f"{'; '.join(f'{word}: {start.described}' for word, start in STARTS.items())}. Default: rest."
 _PRESETS: Final = "Parameters to start from. paper: Table 1 of the paper; soft: softer joints. Default: paper."
 _METHODS: Final = (
     "standard: hybrid at 3e-3, joints softened on the sprocket and in the pile, on a GPU the next; explicit: os32 at "

@@ -70,8 +70,8 @@ class WalkNumbers(Outcome):
     @property
     def sprocket_radius(self) -> float:
         """Radius of the sprocket that links touch [m]; NaN without one."""
-        scene, had_none = self.setup.scene, self.setup.start is not None and np.isnan(self.sprocket_height)
-        return np.nan if had_none or scene.start == "ellipse" else self.setup.contact_radius
+        had_none = self.setup.start is not None and np.isnan(self.sprocket_height)
+        return np.nan if had_none or not self.setup.scene.is_on_sprocket else self.setup.contact_radius
 
     @property
     def joints_in_room(self) -> Array | None:

@@ -17,10 +17,9 @@ from warpchain.chain.floor import circles_of
 from warpchain.chain.keep import NOTHING, Keep
 from warpchain.chain.setup import Setup, State
 from warpchain.chain.sprocket_motion import motion_rows
-from warpchain.chain.start_shapes import ellipse, lay_chain
+from warpchain.chain.starts import laid_start
 from warpchain.engine.world import CACHES, World
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.validation import InputError
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.status import Status
@@ -108,14 +107,7 @@ class WalkRun:
                 world.set_state(first_area=area)
                 world.resume(self._walk_end, Status.TIME_LIMIT)
         elif not setup.has_drive:
-            scene, length = setup.scene, setup.parameters.link_length
-            speed = 2 * math.pi * scene.frequency * setup.joint_radius
-            try:
-                laid = lay_chain(ellipse(scene.ellipse_aspect), scene.links, length, speed, scene.phase)
-            except ValueError:
-                problem = f"too far from 1 for {scene.links} links; give one closer to it"
-                raise InputError(f"scene.ellipse_aspect: {problem}") from None
-            self._release(*laid)
+            self._release(*laid_start(setup))
         else:
             hanging = math.nan
             (position, velocity), drive = drive_of(setup)
