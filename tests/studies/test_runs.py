@@ -76,7 +76,7 @@ MADE: dict[str, tuple[ModuleType, dict[str, Any], Callable[..., Any], list[str]]
             },
         ),
         further(1.1, lambda walk: walk.setup.scene.lateral_speed),
-        ["| tilt 0.1 rad, lateral speed 0.3 m/s |", "| 1.100 ± 0.005 (1.10 to 1.10) |"],
+        ["| tilt 0.1 rad, lateral speed 0.3 m/s |", "| 1.100 (1.10–1.10) |"],
     ),
     "floor friction": (
         friction,
