@@ -11,7 +11,7 @@ import numpy as np
 import typer
 
 import warpchain
-from studies.common import Columns, publish, read_columns, run_study, table, write_rows
+from studies.common import Columns, publish, read_columns, run_study, show, table, write_rows
 from studies.phase_diagram import candidates, cells, drawing, laws, scales, strands
 from studies.phase_diagram.cells import FAILURES, WAYS
 from studies.phase_diagram.endings import Ending
@@ -76,16 +76,15 @@ def make(
         write_rows(strands.CSV, strands.reduced([warpchain.load(path) for path in meetings]))
     found, met, varied = read_columns(cells.CSV), read_columns(strands.CSV), scales.Cells()
     points = laws.points_of(found)
+    ranges = candidates.ranges(found)
     tables = {
         "cells": table_of_cells(found),
-        "failures": table_of_failures(found),
-        "endings": table_of_endings(found),
         "scales": scales.table(varied, points),
-        "candidates": candidates.table(found),
-        "strands": strands.shares(met),
-        "by bounces": strands.by_bounces(met),
-        "ways with strands": strands.ways(met),
+        "candidates": candidates.table({name: ranges[name] for name in candidates.SHOWN}),
+        "meetings": strands.meetings(met),
     }
+    show({"failures": table_of_failures(found), "endings": table_of_endings(found), **candidates.details(ranges)})
+    show({"strands": strands.shares(met), "endings with strands": strands.ways(met)})
     figures = {"maps": drawing.draw_maps(found), "laws": drawing.draw_laws(points)}
     publish(FOLDER, tables, figures | {"scales": scales.draw(varied, points)})
 
