@@ -42,11 +42,11 @@ def reduced(blocks: Mapping[str, Block]) -> Iterator[dict[str, Any]]:
 
 
 def distances(rows: Columns) -> str:
-    """Δx ± its standard error and (standard deviation) of each cell, a row for each mass, in Markdown."""
+    """Δx and (standard deviation of a walk) of each cell, a row for each mass, in Markdown."""
     cells: dict[str, dict[str, str]] = {}
     for row in zip(*rows.values(), strict=True):
         at = dict(zip(rows, row, strict=True))
-        text = "{dx:.3f} ± {standard_error:.3f} ({sd:.3f})".format(**at) if at["at_rest"] else "–"
+        text = "{dx:.3f} ({sd:.3f})".format(**at) if at["at_rest"] else "–"
         share = "" if at["at_rest"] in (0, 1) else f", {100 * at['at_rest']:.0f} %"
         chain = "{links:g} links, {frequency:g} Hz".format(**at)
         cells.setdefault(f"{1e3 * at['charm_mass']:g}", {})[chain] = text + share

@@ -192,10 +192,7 @@ def floor_friction(numbers: Numbers) -> Found:
 
 def collapse(numbers: Numbers) -> Found:
     """Longer links lose their loop after fewer bounces."""
-    verdict, words = monotonic(numbers, "link_length", numbers["paper_claims"]["collapse"]["values"], -1)
-    distances = effects(numbers)["link_length"]["values"]
-    texts = (f"{effect.notes['value']:g}: {percent(effect.cells.mean)}" for effect in distances)
-    return verdict, {**words, "distances": ", ".join(texts)}
+    return monotonic(numbers, "link_length", numbers["paper_claims"]["collapse"]["values"], -1)
 
 
 def lost_on_floor(numbers: Numbers) -> Found:

@@ -30,6 +30,7 @@ NAMES = {
     "ellipse_aspect": "aspect ratio of the ellipse",
 }
 """What the paper leaves open, by field."""
+SHOWN = 0.02  # Least change of Δx that the table of Table 1's quantities has
 WORDS = {"pitch": "the joints", "contact": "the contact surface"}
 
 
@@ -126,12 +127,11 @@ def of_cells(cells: Mapping[str, Any], head: str, rows: Mapping[str, Any]) -> st
 
 
 def distances(numbers: Numbers) -> str:
-    """Mean Δx ± standard deviation of a walk, by start, links and frequency."""
+    """Mean Δx by start, links and frequency."""
     cells, rows = numbers["paper_claims"]["cells"], {}
     for place, links in enumerate(cells["links"]):
         for start in ("rest", "ellipse"):
-            mean, sd = (findings.of_start(numbers, start, name)[place] for name in ("mean", "sd"))
-            rows[f"{links} | {start}"] = [f"{one:.3f} ± {other:.3f}" for one, other in zip(mean, sd, strict=True)]
+            rows[f"{links} | {start}"] = [f"{each:.3f}" for each in findings.of_start(numbers, start, "mean")[place]]
     return of_cells(cells, "links | start", rows)
 
 
@@ -153,10 +153,10 @@ def impacts(numbers: Numbers) -> str:
 
 
 def effects(numbers: Numbers) -> str:
-    """What each value of each quantity does to Δx, mean of the cells."""
+    """What each value of a quantity does to Δx, mean of the cells, if it does more than `SHOWN`."""
     rows = []
     for name, content in findings.effects(numbers).items():
-        if name == "start":
+        if name == "start" or max(abs(effect.cells.mean) for effect in content["values"]) < SHOWN:
             continue
         symbol = SYMBOLS.get(name) or "{0.symbol} ({0.value:g})".format(Parameters.quantities()[name])
         texts = (f"{effect.notes['value']:g}: {effect}" for effect in content["values"])

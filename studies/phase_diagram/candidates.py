@@ -132,7 +132,7 @@ def table(known: Mapping[str, Points]) -> str:
         row = [candidate.name, str(candidate.numbers)]
         for points in known.values():
             left = [residual(points, candidate), *(left_out(points, candidate, block) for block in BLOCKS)]
-            row.append(" / ".join(f"{laws.root_mean_square(each):.1f}" for each in left))
+            row.append("/".join(f"{laws.root_mean_square(each):.1f}" for each in left))
         rows.append(row)
     heads = (f"{name} ({len(points.links)} cells)" for name, points in known.items())
     return markdown(("law of Δx", "numbers", *heads), rows)

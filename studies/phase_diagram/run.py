@@ -20,7 +20,7 @@ FOLDER = Path(__file__).parent
 
 
 def table_of_cells(cells: Columns) -> str:
-    """Markdown: Δx ± s.d. for about six links and frequencies, evenly spread, and the share that failed if any did."""
+    """Markdown: mean Δx for about six links and frequencies, evenly spread, and the share that failed if any did."""
     shown_links, shown_frequencies = (
         known[np.unique(np.linspace(0, len(known) - 1, 6).round().astype(int))]
         for known in (np.unique(cells[name]) for name in ("links", "frequency"))
@@ -30,9 +30,9 @@ def table_of_cells(cells: Columns) -> str:
         texts = []
         for frequency in shown_frequencies:
             here = (cells["links"] == number) & (cells["frequency"] == frequency)
-            mean, sd, rest, walks = (cells[name][here][0] for name in ("dx_mean", "dx_sd", "at_rest", "walks"))
-            text = "–" if np.isnan(mean) else f"{mean:.3g} ± {sd:.2g}"
-            texts.append(text if rest == walks else f"{text} ({100 * (1 - rest / walks):.3g} % failed)")
+            mean, rest, walks = (cells[name][here][0] for name in ("dx_mean", "at_rest", "walks"))
+            text = "–" if np.isnan(mean) else f"{mean:.3g}"
+            texts.append(text if rest == walks else f"{text} ({100 * (1 - rest / walks):.2g} %)")
         rows.append([f"{number:g}", *texts])
     return table(("links", *(f"{frequency:g} Hz" for frequency in shown_frequencies)), rows)
 

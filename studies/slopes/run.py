@@ -22,6 +22,7 @@ TABLES = {
     "stairs": (("links",), ("frequency",)),
 }
 """Block of the sweep → axes down its table, and across it."""
+SHOWN = (-10, -5, 0, 5, 10, 12.5, 15, 17.5, 25, 30)  # Slopes of the tables [°]
 
 
 def is_endless(block: Block) -> Array:
@@ -95,7 +96,7 @@ def main(folder: Annotated[str | None, typer.Argument()] = None) -> None:
         common.publish(FOLDER, {}, {"slopes": draw(blocks["slope"])})
     columns, tables = common.read_columns(FOLDER / RESULTS), {}
     for name, axes in TABLES.items():
-        chosen = columns["block"] == name
+        chosen = (columns["block"] == name) & (np.isin(columns["slope"], SHOWN) | np.isnan(columns["slope"]))
         tables[name] = distances({key: values[chosen] for key, values in columns.items()}, *axes)
     common.publish(FOLDER, tables)
 

@@ -60,9 +60,9 @@ def same_row(title: str, ours: Any, theirs: Any) -> tuple[str, ...]:
         np.interp(s, ours.s, getattr(ours, name)) - np.interp(s, theirs.s, getattr(theirs, name))
         for name in ("effective_tension", "curvature")
     )
-    bend = f"{theory.rms(curvature):.2f} 1/m ({theirs.curvature.max():.1f})"
-    pull = f"{theory.rms(tension):.3f} N ({theirs.effective_tension.max():.1f})"
-    return title, f"{height:.2f} %", f"{width:.2f} %", f"{theory.rms(apart):.2f} mm", bend, pull
+    bend = f"{theory.rms(curvature):.2f} ({theirs.curvature.max():.1f})"
+    pull = f"{theory.rms(tension):.3f} ({theirs.effective_tension.max():.1f})"
+    return title, f"{height:.2f}", f"{width:.2f}", f"{theory.rms(apart):.2f}", bend, pull
 
 
 def draw(walk: warpchain.WalkResult) -> Figure:
@@ -123,12 +123,12 @@ def main(kinks: Annotated[str | None, typer.Argument()] = None) -> None:
             if cell == SHOWN:
                 figure = draw(walk)
     shape_head = "links, Hz | bottom: simulation, theory, catenary | kink | kink in theory | off: theory, catenary / mm"
-    show({"balances": minus(table("links, Hz | force | normal force | moment | friction", balances))})
-    tables = {
-        "shapes": table(shape_head, shapes),
-        "same loop": table("links, Hz | height | width | position | curvature | tension less ρv²", same),
+    printed = {
+        "balances": table("links, Hz | force | normal force | moment | friction", balances),
+        "same loop": table("links, Hz | height / % | width / % | position / mm | curvature / (1/m) | T_e / N", same),
     }
-    publish(FOLDER, {name: minus(text) for name, text in tables.items()}, {"loop": figure}, dpi=100)
+    show({name: minus(text) for name, text in printed.items()})
+    publish(FOLDER, {"shapes": minus(table(shape_head, shapes))}, {"loop": figure}, dpi=100)
 
 
 if __name__ == "__main__":

@@ -133,9 +133,9 @@ def means(cells: Cells) -> str:
         for chosen in columns:
             pairs = [(_together(cells, one, cell), _together(cells, other, cell)) for cell in chosen]
             found = common.OverCells(*zip(*(_ratio(*pair) for pair in pairs if all(pair)), strict=True))
-            texts.append(f"{found.text(2)} ({found.chi2:.1f} / {len(found)})")
+            texts.append(f"{found.text(2).removesuffix(' %')} ({found.chi2:.1f}/{len(found)})")
         rows.append((f"{one} over {other}", *texts))
-    head = f"Δx (χ² / d.o.f.) | all cells | below {LONG} links | {LONG} links or more, 20 and 30 Hz"
+    head = f"change of Δx / % (χ²/d.o.f.) | all cells | below {LONG} links | {LONG} links or more, 20 and 30 Hz"
     return common.table(head, rows)
 
 

@@ -64,11 +64,15 @@ def _of_cells(columns: Columns, fixed: Any) -> dict[str, str]:
 
 
 def taps_table(rows: list[dict[str, str]]) -> str:
-    """What each tap does, means over the cells."""
+    """What each tap of one kind does, means over the cells."""
     head = "perturbation | fell over / % | before collapse / % | Δx over fixed plane (cells) | drift / m"
     shown = "{fell}", "{early}", "{ratio} ({least}–{greatest})", "{drift}"
     straight = f"straight_{STRAIGHT[-1]:g}"
-    lines = ((minus(row["tap"]), *(text.format(**row) for text in shown), row[straight]) for row in rows)
+    lines = (
+        (minus(row["tap"]), *(text.format(**row) for text in shown), row[straight])
+        for row in rows
+        if "," not in row["tap"]
+    )
     return table(f"{head} | straight / %", lines)
 
 

@@ -9,10 +9,11 @@ import typer
 
 from studies import common
 from studies.common import Array
-from studies.waves.drag import CELLS, SAMPLES, SEEDS, VARIANTS
+from studies.waves.drag import CELLS, HALVES, SAMPLES, SEEDS, VARIANTS
 
 FOLDER = Path(__file__).parent
 RESULTS = FOLDER / "results" / "doses.csv"
+SHOWN = (1e-9, *HALVES)  # Rates of the table [1/s]
 
 
 def reduced(files: Sequence[Path]) -> Iterator[dict[str, object]]:
@@ -56,12 +57,12 @@ def changes_table(drags: Sequence[tuple[str, float]]) -> str:
 def summary_table() -> str:
     """Each drag over the cells: mean, root mean square less errors, range, significant cells."""
     lines = []
-    for when, rate in VARIANTS[1:]:
+    for when, rate in (each for each in VARIANTS[1:] if each[1] in SHOWN):
         values, errors = changes(when, rate)
-        over, ends = common.OverCells(values, errors), f"{values.min():+.0f} to {values.max():+.0f} %"
-        texts = over.text(), f"{over.typical:.1f} %", ends, f"{over.rises}, {over.falls}"
+        over, ends = common.OverCells(values, errors), f"{values.min():+.0f} to {values.max():+.0f}"
+        texts = over.text().removesuffix(" %"), f"{over.typical:.1f}", ends, f"{over.rises}, {over.falls}"
         lines.append([f"{rate:g}/s", when, *texts])
-    return common.minus(common.table("drag | acts | mean of cells | typical | range | longer, shorter", lines))
+    return common.minus(common.table("drag | acts | mean / % | typical / % | range / % | longer, shorter", lines))
 
 
 def between_seeds() -> str:

@@ -51,7 +51,7 @@ MADE: dict[str, tuple[ModuleType, dict[str, Any], Callable[..., Any], list[str]]
         charm,
         sweep_of(charm, blocks=[sweep_of(charm)["blocks"][0] | {"samples": 2}]),
         lambda walk: 1.0 - walk.setup.scene.charm_mass + 0.002 * (walk.sample - 0.5),
-        ["| 0 | 1.000 ± 0.001 (0.001) |", "| 100 | 0.900 ± 0.001 (0.001) |"],
+        ["| 0 | 1.000 (0.001) |", "| 100 | 0.900 (0.001) |"],
     ),
     "slopes": (
         slopes,
@@ -71,12 +71,12 @@ MADE: dict[str, tuple[ModuleType, dict[str, Any], Callable[..., Any], list[str]]
             "taps",
             {
                 "name": "lateral_speed",
-                "scene": {"plane": "tilting", "tilt": 0.1},
+                "scene": {"plane": "tilting"},
                 "grid": GRID | {"lateral_speed": [0.3]},
             },
         ),
         further(1.1, lambda walk: walk.setup.scene.lateral_speed),
-        ["| tilt 0.1 rad, lateral speed 0.3 m/s |", "| 1.100 (1.10–1.10) |"],
+        ["| lateral speed 0.3 m/s |", "| 1.100 (1.10–1.10) |"],
     ),
     "floor friction": (
         friction,
