@@ -31,8 +31,8 @@ def table_of_cells(cells: Columns) -> str:
         for frequency in shown_frequencies:
             here = (cells["links"] == number) & (cells["frequency"] == frequency)
             mean, rest, walks = (cells[name][here][0] for name in ("dx_mean", "at_rest", "walks"))
-            text = "–" if np.isnan(mean) else f"{mean:.3g}"
-            texts.append(text if rest == walks else f"{text} ({100 * (1 - rest / walks):.2g} %)")
+            text = "–" if np.isnan(mean) else f"{mean:#.3g}"
+            texts.append(text if rest == walks else f"{text} ({100 * (1 - rest / walks):.3g} %)")
         rows.append([f"{number:g}", *texts])
     return table(("links", *(f"{frequency:g} Hz" for frequency in shown_frequencies)), rows)
 

@@ -115,7 +115,8 @@ def meetings(cells: Columns) -> str:
             mean, _, _, ends = _over_cells(values, cells[f"held_se{end}"][chosen])
             texts.append(f"{mean} ({np.isfinite(values).sum()}: {ends})")
         rows.append((links, *texts))
-    head = "links | 1 | 2 | later | never | by the first | by the second | by the third"
+    head = "links | met in bounce 1 / % | 2 / % | later / % | never / %"
+    head += " | Δx, if met by the first | by the second | by the third"
     return minus(markdown(head, rows))
 
 
