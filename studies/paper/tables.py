@@ -143,13 +143,15 @@ def ellipses(numbers: Numbers) -> str:
 
 
 def impacts(numbers: Numbers) -> str:
-    """Changes in the first impact, means over the numbers of links at each frequency."""
-    content, rows = numbers["paper_shapes"], []
-    for place, frequency in enumerate(content["cells"]["frequency"]):
-        columns = (content["impacts"][name][:, place] for name in ("area", "height", "width", "speed"))
-        known = (values[np.isfinite(values)] for values in columns)
-        rows.append([f"{frequency:g} Hz", *(percent(values.mean()) if values.size else "—" for values in known)])
-    return table(["", "area", "height", "width", "speed along the loop"], rows)
+    """Changes in the first impact, means over the numbers of links, of the frequencies at which loops rise again."""
+    content = numbers["paper_shapes"]
+    rise = np.isfinite(content["impacts"]["speed"]).any(axis=0)
+    frequencies = ", ".join(f"{each:g}" for each in np.array(content["cells"]["frequency"])[rise])
+    texts = []
+    for name in ("speed", "width", "height", "area"):
+        means = map(percent, np.nanmean(content["impacts"][name][:, rise], axis=0))
+        texts.append(f"the {name} by {', '.join(means)}")
+    return f"at {frequencies} Hz {'; '.join(texts)}"
 
 
 def effects(numbers: Numbers) -> str:

@@ -214,6 +214,6 @@ def tables_and_figure() -> tuple[dict[str, str], Figure]:
     found, rows = measured(angles, waves), [row for packet in PACKETS for row in packets(*packet, speed)]
     head = "links | links per wave |  | along the chain, m/s | theory | laboratory frame, m/s | γ, 1/s | theory"
     texts = minus(table(head, (row[:-2] for row in rows), "d .0f s .3f .3f .2f .3g .3g"))
-    show({"modes of the ring": ring_table(speed, waves, found)})
-    tables = {"reach": reach_table(), "ring": ring_text(speed, waves, found), "packets": texts}
+    show({"modes of the ring": ring_table(speed, waves, found), "packets": texts})
+    tables = {"reach": reach_table(), "ring": ring_text(speed, waves, found)}
     return tables, draw(speed, waves, found, np.array([row[-2:] for row in rows]))
