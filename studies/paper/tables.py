@@ -150,7 +150,7 @@ def impacts(numbers: Numbers) -> str:
     texts = []
     for name in ("speed", "width", "height", "area"):
         means = map(percent, np.nanmean(content["impacts"][name][:, rise], axis=0))
-        texts.append(f"the {name} by {', '.join(means)}")
+        texts.append(f"their {name} by {', '.join(means)}")
     return f"at {frequencies} Hz {'; '.join(texts)}"
 
 
