@@ -155,6 +155,21 @@ def test_the_drawing_shows_the_arrows() -> None:
     assert drawn == arrows()
 
 
+def test_what_the_pages_name_exists() -> None:
+    """Files, folders, functions and fields that docs/architecture.md names in code are in the tree."""
+    text = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
+    names = set(re.findall(r"`([^`\n]+)`", re.sub(r"```.*?```", "", text, flags=re.DOTALL)))
+    code = "\n".join(path.read_text(encoding="utf-8") for path in (*HOST, *KERNELS))
+    words = set(re.findall(r"\w+", code)) | {"warpchain", "kernels"} | {path.stem for path in ROOT.glob("docs/*.py")}
+    files = [f"/{name}" for name in tracked()]
+    for name in names:
+        if "/" in name or name.endswith((".py", ".toml", ".md", ".json", ".html")):
+            path = name.split(" ")[-1].split(".py:")[0]
+            assert [file for file in files if f"/{path}" in file or file.endswith(f"/{path}")], f"no file {name}"
+        elif re.fullmatch(r"[A-Za-z_][\w.]*", name):
+            assert set(name.split(".")) <= words, f"no code is named {name}"
+
+
 @pytest.mark.parametrize("path", [*HOST, *KERNELS], ids=module_of)
 def test_a_file_is_short_and_knows_its_place(path: Path) -> None:
     """A file is one concept, which fits in so many lines; it knows no study, and a kernel neither NumPy nor the host.
