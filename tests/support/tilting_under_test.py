@@ -28,12 +28,12 @@ Start = tuple[Array, Array, Plane]
 
 
 def row_of(plane: Plane) -> Array:
-    """A plane as `Batch.set_plane` takes it, (12,)."""
+    """A plane as `World.set_plane` takes it, (12,)."""
     return np.array([plane.speed, *plane.turn, *plane.x, *plane.y, *plane.origin])
 
 
 def plane_of(row: Array) -> Plane:
-    """A plane from what `Batch.plane` gives, (12,)."""
+    """A plane from what `World.plane` gives, (12,)."""
     return Plane(float(row[0]), row[1:3].copy(), row[3:6].copy(), row[6:9].copy(), row[9:12].copy())
 
 

@@ -98,9 +98,9 @@ class World:
         self.set_floor(setup.floor)
 
     def set_chain(
-        self, parameters: Parameters, links: int, own: LinkValues | None = None, sprocket: float = 0.0
+        self, parameters: Parameters, links: int, own: LinkValues | None = None, sprocket: float | None = None
     ) -> None:
-        """Set the chain, and the radius of its sprocket [m]; without values of its own, links alternate."""
+        """Set the chain and the radius of its sprocket [m], by default its parameter; by default, links alternate."""
         own, half, chains = (
             own or alternating(parameters, links),
             parameters.link_length / 2,
@@ -113,7 +113,7 @@ class World:
             "mass": own.total_mass,
             "circle_radius": own.radius.max(),
             "inverse_smoothing": 1 / parameters.friction_smoothing,
-            "sprocket_radius": sprocket,
+            "sprocket_radius": parameters.sprocket_radius if sprocket is None else sprocket,
         }
         for name in chains.dtype.names or ():
             chains[name][self._at] = values.get(name, 0)
