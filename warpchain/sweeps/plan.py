@@ -171,15 +171,16 @@ class Sweep:
                 number = number * len(values) + place
         stream = block.first_stream + number
         rng, problem = random_generator(self.seed, stream, row), ""
+        own, of_cell = {name: laws[name] for name in block.independent}, random_generator(self.seed, stream, row, 1, *cell)
         makers: list[Callable[[], Point]] = [lambda: draw(laws, rng)] * DRAW_LIMIT
         if designed:
             matrix = design_points(block.sampler, self.seed, stream, block.samples_given, len(laws))
             fractions = iter(matrix[row].tolist())
             makers = [lambda: {name: each.quantile(next(fractions)) for name, each in laws.items()}, *makers]
         for point in makers:
-            points = [point()]
+            points = [point() | draw(own, of_cell)]
             if block.sampler == "saltelli":  # rows of A and B, and A with one value of B, of each quantity in turn
-                first, second = points[0], point()
+                first, second = points[0], point() | draw(own, of_cell)
                 points = [first, second, *({**first, name: second[name]} for name in first)]
             try:
                 return points, [fixed.with_drawn(point) for point in points]
