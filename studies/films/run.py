@@ -46,7 +46,7 @@ def experiments_table(bank: films.Bank) -> str:
     middle, found = bank.values.mean(axis=0), []
     nearest = int((((bank.values - middle) / bank.values.std(axis=0)) ** 2).sum(axis=1).argmin())
     for wanted in sets:
-        seen = set_of_films(bank, nearest, wanted, np.zeros(8), np.random.default_rng(0))
+        seen = set_of_films(bank, nearest, wanted, np.zeros(9), np.random.default_rng(0))
         alone = bank.posterior(seen, CAMERA)
         measured = alone.given(circle_radius=(middle[alone.names.index("circle_radius")], CALIPERS))
         radius = (measured.sigma / middle)[alone.names.index("sprocket_radius")]
@@ -65,12 +65,12 @@ def calibration_rows(found: Calibration) -> Iterator[str]:
 def pitfalls_table(bank: films.Bank, truths: films.Bank) -> str:
     """Coverage of 95 % intervals with one error of the camera at twice its σ, allowed for or not."""
     errors = {
-        "none": (np.zeros(8), 0.0),
+        "none": (np.zeros(9), 0.0),
         "floor 1 mm too low": (1e-3 * np.eye(8)[1], 0.0),
         "scale 0.5 %": (5e-3 * np.eye(8)[0], 0.0),
         "axis of the sprocket 1 mm off": (1e-3 * np.eye(8)[2], 0.0),
         "camera rolled by 0.3°": (5.2e-3 * np.eye(8)[3], 0.0),
-        "release 4 ms off": (np.zeros(8), 4e-3),
+        "release 4 ms off": (np.zeros(9), 4e-3),
     }
     rows = []
     for name, (shared, delay) in errors.items():

@@ -95,7 +95,7 @@ def test_an_answer_outside_of_the_bank_is_refused(friction: float, higher: float
     """Friction 2.2 standard deviations off the middle, where few chains are; an outline that no chain has."""
     exact = motion(friction)
     exact = dataclasses.replace(exact, outline=exact.outline + np.array([0, 0, 0, higher]))
-    film = exact.seen(CAMERA, np.zeros(8), np.random.default_rng(0))
+    film = exact.seen(CAMERA, np.zeros(9), np.random.default_rng(0))
     with pytest.raises(InputError, match=f"; check direction, .*; if right, give one about these values\n{wrong}$"):
         made_bank(160, seed=1).posterior([film])
 

@@ -9,7 +9,7 @@ import pytest
 from tests.support.made_films import motion
 from warpchain import InputError, films
 
-EXACT = motion(0.3).seen(films.Camera(), np.zeros(8), np.random.default_rng(0))
+EXACT = motion(0.3).seen(films.Camera(), np.zeros(9), np.random.default_rng(0))
 
 
 def test_line_of_a_sliding_body_is_its_friction() -> None:
@@ -29,7 +29,7 @@ def test_line_of_a_sliding_body_is_its_friction() -> None:
 def test_slow_loops_are_known_less() -> None:
     """The slower the loop, the sooner it sticks: the fit ends earlier and the error is larger."""
     slow, fast = (
-        films.friction_line(motion(0.27, frequency=hz).seen(films.Camera(), np.zeros(8), np.random.default_rng(0)))
+        films.friction_line(motion(0.27, frequency=hz).seen(films.Camera(), np.zeros(9), np.random.default_rng(0)))
         for hz in (5.0, 20.0)
     )
     assert slow.end < fast.end and slow.error > 2 * fast.error

@@ -10,7 +10,7 @@ from tests.support.made_films import motion
 from warpchain import InputError, films
 
 TRACKER = "cm_A\nt\tx\ty\t\n{}\n"
-FILM = motion(0.3).seen(films.Camera(), np.zeros(8), np.random.default_rng(4))
+FILM = motion(0.3).seen(films.Camera(), np.zeros(9), np.random.default_rng(4))
 
 
 def table(time: np.ndarray, center: np.ndarray, mark: str = "\t") -> str:
@@ -70,7 +70,7 @@ def test_the_release_is_found(tmp_path: Path) -> None:
     found = []
     for seed in range(31):
         camera = films.Camera(release=1e-9, noise=5e-4 if seed else 1e-9)
-        film = motion(0.3, 0.008).seen(camera, np.zeros(8), np.random.default_rng(seed))
+        film = motion(0.3, 0.008).seen(camera, np.zeros(9), np.random.default_rng(seed))
         path = write(tmp_path, TRACKER.format(table(film.time + 1.234, film.center)))
         found.append(films.read(path, links=60, frequency=20.0).time[0] - film.time[0])
     assert abs(np.mean(found)) < 8e-4 and np.std(found) < films.Camera().release

@@ -163,7 +163,8 @@ class Sweep:
     ) -> tuple[list[Point], list[Setup]]:
         """Points for the walks of sample `row` of a cell, the first that make possible walks only, and their setups.
 
-        The designed ones are tried first, then random ones; if all are impossible, an `InputError` says so.
+        The designed ones are tried first, then random ones; if all are impossible, an `InputError` says so. What is
+        independent of the other cells is always random, from a generator of the cell's own.
         """
         number = 0  # of the cell's random stream among those of the block
         for (name, values), place in zip(block.axes.items(), cell, strict=True):
@@ -171,7 +172,8 @@ class Sweep:
                 number = number * len(values) + place
         stream = block.first_stream + number
         rng, problem = random_generator(self.seed, stream, row), ""
-        own, of_cell = {name: laws[name] for name in block.independent}, random_generator(self.seed, stream, row, 1, *cell)
+        own = {name: laws[name] for name in block.independent}
+        of_cell = random_generator(self.seed, stream, row, 1, *cell)
         makers: list[Callable[[], Point]] = [lambda: draw(laws, rng)] * DRAW_LIMIT
         if designed:
             matrix = design_points(block.sampler, self.seed, stream, block.samples_given, len(laws))
