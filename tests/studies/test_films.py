@@ -39,7 +39,7 @@ def test_calibration_tells_a_bank_that_knows_from_one_that_does_not(banks: tuple
     bank, truths = banks
     good = calibration.calibrate(bank, truths, run.PAIR)
     assert good.refused < 0.2 and (good.coverage(1.96) > 0.8).all() and (np.abs(good.bias) < 0.6).all()
-    wide = calibration.calibrate(bank, truths, run.PAIR, shared=np.array([0, 0, 0, 0, -0.004, 0.004, 0, 0]))
+    wide = calibration.calibrate(bank, truths, run.PAIR, shared=np.array([0, 0, 0, 0, -0.004, 0.004, 0, 0, 0]))
     assert wide.refused > 0.5 or wide.coverage(1.96)[1] < 0.5
     assert "2 films: 5, 20 Hz" in run.SETS and len(list(run.calibration_rows(good))) == 3
 

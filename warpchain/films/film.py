@@ -54,8 +54,8 @@ class Camera:
     def __post_init__(self) -> None:
         """Refuse what is no positive number, and a clock that films of 0.4 s cannot allow for."""
         for name, value in vars(self).items():
-            most = {"le": 0.01} if name == "clock" else {}
-            checked(value, f"camera.{name}", Annotated[float, Field(gt=0, **most)])
+            most = 0.01 if name == "clock" else None
+            checked(value, f"camera.{name}", Annotated[float, Field(gt=0, le=most)])
 
     def errors(self, random: np.random.Generator) -> Array:
         """Errors that all films of a chain have: scale, floor, origin, roll, four edges, clock."""
@@ -93,14 +93,14 @@ class Film:
     def seen(self, camera: Camera, errors: Array, random: np.random.Generator) -> Self:
         """A film without errors as a camera shows it, given the errors that other films of the chain share."""
         scale, floor, origin, roll, *edges_off, clock = errors
-        time = np.arange(-BEFORE + random.uniform() / camera.fps, self.time[-1], 1 / camera.fps)
-        center = np.column_stack([np.interp(time, self.time, x) for x in self.center.T])
+        time = np.arange(-BEFORE + random.uniform() / camera.fps, (1 + clock) * self.time[-1], 1 / camera.fps)
+        center = np.column_stack([np.interp(time / (1 + clock), self.time, x) for x in self.center.T])
         turned = roll * np.column_stack([center[:, 1] - center[0, 1], -center[:, 0]])
         shift, noise = np.array([origin, floor]), random.normal(size=center.shape) * camera.noise
         delay, slip = random.normal(size=2) * [camera.release, camera.speed]
         return replace(
             self,
-            time=(1 + clock) * time + delay,
+            time=time + delay,
             center=(1 + scale) * (center + turned) + noise + shift,
             outline=None if self.outline is None else (1 + scale) * self.outline + np.repeat(shift, 2) + edges_off,
             speed=None if self.speed is None else self.speed * (1 + slip) / (1 + clock),

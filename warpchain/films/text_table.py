@@ -110,7 +110,7 @@ def _text(file: Path, path: object) -> str:
     with file.open("rb") as opened:
         content = opened.read(LARGEST + 1)
     if len(content) > LARGEST:
-        raise InputError(f"{path}: more than {LARGEST:.0e} bytes; export the centre of mass about the release only")
+        raise InputError(f"{path}: more than {LARGEST / 1e6:g} MB; export the centre of mass about the release only")
     wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     text = content.decode("utf-16" if wide else "utf-8-sig", errors="replace")
     if "\0" in text:
@@ -143,7 +143,7 @@ def _heads(lines: list[list[str]], path: object) -> tuple[int, list[re.Match[str
 
 def _units(heads: list[re.Match[str] | None], given: str | None, path: object) -> tuple[float, float]:
     """Metres in the unit of lengths and seconds in that of times: those that heads say, the one given, or m and s."""
-    lengths, seconds = {given} - {None}, 1.0
+    lengths, seconds = set() if given is None else {given}, 1.0
     for head in filter(None, heads):
         known = _OF_HEADS[head["name"]]
         if head["unit"] and head["unit"] not in known:
