@@ -29,14 +29,6 @@ EXACT = replace(CAMERA, scale=1e-6, floor=1e-6, origin=1e-6, roll=1e-6, outline=
 """A camera without errors other than noise, and those of the loop's speed."""
 
 
-def beside(bank: films.Bank, other: films.Bank) -> films.Bank:
-    """The chains that two banks have in common, with the experiments of both."""
-    known = {tuple(values): chain for chain, values in enumerate(other.values)}
-    pairs = [(chain, known[tuple(values)]) for chain, values in enumerate(bank.values) if tuple(values) in known]
-    both = [[*bank.films[first], *other.films[second]] for first, second in pairs]
-    return films.Bank(bank.names, bank.values[[first for first, _ in pairs]], both)
-
-
 def percent(share: float) -> str:
     """Two digits."""
     return f"{100 * share:.2g} %"
@@ -93,7 +85,9 @@ def lines_table(banks: Mapping[str, films.Bank]) -> str:
         for at, (links, frequency) in enumerate(bank.experiments):
             found = []
             for chain, values in enumerate(bank.values[:256]):
-                film = bank.films[chain][at][chain % len(bank.films[chain][at])].seen(CAMERA, CAMERA.errors(random), random)
+                film = bank.films[chain][at][chain % len(bank.films[chain][at])].seen(
+                    CAMERA, CAMERA.errors(random), random
+                )
                 line = films.friction_line(film, CAMERA)
                 found.append((line.friction - values[0], line.error, values[0]))
             error, sigma, friction = np.array(found).T
@@ -109,7 +103,7 @@ def main(folder: Path) -> None:
     def bank_of(sweep: str, block: str = "main") -> films.Bank:
         return films.Bank.of(warpchain.load(folder / sweep).blocks[block])
 
-    bank, speeds = bank_of("film_pair"), bank_of("film_speeds")
+    bank = bank_of("film_pair")
     hidden = {kind: bank_of("film_truths", block) for kind, block in HEIGHTS.items()}
     others = {kind: bank_of("film_truths", block) for kind, block in OTHERS.items()}
     others["paper's joints"] = bank_of("film_truths_paper")
@@ -130,11 +124,11 @@ def main(folder: Path) -> None:
     known = found_in(hidden)
     own = hidden["one for each film"]
     tables = {
-        "experiments": experiments_table(beside(bank, speeds)),
+        "experiments": experiments_table(bank),
         "calibration": rows_of(known),
         "other chains": rows_of(found_in(others)),
         "pitfalls": pitfalls_table(bank, own),
-        "lines": lines_table({"film_pair": bank, "film_speeds": speeds, "film_lines_90": bank_of("film_lines_90")} | others),
+        "lines": lines_table({"film_pair": bank} | others),
     }
     pairs = {kind: known[kind, "2 films: 5, 20 Hz"] for kind in hidden}
     publish(FOLDER, tables, {"coverage": coverage_figure(pairs)}, dpi=130)

@@ -197,6 +197,7 @@ def test_a_sweep_that_is_no_bank_is_refused(tmp_path: Path) -> None:
     ("grid", "more", "wrong"),
     [
         ({"phase": [0.1, 0.2]}, {}, "clearance"),
+        ({"phase": [0.1]}, {}, "clearance"),
         ({"phase": [0.1, 0.2]}, {"scene": {"clearance": 0.01}}, "clearance"),
         ({"phase": [0.1, 0.2]}, {"distributions": {"clearance": "fixed"}}, "clearance"),
         ({}, {"independent": ["clearance"]}, "phase"),
@@ -206,13 +207,18 @@ def test_a_sweep_that_is_no_bank_is_refused(tmp_path: Path) -> None:
 def test_a_bank_whose_releases_are_alike_is_refused(
     grid: dict[str, Any], more: dict[str, Any], wrong: str, tmp_path: Path
 ) -> None:
-    """Clearance and phase are each release's own: of two films of a chain they are neither drawn once nor fixed."""
-    settings: dict[str, Any] = {"samples": 2, "preset": "soft", "record": {"series": True, "frames": True}, **more}
-    settings["scene"] = {"start": "spinning", "walk_limit": 0.01, **more.get("scene", {})}
+    """Clearance and phase are each release's own: of two films they are neither drawn once nor fixed; one may be so."""
+    settings: dict[str, Any] = {"samples": 1, "preset": "soft", **more}
+    settings["scene"] = {"start": "spinning", "walk_until": 0.4, **more.get("scene", {})}
+    settings["record"] = {"series": {"interval": 0.004}, "frames": {"interval": 0.4}}
     axes = {"links": [40], "frequency": [15, 20], **grid}
     result = warpchain.sweep(grid=axes, same_samples_along=list(axes), out=tmp_path / "a", progress=False, **settings)
-    with pytest.raises(InputError, match=rf"^bank: {wrong} is the same in films of a chain, .* independent: \[{wrong}\]"):
-        films.Bank.of(result)
+    bank = films.Bank.of(result)
+    seen = [row[0].seen(CAMERA, np.zeros(9), np.random.default_rng(0)) for row in bank.films[0]]
+    with pytest.raises(InputError, match=rf"^bank: {wrong} is the same in all films of .* independent: \[{wrong}\]"):
+        bank.posterior(seen)
+    with pytest.raises(InputError, match=r"^films: they are not .* a bank of 32 chains or more"):
+        bank.posterior(seen[:1])
 
 
 def test_films_of_a_chain_come_from_heights_of_their_own() -> None:

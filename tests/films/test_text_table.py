@@ -68,7 +68,9 @@ def test_unknown_units_in_heads_are_refused(unit: str, form: str, tmp_path: Path
     for heads in (f"t\tx {form}\ty {form}", f"t {form}\tx\ty"):
         path = write(tmp_path, heads.format(unit, unit) + "\n" + rows)
         for given in (None, "mm"):
-            with pytest.raises(InputError, match=r"film\.txt: unknown unit in the head '[txy] .*; give .*m?s?, or name"):
+            with pytest.raises(
+                InputError, match=r"film\.txt: unknown unit in the head '[txy] .*; give .*m?s?, or name"
+            ):
                 films.read(path, links=60, frequency=20.0, unit=given)  # type: ignore[arg-type]
 
 

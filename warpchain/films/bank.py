@@ -60,11 +60,13 @@ class Bank:
         names: of the parameters.
         values: of each chain, (c, p).
         films: `films[c][e]` are those of chain c in experiment e, one for each repetition.
+        tied: what two films of a chain have in common although releases differ in it, of clearance and phase.
     """
 
     names: tuple[str, ...]
     values: Array
     films: Sequence[Sequence[Sequence[Film]]]
+    tied: tuple[str, ...] = ()
 
     @property
     def experiments(self) -> list[tuple[int, float]]:
@@ -84,8 +86,7 @@ class Bank:
         is an axis, or drawn and `independent`.
 
         Raises:
-            InputError: walks or motions are missing, axes are others, the chains differ along them, or all films of a
-                chain have the same clearance or phase.
+            InputError: walks or motions are missing, axes are others, or the chains differ along them.
         """
         axes, shape = list(result.axes), result.shape
         names = tuple(name for name in FOUND if name in result.drawn)
@@ -97,11 +98,8 @@ class Bank:
         if any(np.any(columns[name] != columns[name][0]) for name in columns if name in Parameters.model_fields):
             remedy = f"give same_samples_along: [{', '.join(axes)}], and no parameter as independent"
             raise InputError(f"bank: its chains differ along the axes; {remedy}")
-        for name in OF_RELEASES:
-            alike = any(np.array_equal(*pair) for pair in combinations(columns.get(name, ()), 2))
-            if name not in axes and (name not in columns or alike):
-                remedy = f"give a distribution and independent: [{name}], or make it an axis"
-                raise InputError(f"bank: {name} is the same in films of a chain, but each release has its own; {remedy}")
+        alike = {name for name in columns if any(np.array_equal(*two) for two in combinations(columns[name], 2))}
+        tied = tuple(name for name in OF_RELEASES if name not in axes and (name in alike or name not in columns))
         drawn = np.stack([columns[name] for name in names], axis=-1)
         walks, end = {}, CLOCK[-1] + 0.03
         for place, group in result.kept_motions(np.flatnonzero(result.kept)):  # in the order of the files
@@ -121,7 +119,7 @@ class Bank:
         if not len(chains):
             raise InputError("bank: no motion was recorded; give record: {series: true, frames: true}")
         films = [[[walks[place] for place in row] for row in chain] for chain in places[chains].tolist()]
-        return cls(names, drawn[0, chains], films)
+        return cls(names, drawn[0, chains], films, tied)
 
     def posterior(self, films: Sequence[Film], camera: Camera = CAREFUL) -> "Posterior":
         """The parameters of the chain in some films, and how well they would be known of chains of the bank.
@@ -131,9 +129,16 @@ class Bank:
             camera: of all films.
 
         Raises:
-            InputError: a film is of no experiment of the bank, or not as the camera says, or lies outside of the bank.
+            InputError: a film is of no experiment of the bank, or not as the camera says, or lies outside of the bank;
+                or the bank takes for common to several films what each release has of its own.
         """
         films = checked(films, "films", list[InstanceOf[Film]])
+        if self.tied and len(films) > 1:
+            names = " and ".join(self.tied)
+            remedy = f"draw it, and give the sweep independent: [{', '.join(self.tied)}]"
+            raise InputError(
+                f"bank: {names} is the same in all films of a chain, but each release has its own; {remedy}"
+            )
         groups: dict[tuple[int, float], list[Film]] = {}
         for film in films:
             film.check(camera)
