@@ -1,5 +1,6 @@
 """The study of films makes its tables and figures of made banks, whose chains nobody simulated."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -58,10 +59,15 @@ def test_dropped_frames_are_seen_in_the_fall() -> None:
     """Every tenth frame gone and the rest renumbered, as phones and programs do: 0.281 ± 0.002, once, for 0.231."""
     path = run.FOLDER / "hidden/60_links_20_Hz.txt"
     seen = films.read(path, links=60, frequency=20.0, unit="mm", speed=7.648)
+    refused = 0
     for first in range(10):
         kept = np.arange(len(seen.time)) % 10 != first
         center, time = seen.center[kept], np.arange(kept.sum()) / 240
         before = np.count_nonzero(kept[seen.time < 0])
         dropped = replace(seen, time=time - time[before] + seen.time[kept][before], center=center)
-        with pytest.raises(InputError, match=r"^film: it falls with 1[12]\.\d ± 0\.\d m/s² .* frames were dropped"):
+        try:
             films.friction_line(dropped)
+        except InputError as error:
+            assert re.match(r"film: it falls with 1[012]\.\d ± 0\.\d m/s² from .* frames were dropped", str(error))
+            refused += 1
+    assert refused == 10
