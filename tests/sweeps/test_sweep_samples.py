@@ -1,6 +1,7 @@
 """What the walks of a sweep draw: random numbers, distributions, designed samples."""
 
 import math
+import re
 import time
 import tracemalloc
 from typing import Any
@@ -88,6 +89,37 @@ def test_same_samples_along_axes() -> None:
     assert all(len(set(column)) == 12 for column in distinct.T)
     apart = drawn(load_sweep(blocks({"grid": grid}, {"grid": grid})), 24)
     assert all(len(set(column)) == 24 for column in apart.T)
+
+
+@pytest.mark.parametrize("sampler", ["random", "sobol", "saltelli"])
+def test_what_is_independent_differs_along_such_axes(sampler: str) -> None:
+    """All but the independent quantities are as without them; these differ in all cells and samples."""
+    given = content(sampler=sampler, samples=4, same_samples_along=["links", "frequency"])
+    tied, own = load_sweep(given), load_sweep(given | {"independent": ["clearance", "mu_fc"]})
+    names = list(own.planned(0).drawn)
+    alone = [names.index(name) for name in ("floor_friction", "clearance")]
+    before, after = drawn(tied, tied.walk_count), drawn(own, own.walk_count)
+    shared = [k for k in range(len(names)) if k not in alone]
+    if sampler != "saltelli":  # which changes them one by one, too
+        assert (before[:, shared] == after[:, shared]).all()
+        assert all(len(set(column)) == own.walk_count for column in after[:, alone].T)
+    cells = after.reshape(4, -1, len(names))
+    assert (cells[:, :, shared] == cells[:1, :, shared]).all() and not (cells[0] == cells[1])[:, alone].any()
+    assert load_sweep(own.canonical()).digest() == own.digest() != tied.digest()
+
+
+@pytest.mark.parametrize(
+    ("names", "problem"),
+    [
+        (["frequency"], "sweep.independent: 'frequency' is not drawn; give one of clearance"),
+        (["clearence"], "sweep.independent: 'clearence' is not drawn; did you mean clearance?"),
+        ("clearance", "sweep.independent: Input should be a valid list"),
+    ],
+)
+def test_only_drawn_quantities_are_independent(names: Any, problem: str) -> None:
+    """Others are refused by name."""
+    with pytest.raises(InputError, match=re.escape(problem)):
+        load_sweep(content(independent=names))
 
 
 # Distributions

@@ -106,6 +106,7 @@ def sweep(
         distributions: Quantity → what samples draw: ``"fixed"``, ``"table"`` (Table 1), ``{"uniform": [lower, upper]}``
             or ``{"gaussian": {"mean":, "sigma":}}``; ``"all"`` is any that is not named, by default ``"table"``.
         same_samples_along: Axes along which the same samples are used.
+        independent: Drawn quantities of which every cell has its own values, even along such axes.
         record: What is kept of motions, such as ``{"series": True, "frames": {"samples": [0]}}``.
         name: Of the sweep; by default that of the folder.
         seed: Of all random numbers, by default 0; beside a source instead of its own.

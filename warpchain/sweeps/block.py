@@ -55,6 +55,7 @@ class Block:
         named: name of each axis that has names for values, such as `floor` → name → value of the field.
         points: name of each quantity that parameter sets have → its value in each, along the axis `point`.
         distributions: name → distribution, in the order of drawing.
+        independent: names of those that each cell draws by itself, also along axes with the same samples.
         sampler: one of `warpchain.sweeps.designs.SAMPLERS`.
         samples_given: samples per cell, as the file says.
         first_cell: number of the block's first cell among all cells of the sweep.
@@ -70,6 +71,7 @@ class Block:
     named: Mapping[str, Mapping[str, Value]]
     points: Mapping[str, tuple[Value, ...]]
     distributions: Mapping[str, Distribution]
+    independent: tuple[str, ...]
     sampler: str
     samples_given: int
     first_cell: int = 0
@@ -185,6 +187,7 @@ class Block:
             "sampler": self.sampler,
             **{section: getattr(first, section).model_dump(exclude=replaced) for section in SECTIONS},
             "distributions": {"all": "fixed"} | {name: each.canonical() for name, each in self.distributions.items()},
+            **({"independent": list(self.independent)} if self.independent else {}),
             **({"points": {name: list(values) for name, values in self.points.items()}} if self.points else {}),
             "grid": {n: json_value(self.named.get(n)) or list(values) for n, values in self.axes.items() if n != POINT},
         }

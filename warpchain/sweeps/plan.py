@@ -159,7 +159,8 @@ class Sweep:
     ) -> tuple[list[Point], list[Setup]]:
         """Points for the walks of sample `row` of a cell, the first that make possible walks only, and their setups.
 
-        The designed ones are tried first, then random ones; if all are impossible, an `InputError` says so.
+        The designed ones are tried first, then random ones; if all are impossible, an `InputError` says so. What is
+        independent of the other cells is always random, from a generator of the cell's own.
         """
         number = 0  # of the cell's random stream among those of the block
         for (name, values), place in zip(block.axes.items(), cell, strict=True):
@@ -167,15 +168,17 @@ class Sweep:
                 number = number * len(values) + place
         stream = block.first_stream + number
         rng, problem = random_generator(self.seed, stream, row), ""
+        own = {name: laws[name] for name in block.independent}
+        of_cell = random_generator(self.seed, stream, row, 1, *cell)
         makers: list[Callable[[], Point]] = [lambda: draw(laws, rng)] * DRAW_LIMIT
         if designed:
             matrix = design_points(block.sampler, self.seed, stream, block.samples_given, len(laws))
             fractions = iter(matrix[row].tolist())
             makers = [lambda: {name: each.quantile(next(fractions)) for name, each in laws.items()}, *makers]
         for point in makers:
-            points = [point()]
+            points = [point() | draw(own, of_cell)]
             if block.sampler == "saltelli":  # rows of A and B, and A with one value of B, of each quantity in turn
-                first, second = points[0], point()
+                first, second = points[0], point() | draw(own, of_cell)
                 points = [first, second, *({**first, name: second[name]} for name in first)]
             try:
                 return points, [fixed.with_drawn(point) for point in points]

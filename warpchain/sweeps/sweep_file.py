@@ -182,6 +182,9 @@ class BlockKeys(WalkKeys):
     distributions: Annotated[
         dict[str, Any], _mapping_of("distributions", {"all": _Word, **dict.fromkeys(DRAWABLE, _Drawn)})
     ] = Field({}, description="what samples draw, see below")
+    independent: list[str] = Field(
+        [], description="drawn quantities that every cell draws by itself, even along axes with the same samples"
+    )
     grid: Annotated[
         dict[str, list[Value] | dict[str, Value]], _mapping_of("grid", {"preset": axis(_Preset), **_AXES})
     ] = Field({}, description="axes of the grid, see below; not in a file with blocks")
@@ -325,8 +328,12 @@ def _block(name: str, path: str, outer: BlockKeys | None, inner: BlockKeys) -> B
         raise InputError(f"{path}.samples: missing; give the number of samples per cell")
     drawn = _drawn(merged("distributions"), sections, varied, f"{path}.distributions")
     check_design(sampler or "random", samples, len(drawn), path)
-    fixed = None if "preset" in axes else preset
-    return Block(path, name, fixed, sections, axes, named, points, drawn, sampler or "random", samples)
+    own = {*map(validation.full_name, either("independent") or ())}
+    for quantity in own - drawn.keys():
+        remedy = validation.suggestion(quantity, sorted(drawn))
+        raise InputError(f"{path}.independent: {shown(quantity)} is not drawn; {remedy}")
+    independent, fixed = tuple(each for each in drawn if each in own), None if "preset" in axes else preset
+    return Block(path, name, fixed, sections, axes, named, points, drawn, independent, sampler or "random", samples)
 
 
 def _drawn(given: Mapping[str, Any], sections: Sections, varied: set[str], path: str) -> dict[str, Distribution]:
