@@ -98,6 +98,7 @@ def sweep(
             ``point``, beside the grid.
         samples: Samples in each cell of the grid; beside a source instead of those at the top of it.
         sampler: ``"random"`` (the default), ``"sobol"``, ``"latin_hypercube"`` or ``"saltelli"``.
+        randomisations: Independent randomisations of such a design, by default 8; errors of means come from them.
         preset: As of :func:`walk`.
         scene: Fields of :class:`Scene` that differ from their defaults.
         parameters: Fields of :class:`Parameters` that differ from the preset.

@@ -21,7 +21,7 @@ from warpchain.inputs.parameters import preset as parameter_preset
 from warpchain.inputs.scene import COMPOUND, Scene
 from warpchain.inputs.setup import SECTIONS, Setup, combined, options_beside
 from warpchain.inputs.validation import FIELDS, SECTION_OF, InputError, checked, json_value, path_of, shown, validated
-from warpchain.sweeps.designs import walks_per_sample
+from warpchain.sweeps.designs import independent_groups, walks_per_sample
 from warpchain.walks.landmarks import least
 
 Value = float | int | str | tuple[Any, ...] | None
@@ -54,6 +54,7 @@ class Block:
         points: name of each quantity that parameter sets have → its value in each, along the axis `point`.
         distributions: name → distribution, in the order of drawing.
         sampler: one of `warpchain.sweeps.designs.SAMPLERS`.
+        randomisations: number of independent randomisations of designed samples; random ones need none.
         samples_given: samples per cell, as the file says.
         first_cell: number of the block's first cell among all cells of the sweep.
         stride: number of all cells of the sweep.
@@ -69,6 +70,7 @@ class Block:
     points: Mapping[str, tuple[Value, ...]]
     distributions: Mapping[str, Distribution]
     sampler: str
+    randomisations: int
     samples_given: int
     first_cell: int = 0
     stride: int = 0
@@ -83,6 +85,11 @@ class Block:
     def samples(self) -> int:
         """Walks in each cell; for `saltelli` all walks of all samples."""
         return self.samples_given * walks_per_sample(self.sampler, len(self.distributions))
+
+    @property
+    def groups(self) -> NDArray[np.int64]:
+        """Number of the group of each walk of a cell, see `independent_groups`."""
+        return independent_groups(self.sampler, self.samples, len(self.distributions), self.randomisations)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -157,8 +164,12 @@ class Block:
 
         They lie along the axes, one for all samples, shape (…, 1).
         """
-        cells, section = list(self.cells_along((name, "preset"))), SECTION_OF[name]
-        values = [least(getattr(getattr(setup, section), name)) for setup in self.fixed_in(cells)]
+        return self.over_cells((name, "preset"), lambda setup: least(getattr(getattr(setup, SECTION_OF[name]), name)))
+
+    def over_cells(self, names: Container[str], value_of: Callable[[Setup], float]) -> NDArray[Any]:
+        """A number of the `fixed` setup of each cell, which depends on some quantities only, shape (…, 1)."""
+        cells = list(self.cells_along(names))
+        values = [value_of(setup) for setup in self.fixed_in(cells)]
         sizes = [1 + max(places) for places in zip(*cells, strict=True)]
         return np.broadcast_to(np.reshape(values, (*sizes, 1)), (*self.shape[:-1], 1))
 
@@ -181,6 +192,7 @@ class Block:
             **({} if self.preset is None else {"preset": self.preset}),
             "samples": self.samples_given,
             "sampler": self.sampler,
+            **({} if self.sampler == "random" else {"randomisations": self.randomisations}),
             **{section: getattr(first, section).model_dump(exclude=replaced) for section in SECTIONS},
             "distributions": {"all": "fixed"} | {name: each.canonical() for name, each in self.distributions.items()},
             **({"points": {name: list(values) for name, values in self.points.items()}} if self.points else {}),

@@ -173,7 +173,8 @@ class Sweep:
         rng, problem = random_generator(self.seed, stream, row), ""
         makers: list[Callable[[], Point]] = [lambda: draw(laws, rng)] * DRAW_LIMIT
         if designed:
-            matrix = design_points(block.sampler, self.seed, stream, block.samples_given, len(laws))
+            given = block.samples_given, len(laws), block.randomisations
+            matrix = design_points(block.sampler, self.seed, stream, *given)
             fractions = iter(matrix[row].tolist())
             makers = [lambda: {name: each.quantile(next(fractions)) for name, each in laws.items()}, *makers]
         for point in makers:
