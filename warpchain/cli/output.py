@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final, get_args
 from warpchain.engine.tallies import LOST
 from warpchain.files import checked_output, make_folder, naming, remove_output
 from warpchain.inputs.validation import InputError, json_value, one_line, printable
-from warpchain.pictures.labels import Kind, cell_table
+from warpchain.pictures.labels import COUNTS, SPREADS, Kind, cell_notes, cell_table
 from warpchain.walks.landmarks import FAULTS
 from warpchain.walks.walk_result import WalkResult, load_walk
 
@@ -48,7 +48,7 @@ def print_sweep(result: "SweepResult", as_json: bool) -> None:
         blocks = {
             name: {
                 "axes": cells.axes,
-                "dx": {key: getattr(cells, key) for key in ("mean", "sd", "count", "absent", "failed", "missing")},
+                "dx": {key: getattr(cells, key) for key in (*SPREADS, "independent", *COUNTS)},
             }
             for name, cells in statistics.items()
         }
@@ -69,6 +69,8 @@ def print_sweep(result: "SweepResult", as_json: bool) -> None:
         if room:
             print_table(head, itertools.islice(rows, room))
         room = max(0, room - cells.mean.size)
+    for note in cell_notes(statistics.values()):
+        print(note)
     if (more := sum(cells.mean.size for cells in statistics.values()) - _MOST_CELLS) > 0:
         print(f"… and {more:,} more cells, which --json lists")
 

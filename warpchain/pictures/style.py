@@ -8,9 +8,11 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure, SubFigure
+from matplotlib.lines import Line2D
 
 from warpchain.files import write_whole
 from warpchain.inputs.validation import InputError
@@ -62,6 +64,23 @@ def tidy(axes: Axes, *, grid: Literal["x", "y", "both"] | None = None) -> None:
     if grid is not None:
         axes.grid(axis=grid, color="#E6E6E6", linewidth=0.6)
         axes.set_axisbelow(True)
+
+
+_OPEN: Final[Any] = {"linestyle": "", "markerfacecolor": "white", "markersize": 5.0}
+
+
+def mark_survivors(axes: Axes, x: Any, mean: Any, partial: Any, at_least: Any, color: Any) -> None:
+    """Open symbols over means that leave out walks, and triangles at lower bounds of the whole mean, NaN for none."""
+    bounded = np.isfinite(at_least)
+    for marker, y, chosen in (("o", mean, partial), ("^", at_least, bounded)):
+        if chosen.any():
+            axes.plot(x[chosen], y[chosen], marker=marker, color=color, zorder=3.5, label="_mark", **_OPEN)
+
+
+def survivor_handles(partial: bool, bounded: bool) -> list[Line2D]:
+    """What a legend says of the marks of `mark_survivors`, of those that there are."""
+    texts = [("o", "mean of survivors only")] * partial + [("^", "at least, of all walks")] * bounded
+    return [Line2D([], [], color=FAINT, marker=marker, label=text, **_OPEN) for marker, text in texts]
 
 
 def panel_grid(
