@@ -69,6 +69,8 @@ def draw_grid(
     the name of the quantity is for labels; all else is as of `SweepResult.plot`. A `NothingToShow` says that no block
     has an axis of several values, or that there is no mean.
     """
+    if figure is not None:
+        style.checked_figure(figure)
     panels, left_out = _all_panels(blocks, x)
     label = with_unit(labels.quantity_text(quantity), next(iter(blocks.values())).unit)
     are_lines = not any(panel.is_map for panel in panels)

@@ -18,11 +18,12 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from warpchain.inputs.arrays import Array
+from warpchain.inputs.validation import InputError, shown
 from warpchain.loop.stationary_loop import StationaryLoop
 from warpchain.pictures import chain
 from warpchain.pictures.chain import center_in_room, checked_joints
 from warpchain.pictures.labels import Kind, Walk, setting
-from warpchain.pictures.style import BLUE, DASHES, DOTS, FAINT, GREEN, GROUND, INK, RED, InlineFigure, tidy
+from warpchain.pictures.style import BLUE, DASHES, DOTS, FAINT, GREEN, GROUND, INK, RED, InlineFigure, checked_figure, tidy
 from warpchain.status import Status
 
 FALLEN: Final = 45.0
@@ -56,6 +57,10 @@ def draw(walk: Walk, kind: Kind, *, figure: Figure | None = None, ax: Axes | Non
         raise ValueError(f"ax: {kind} has several axes; give an empty figure=, or a SubFigure of yours")
     if ax is not None and figure is not None:
         raise ValueError("ax: given together with figure; leave one out")
+    if figure is not None:
+        checked_figure(figure)
+    if ax is not None and not isinstance(ax, Axes):
+        raise InputError(f"ax: expected matplotlib Axes, got {shown(ax)}")
     if kind == "film_strip":
         return film_strip(walk, figure)
     if ax is not None:

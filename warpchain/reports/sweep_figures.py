@@ -18,7 +18,7 @@ from warpchain.inputs.arrays import Array
 from warpchain.pictures import labels
 from warpchain.pictures.grid_figure import draw_grid
 from warpchain.pictures.labels import cell_values, quantity_name, quantity_text
-from warpchain.pictures.style import BLUE, FAINT, GREEN, INK, LINE_COLORS, RED, NothingToShow, Picture
+from warpchain.pictures.style import BLUE, FAINT, GREEN, INK, LINE_COLORS, RED, InlineFigure, NothingToShow, Picture
 from warpchain.pictures.style import mark_survivors, panel_grid, survivor_handles, tidy
 from warpchain.status import Status
 from warpchain.store.block_result import BlockResult
@@ -110,7 +110,7 @@ def figure6(result: SweepResult) -> Picture:
     gap = float(np.diff(frequencies).min()) if len(frequencies) > 1 else 1.0
     columns = {1: 1, 2: 2, 4: 2}.get(len(cells), 3)
     size = max(4.2, 3.1 * columns), 1.0 + 2.6 * -(-len(cells) // columns)
-    figure = Figure(figsize=size, layout="constrained")
+    figure = InlineFigure(figsize=size, layout="constrained")
     used, empty = panel_grid(figure, len(cells), columns, sharex=True)
     for (links, series), axes in zip(sorted(cells.items()), used, strict=True):
         for number, (label, each) in enumerate(series.items()):
@@ -228,7 +228,7 @@ def sensitivity(result: SweepResult) -> Picture:
     names = sorted(totals, key=lambda name: -float(np.mean(totals[name])))
     columns = min(len(cells), 3)
     size = max(4.2, 2.4 + 3.2 * columns), 0.9 + (0.6 + 0.36 * len(names)) * -(-len(cells) // columns)
-    figure = Figure(figsize=size, layout="constrained")
+    figure = InlineFigure(figsize=size, layout="constrained")
     used, _ = panel_grid(figure, len(cells), columns, sharex=True)
     for axes, cell in zip(used, cells, strict=True):
         places = np.array([names.index(name) for name in cell.names])

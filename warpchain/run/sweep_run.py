@@ -126,6 +126,9 @@ def sweep(
         OSError: The folder cannot be read or written.
         LostWorkersError: Worker processes were killed, or the scheduler of a Dask client was closed.
     """
+    if executor is not None and not hasattr(executor, "submit"):
+        wanted = "one with submit, such as concurrent.futures.ProcessPoolExecutor(), or a Dask client"
+        raise InputError(f"executor: expected {wanted}; got {shown(executor)}")
     planned, folder, own, count = _checked_call(source, out, settings, device, workers, part)
     if hasattr(executor, "get_executor"):
         count = count or sum(executor.nthreads().values())

@@ -266,6 +266,14 @@ def named_axis(kind: Any) -> Any:
     return Annotated[named, BeforeValidator(_with_names, json_schema_input_type=named)]
 
 
+def refuse_axes(values: Mapping[str, object]) -> None:
+    """Refuse values of a walk, by names of fields, that are axes of a sweep, in one line that names `sweep`."""
+    for name, value in validation.by_name(values).items():
+        if name in FIELDS and is_axis(name, given := validation.plain(value, name)):
+            problem = f"{shown(given)} is several values, and a walk has one"
+            raise InputError(f"{SECTION_OF[name]}.{name}: {problem}; use warpchain.sweep or a sweep file for a grid")
+
+
 def is_axis(name: str, given: object) -> bool:
     """Whether a list or mapping that is given for a field by its name is an axis, and no value of the field."""
 
