@@ -2,12 +2,11 @@
 
 from typing import Any
 
-import numpy as np
 import pytest
 
 import warpchain
 from tests.support.command_line import Command
-from tests.hard_cases.starts import folded
+from tests.hard_cases.starts import dropped, folded
 from warpchain import Status
 
 SHORT = {"links": 40, "start": "ellipse", "frame_interval": None}
@@ -66,16 +65,14 @@ def test_the_advice_of_a_status_helps(
 
 def test_the_advice_of_statuses_that_only_flights_reach() -> None:
     """Absurd speeds are lowered, and a neighbour list that is too wide is made narrower."""
-    position, velocity = folded(60)
+    position, velocity = dropped()
+    lying = folded(60)
     for status, first, second, named in (
-        (Status.NOT_FINITE, {"speed": 1e305}, {"speed": 1.0}, "lower speeds"),
+        (Status.NOT_FINITE, {"velocity": velocity * 1e305}, {"velocity": velocity}, "lower speeds"),
         (Status.LIST_OVERFLOW, {"skin": 1.0}, {"skin": 2e-3}, "lower options.skin"),
     ):
-        ends = []
-        for given in (first, second):
-            fast = np.zeros_like(velocity) + [given.get("speed", 0.0), 0.0, 0.0]
-            skin = given.get("skin", 2e-3)
-            ends.append(warpchain.simulate("soft", position, velocity + fast, 1e-4, skin=skin).status)
+        given = {"position": position} if "velocity" in first else dict(zip(("position", "velocity"), lying, strict=True))
+        ends = [warpchain.simulate("soft", duration=1e-4, **given, **case).status for case in (first, second)]
         assert named in status.sentence and ends == [status, Status.FINISHED]
 
 
