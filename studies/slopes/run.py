@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 import warpchain
 from studies import common
-from studies.common import DISTANCE, LINE_COLORS, Array, Block
+from studies.common import LINE_COLORS, Array, Block
 
 FOLDER = Path(__file__).parent
 LIMIT = 20.0  # `distance_limit` of the sweep [m]
@@ -19,16 +19,20 @@ def share_without_end(block: Block) -> Array:
 
 
 def rows(block: Block) -> str:
-    """Of each cell Δx, share and speed along the floor of walks without end, and when it collapsed, if it did."""
+    """Of each cell Δx, share and speed along the floor of walks without end, and when it collapsed, if it did.
+
+    A mean of survivors has a star, and beside it stands a lower bound of the mean of all walks.
+    """
     cells, share, collapsed = block.statistics(), share_without_end(block), common.mean(block.columns["collapsed_at"])
     endless = block.columns["status"] == warpchain.Status.DISTANCE_LIMIT
     speed = common.mean(np.where(endless, LIMIT / block.columns["walk_time"], np.nan))
     lines = []
     for place, at in common.of_cells(block):
-        numbers = cells.mean[place], cells.standard_error[place], share[place], speed[place], collapsed[place]
-        lines.append([*at.values(), *("–" if np.isnan(number) else number for number in numbers)])
-    heads = *block.axes, "Δx / m", "±", "without end", "their speed / (m/s)", "collapse / s"
-    return common.table(heads, lines, len(at) * "g " + ".3f .3f .0% .2f .2f")
+        mean = f"{cells.mean[place]:.3f}{'*' * bool(cells.of_survivors[place])}".replace("nan", "–")
+        numbers = cells.standard_error[place], cells.at_least[place], share[place], speed[place], collapsed[place]
+        lines.append([*at.values(), mean, *("–" if np.isnan(number) else number for number in numbers)])
+    heads = *block.axes, "Δx / m", "±", "at least / m", "without end", "their speed / (m/s)", "collapse / s"
+    return common.table(heads, lines, len(at) * "g " + "s .3f .2f .0% .2f .2f")
 
 
 def draw(block: Block) -> Figure:
@@ -42,7 +46,7 @@ def draw(block: Block) -> Figure:
             label = f"$n$ = {links:g}, $ν$ = {frequency:g} Hz"
             common.error_line(distance, slope, cells, (row, column), label=label, **style)
             share.plot(slope, share_without_end(block)[row, column], **style)
-    distance.set(yscale="log", ylabel=DISTANCE)
+    distance.set(yscale="log", ylabel="distance walked $Δx$ = $x$ / cos $α$ / m")
     distance.legend(frameon=False, fontsize="small")
     share.set(ylabel="share\nwithout end", xlabel="slope / °, positive downhill")
     for panel in (distance, share):

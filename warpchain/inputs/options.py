@@ -94,10 +94,10 @@ class Options(Section):
     record_interval: float = number_field(1e-3, "s", ge=1e-6)
     """time between two samples of a walk"""
     soften_pile: bool = False
-    """whether joints become soft when the walking loop has collapsed, and softest when it encloses less than half of
-    soften_area"""
+    """whether joints become soft when the walking loop encloses less than soften_area, and softest at less than half of
+    that"""
     soften_area: float = number_field(0.9, "1", gt=0, lt=1)
-    """a loop has collapsed when it encloses less than this fraction of its area at the release"""
+    """softening threshold: fraction of its area at the release that the loop still encloses when soften_pile begins"""
     soften_drive: bool = False
     """whether joints are softened on the sprocket: softest until it has spun up, then at least soft; within 0.03 s
     after the release they return to their own values"""

@@ -72,7 +72,10 @@ def draw_grid(
     if figure is not None:
         style.checked_figure(figure)
     panels, left_out = _all_panels(blocks, x)
-    label = with_unit(labels.quantity_text(quantity), next(iter(blocks.values())).unit)
+    text = labels.quantity_text(quantity)
+    if quantity == "dx" and any("slope" in cells.axes for cells in blocks.values()):
+        text = f"{text} = $x$ / cos $α$"
+    label = with_unit(text, next(iter(blocks.values())).unit)
     are_lines = not any(panel.is_map for panel in panels)
     alike = len({panel[:3] for panel in panels}) == 1
     columns = len(panels) if len(panels) <= 3 else min(4, math.ceil(len(panels) ** 0.5))

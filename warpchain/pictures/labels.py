@@ -171,4 +171,5 @@ def setting(walk: Walk) -> str:
 
 def headline(walk: Walk) -> str:
     """Links, frequency and, if it came to rest, how far it walked."""
-    return setting(walk) + (f": Δx = {walk.dx:.3f} m" if math.isfinite(walk.dx) else "")
+    text = "Δx = x / cos α" if walk.setup.scene.slope else "Δx"
+    return setting(walk) + (f": {text} = {walk.dx:.3f} m" if math.isfinite(walk.dx) else "")

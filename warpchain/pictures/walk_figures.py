@@ -339,7 +339,7 @@ def _draw_distance(axes: Axes, walk: Walk, low: float, depth: float) -> None:
     axes.annotate("", (x[1], y[1]), (x[0], y[0]), arrowprops=arrow, zorder=4)
     axes.plot([x, x], [floor, y - 0.6 * depth], color=INK, linewidth=0.8, zorder=4)
     box = {"facecolor": GROUND, "edgecolor": "none", "pad": 2.0}
-    text = f"Δx = {walk.dx:.3f} m"
+    text = f"Δx = {'x / cos α = ' * (slope != 0)}{walk.dx:.3f} m"
     axes.text(x.mean(), y.mean(), text, rotation=-slope, ha="center", va="center", bbox=box, zorder=6)
 
 

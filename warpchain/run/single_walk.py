@@ -34,7 +34,7 @@ def walk(
     Args:
         links: Number of links n, even where two kinds alternate; None: 60.
         frequency: Turns of the sprocket per second [Hz]; None: 15.
-        preset: None or ``"paper"`` (Table 1), or ``"soft"`` (softer joints, with ``reference`` 10 to 15
+        preset: None or ``"paper"`` (Table 1), or ``"soft"`` (softer joints, with ``reference`` 15 to 19
             times fewer steps).
         method: None or ``"standard"`` (``"hybrid"`` at 3e-3, with joints softened on the sprocket and in the pile; on a
             GPU, and with ``record_loads``, the next), ``"explicit"`` (``"os32"`` at 3e-3, softened likewise),
