@@ -105,9 +105,15 @@ STILL = [0.1, 0, 0, 0]
         ({"R": 55.6}, "parameters.sprocket_radius: 55.6 m is 1000 times Table 1's; did you mean 0.0556 (55.6 mm)? "),
         ({"m_inner": 3.7}, "parameters.inner_mass: 3.7 kg is 1000 times Table 1's; did you mean 0.0037 (3.7 g)? Else "),
         ({"m_outer": 3e-6}, "parameters.outer_mass: 3e-6 kg is 0.000953 times Table 1's; give it in kg, or set "),
-        ({"I_inner": 169}, "parameters.inner_inertia: 169 kg m² is 1e9 times Table 1's; did you mean 1.69e-7 (169 g mm²)"),
+        (
+            {"I_inner": 169},
+            "parameters.inner_inertia: 169 kg m² is 1e9 times Table 1's; did you mean 1.69e-7 (169 g mm²)",
+        ),
         ({"g": 981}, "parameters.gravity: 981 m/s² is 100 times Table 1's; did you mean 9.81 (981 cm/s²)? Else set "),
-        ({"link_masses": [3.7] * 60}, "scene.link_masses: 3.7 kg is 1000 times Table 1's; did you mean 0.0037 (3.7 g)?"),
+        (
+            {"link_masses": [3.7] * 60},
+            "scene.link_masses: 3.7 kg is 1000 times Table 1's; did you mean 0.0037 (3.7 g)?",
+        ),
         ({"charm_radius": 4.5}, "scene.charm_radius: 4.5 m is 1070 times Table 1's; did you mean 0.0045 (4.5 mm)? "),
         # links that are unlike
         ({"links": 61}, "scene.links: 61 is odd; give an even number, or link_masses and "),

@@ -28,7 +28,13 @@ def test_ten_times_a_value_is_taken_and_more_is_asked_about(name: str) -> None:
 
 def test_who_insists_gets_the_value() -> None:
     """A chain of another size, all of it, is taken with `unusual_values`, in a walk and in a sweep."""
-    large = {"link_length": 0.254, "sprocket_radius": 1.1, "circle_radius": 0.084, "inner_mass": 30.0, "outer_mass": 25.0}
+    large = {
+        "link_length": 0.254,
+        "sprocket_radius": 1.1,
+        "circle_radius": 0.084,
+        "inner_mass": 30.0,
+        "outer_mass": 25.0,
+    }
     with pytest.raises(InputError, match=r"options\.unusual_values: true to insist$"):
         setup_with({}, **large)
     assert setup_with({"unusual_values": True}, **large).parameters.inner_mass == 30.0
@@ -41,7 +47,9 @@ def test_who_insists_gets_the_value() -> None:
 def test_distributions_are_asked_about_too() -> None:
     """A law in another unit is refused where it was given; what is drawn about a fixed value goes with that."""
     for law in ({"uniform": [12.6, 12.7]}, {"gaussian": {"mean": 12.65, "sigma": 0.1}}):
-        with pytest.raises(InputError, match=r"^sweep\.distributions\.link_length: 12\.65 m is 998 times Table 1's; did"):
+        with pytest.raises(
+            InputError, match=r"^sweep\.distributions\.link_length: 12\.65 m is 998 times Table 1's; did"
+        ):
             load_sweep(content(distributions={"link_length": law}))
 
 

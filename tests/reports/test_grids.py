@@ -333,4 +333,6 @@ def test_a_figure_of_one_randomisation_says_that_it_has_no_errors(tmp_path: Path
         assert ("gives no standard error; randomisations: 8" in told) == (count == 1)
         assert result.to_xarray().randomisation.values.tolist() == [k % count for k in range(16)]
     merge(tmp_path / "8", tmp_path / "8.h5")
-    np.testing.assert_array_equal(load(tmp_path / "8.h5").statistics().standard_error, result.statistics().standard_error)
+    np.testing.assert_array_equal(
+        load(tmp_path / "8.h5").statistics().standard_error, result.statistics().standard_error
+    )

@@ -1,4 +1,4 @@
-"""Arguments of another kind than wanted: one line with the name of the argument, and the right name for what is meant."""
+"""Arguments of another kind than wanted: one line with the name of the argument, and the right name for a wrong one."""
 
 import os
 import subprocess
@@ -34,13 +34,25 @@ def joined() -> tuple[Any, Any]:
     [
         (lambda: warpchain.sweep(links=[40], out="never", executor=3), "executor: expected one with submit, such as "),
         (lambda: films.film_of(3), "walk: expected a WalkResult, got 3"),  # type: ignore[arg-type]
-        (lambda: warpchain.sweep(points={"mu": [0.1]}, out="never"), "sweep.points.mu: unknown name; did you mean mu_fc, "),
+        (
+            lambda: warpchain.sweep(points={"mu": [0.1]}, out="never"),
+            "sweep.points.mu: unknown name; did you mean mu_fc, ",
+        ),
         (lambda: warpchain.walk(mu=0.1), "'mu': unknown name; did you mean mu_fc, mu_cc or mu_sc?"),
         (lambda: warpchain.walk(μ=0.1), "'μ': unknown name; did you mean mu_fc, mu_cc or mu_sc?"),
         (lambda: warpchain.walk(tau=0.1), "'tau': unknown name; did you mean tau_c?"),
-        (lambda: warpchain.walk(links=[40, 60]), "scene.links: [40, 60] is several values, and a walk has one; use warpc"),  # type: ignore[arg-type]
-        (lambda: warpchain.walk(mu_fc=[0.1, 0.2]), "parameters.floor_friction: [0.1, 0.2] is several values, and a walk h"),
-        (lambda: warpchain.simulate("soft", *joined()), "duration: missing, and so is times; give the simulated time in s"),
+        (
+            lambda: warpchain.walk(links=[40, 60]),
+            "scene.links: [40, 60] is several values, and a walk has one; use warpc",
+        ),  # type: ignore[arg-type]
+        (
+            lambda: warpchain.walk(mu_fc=[0.1, 0.2]),
+            "parameters.floor_friction: [0.1, 0.2] is several values, and a walk h",
+        ),
+        (
+            lambda: warpchain.simulate("soft", *joined()),
+            "duration: missing, and so is times; give the simulated time in s",
+        ),
         (lambda: warpchain.load(None), "path: None is no path; give one as text"),  # type: ignore[arg-type]
         (lambda: warpchain.load(""), "path: '' is no path; give one as text"),
         (lambda: warpchain.load([]), "path: an empty list; give the folders of a sweep"),
@@ -115,4 +127,6 @@ def test_figures_need_no_backend(tmp_path: Path) -> None:
         text=True,
     )
     assert done.returncode == 0 and (tmp_path / "sweep/distance.png").exists()
-    assert done.stderr == "warning: MPLBACKEND: 'nonsense' is not a backend of matplotlib; figures are drawn without it\n"
+    assert (
+        done.stderr == "warning: MPLBACKEND: 'nonsense' is not a backend of matplotlib; figures are drawn without it\n"
+    )

@@ -1,19 +1,17 @@
 """Standard errors of means over the samples of a cell, held against the spread of means over many seeds."""
 
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from tests.support.made_sweeps import make_sweep
 from tests.support.sweep_content import content
 from warpchain.inputs.validation import InputError
 from warpchain.status import Status
 from warpchain.store.cell_statistics import CellStatistics
 from warpchain.sweeps.designs import RANDOMISATIONS, SAMPLERS, independent_groups
-from warpchain.sweeps.plan import PlannedWalk, Sweep, load_sweep
+from warpchain.sweeps.plan import Sweep, load_sweep
 
 SEEDS = 24
 DRAWN = {"floor_friction": (0.2, 0.4), "phase": (0.0, 1.0), "clearance": (0.005, 0.015), "gravity": (9.0, 10.0)}

@@ -5,8 +5,8 @@ from typing import Any
 import pytest
 
 import warpchain
-from tests.support.command_line import Command
 from tests.hard_cases.starts import dropped, folded
+from tests.support.command_line import Command
 from warpchain import Status
 
 SHORT = {"links": 40, "start": "ellipse", "frame_interval": None}
@@ -71,7 +71,9 @@ def test_the_advice_of_statuses_that_only_flights_reach() -> None:
         (Status.NOT_FINITE, {"velocity": velocity * 1e305}, {"velocity": velocity}, "lower speeds"),
         (Status.LIST_OVERFLOW, {"skin": 1.0}, {"skin": 2e-3}, "lower options.skin"),
     ):
-        given = {"position": position} if "velocity" in first else dict(zip(("position", "velocity"), lying, strict=True))
+        given = (
+            {"position": position} if "velocity" in first else dict(zip(("position", "velocity"), lying, strict=True))
+        )
         ends = [warpchain.simulate("soft", duration=1e-4, **given, **case).status for case in (first, second)]
         assert named in status.sentence and ends == [status, Status.FINISHED]
 

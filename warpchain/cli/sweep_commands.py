@@ -12,7 +12,6 @@ from warpchain.cli.words import JSON, argument, option, output, output_path
 
 if TYPE_CHECKING:
     from warpchain.store.sweep_result import SweepResult
-    from warpchain.walks.walk_result import WalkResult
 
 _FILE: Final = "The sweep, or the bare name of one that comes with warpchain, such as figure6."
 _DEVICE: Final = "cpu, cuda (the first GPU) or cuda:N, instead of what the sweep says."

@@ -23,7 +23,19 @@ from warpchain.loop.stationary_loop import StationaryLoop
 from warpchain.pictures import chain
 from warpchain.pictures.chain import center_in_room, checked_joints
 from warpchain.pictures.labels import Kind, Walk, setting
-from warpchain.pictures.style import BLUE, DASHES, DOTS, FAINT, GREEN, GROUND, INK, RED, InlineFigure, checked_figure, tidy
+from warpchain.pictures.style import (
+    BLUE,
+    DASHES,
+    DOTS,
+    FAINT,
+    GREEN,
+    GROUND,
+    INK,
+    RED,
+    InlineFigure,
+    checked_figure,
+    tidy,
+)
 from warpchain.status import Status
 
 FALLEN: Final = 45.0

@@ -18,8 +18,21 @@ from warpchain.inputs.arrays import Array
 from warpchain.pictures import labels
 from warpchain.pictures.grid_figure import draw_grid
 from warpchain.pictures.labels import cell_values, quantity_name, quantity_text
-from warpchain.pictures.style import BLUE, FAINT, GREEN, INK, LINE_COLORS, RED, InlineFigure, NothingToShow, Picture
-from warpchain.pictures.style import mark_survivors, panel_grid, survivor_handles, tidy
+from warpchain.pictures.style import (
+    BLUE,
+    FAINT,
+    GREEN,
+    INK,
+    LINE_COLORS,
+    RED,
+    InlineFigure,
+    NothingToShow,
+    Picture,
+    mark_survivors,
+    panel_grid,
+    survivor_handles,
+    tidy,
+)
 from warpchain.status import Status
 from warpchain.store.block_result import BlockResult
 from warpchain.store.sweep_result import SweepResult

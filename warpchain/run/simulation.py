@@ -112,7 +112,9 @@ def simulate(
         raise InputError("duration: missing, and so is times; give the simulated time in s, or the instants")
     if duration is None and given is not None and len(given):
         duration = plain(given[-1])
-    end: float = checked(0.0 if duration is None else duration, "duration", Annotated[float, Field(ge=0, lt=LONGEST)], "s")
+    end: float = checked(
+        0.0 if duration is None else duration, "duration", Annotated[float, Field(ge=0, lt=LONGEST)], "s"
+    )
     options = validated(Options, {**_UNSOFTENED, **settings, **chosen}, "options")
     for name in _UNSOFTENED:
         if getattr(options, name):

@@ -9,8 +9,8 @@ has several designs of fewer points, randomised independently of one another, an
 groups tells the error. The samples of a cell belong to the groups in turn, so that more samples move none.
 
 Sources: I. M. Sobol', USSR Comput. Math. Math. Phys. 7 (1967) 86; A. B. Owen, J. Complexity 14 (1998) 466
-(scrambling, independent replicates); M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21 (1979) 239 (latin hypercubes);
-A. Saltelli et al., Comput. Phys. Commun. 181 (2010) 259 (A, B and AB).
+(scrambling, independent replicates); M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21 (1979) 239 (latin
+hypercubes); A. Saltelli et al., Comput. Phys. Commun. 181 (2010) 259 (A, B and AB).
 """
 
 import functools

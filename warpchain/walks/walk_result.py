@@ -83,8 +83,8 @@ class WalkResult:
         float,
         Stored(
             "m",
-            "x of the centre of mass from the sprocket (x = 0) on; on a slope of the angle α x / cos α, the distance along "
-            "the floor to the point vertically below it; NaN unless at rest",
+            "x of the centre of mass from the sprocket (x = 0) on; on a slope of the angle α x / cos α, the distance "
+            "along the floor to the point vertically below it; NaN unless at rest",
         ),
     ]
     walk_time: Annotated[float, Stored("s", "from the release to the end")]
