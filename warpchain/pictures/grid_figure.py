@@ -66,8 +66,8 @@ def draw_grid(
     Lines have bars of one standard error; a single line has lighter ones of one standard deviation, too. Open symbols
     are means of survivors, with an upright triangle at the lower bound of the whole mean where there is one. A red
     cross on the x axis, or a dot in a map, says that walks failed there; a ring in a map is a mean of survivors.
-    `blocks`: name of each → the statistics of its cells; the name of the quantity is for labels; all else is as of `SweepResult.plot`. A `NothingToShow` says that no block
-    has an axis of several values, or that there is no mean.
+    `blocks`: name of each → the statistics of its cells; the name of the quantity is for labels; all else is as of
+    `SweepResult.plot`. A `NothingToShow` says that no block has an axis of several values, or that there is no mean.
     """
     if figure is not None:
         style.checked_figure(figure)
