@@ -100,7 +100,10 @@ def test_figure6_counts_what_is_not_in_the_means(flawed6: SweepResult) -> None:
     first, second = panels(figure6(flawed6))
     assert first.get_xlabel() == "4 of 6 walks failed"
     assert second.get_xlabel() == "3 of 12 not run yet"
-    assert means(first, RED) == {10.0: pytest.approx(flawed6.blocks["rest"].dx[0, 0, 1:].mean())}
+    mean = pytest.approx(flawed6.blocks["rest"].dx[0, 0, 1:].mean())
+    assert means(first, RED) == {10.0: mean}
+    (mark,) = [line for line in first.lines if line.get_label() == "_mark"]  # the mean of two of three walks
+    assert np.asarray(mark.get_xydata()).tolist() == [[10.0, mean]] and mark.get_markerfacecolor() == "white"
     assert len(means(second, GREEN)) == 1
 
 
