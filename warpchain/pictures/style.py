@@ -118,7 +118,7 @@ class InlineFigure(Figure):
         """Draw everything without LaTeX."""
         with rc_context({"text.usetex": False}):
             for text in self.findobj(Text):
-                text.set_usetex(False)  # type: ignore[attr-defined]
+                text.set_usetex(False)
             super().draw(renderer)
 
     def _repr_png_(self) -> bytes:

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from warpchain.inputs.arrays import Array
+from warpchain.inputs.arrays import AnyArray, Array
 from warpchain.pictures import labels
 from warpchain.pictures.grid_figure import draw_grid
 from warpchain.pictures.labels import cell_values, quantity_name, quantity_text
@@ -211,7 +211,7 @@ def sensitivities(result: SweepResult) -> list[Sensitivity]:
     return found
 
 
-def _half_interval(samples: Array, groups: Array) -> Array:
+def _half_interval(samples: Array, groups: AnyArray) -> Array:
     """Half width of the intervals of `sobol_indices`, (2, d), by leaving out each group of samples in turn.
 
     The delete-a-group jackknife: B. Efron, C. Stein, Ann. Statist. 9 (1981) 586. Indices are no means, but smooth

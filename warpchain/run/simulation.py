@@ -107,11 +107,11 @@ def simulate(
     if tolerance is not None:
         chosen["tolerance"] = tolerance
     floor, gravity = plain(floor, "floor"), checked(gravity, "gravity", bool)
-    given = None if times is None else checked_array(times, "times", "t")
-    if duration is None and given is None:
+    chosen_times = None if times is None else checked_array(times, "times", "t")
+    if duration is None and chosen_times is None:
         raise InputError("duration: missing, and so is times; give the simulated time in s, or the instants")
-    if duration is None and given is not None and len(given):
-        duration = plain(given[-1])
+    if duration is None and chosen_times is not None and len(chosen_times):
+        duration = max(0.0, float(chosen_times[-1]))
     end: float = checked(
         0.0 if duration is None else duration, "duration", Annotated[float, Field(ge=0, lt=LONGEST)], "s"
     )
@@ -136,8 +136,8 @@ def simulate(
     chain = state.parameters if gravity else state.parameters.with_values({"gravity": 0.0})
     setup = replace(state.setup, scene=scene, parameters=chain)
     check_links_on_gpu(state.links, options.device, "position")
-    instants = np.linspace(0.0, end, 101) if given is None else given
-    is_rising = given is None or bool(np.all(np.diff(instants) > 0))
+    instants = np.linspace(0.0, end, 101) if chosen_times is None else chosen_times
+    is_rising = chosen_times is None or bool(np.all(np.diff(instants) > 0))
     if not len(instants) or instants[0] < 0 or instants[-1] > end or not is_rising:
         raise InputError(f"times: give rising instants between 0 and the duration of {end} s")
     if len(instants) * state.links > MOST_PLACES:
