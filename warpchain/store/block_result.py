@@ -265,10 +265,10 @@ class BlockResult:
         Raises:
             KeyError: there is no such column.
         """
-        column, status, farthest = self.columns[name], self.columns["status"], np.array(np.nan)
-        if name == "dx" and (status == Status.DISTANCE_LIMIT).any():
-            farthest = self._farthest()
-        return CellStatistics.of(self.axes, self.unit(name), column, status, self.planned.groups, farthest)
+        unit, column, status = self.unit(name), self.columns[name], self.columns["status"]
+        is_bounded = name == "dx" and (status == Status.DISTANCE_LIMIT).any()
+        farthest = self._farthest() if is_bounded else np.array(np.nan)
+        return CellStatistics.of(self.axes, unit, column, status, self.planned.groups, farthest)
 
     def _farthest(self) -> NDArray[np.float64]:
         """Distance [m] that walks which ended by it had come, in each cell; NaN where the floor may rise ahead.
