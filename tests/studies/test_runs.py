@@ -57,7 +57,7 @@ MADE: dict[str, tuple[ModuleType, dict[str, Any], Callable[..., Any], list[str]]
         slopes,
         sweep_of(slopes),
         endless,
-        ["| 60 | 10 | 5 | 2.501 | 0.001 | 0% | – |", "| 120 | 25 | 20 | – | – | 100% |"],
+        ["| 60 | 10 | 5 | 2.501 | 0.001 | – | 0% | – |", "| 120 | 25 | 20 | – | – | 20.00 | 100% |"],
     ),
     "tilts": (
         falls,
