@@ -76,11 +76,14 @@ def walk(
     from warpchain.inputs.validation import InputError, checked, printable
     from warpchain.inputs.yaml_files import parse_yaml
     from warpchain.run.progress_bar import changing_line, walk_progress_text
+    from warpchain.sweeps.block import refuse_axes
     from warpchain.walks.one_walk import run_walk
     from warpchain.walks.walk_result import WalkResult
 
     named = {"links": links, "frequency": frequency, "start": start}
     given = _given_values(named | {"method": method, "tolerance": tolerance, "device": device}, assignments or [])
+    for section in given.values():
+        refuse_axes(section)
     own: Mapping[str, Mapping[str, Any]] = {}
     number = None if seed is None else checked(parse_yaml(seed, "seed"), "seed", Seed)
     if like is not None:

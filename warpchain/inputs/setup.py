@@ -14,6 +14,7 @@ from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.parameters import preset as parameter_preset
 from warpchain.inputs.scene import OF_LINKS, Scene, check_links, check_links_on_gpu, check_parity, check_scene
 from warpchain.inputs.state import DEFAULT_PRESET, Setup, State
+from warpchain.inputs.unit_slips import check_units
 from warpchain.inputs.validation import InputError, Section, checked, shown, validated
 from warpchain.kernels.methods.method import find_method
 
@@ -59,6 +60,9 @@ def options_beside(plane: str, options: Values, loads: bool = False) -> Options:
 def combined(preset: str, parameters: Parameters, scene: Scene, options: Options) -> Setup:
     """The setup of these values, if they do not contradict one another; else an `InputError`."""
     _check_can_tilt(scene, options)
+    if not options.unusual_values:
+        check_units(vars(parameters), "parameters")
+        check_units(vars(scene), "scene")
     check_scene(scene, parameters)
     check_links_on_gpu(scene.links, options.device, "scene.links")
     interval = options.record_interval
@@ -91,6 +95,9 @@ def continued(state: State, sections: Mapping[str, Values]) -> Setup:
     for name in OF_THE_WALK[:2]:
         if (end := getattr(scene, name)) is not None and end < state.time:
             raise InputError(f"{name}: {end:g} s is before the state at {state.time:g} s; give a later time")
+    if not options.unusual_values:
+        check_units({name: getattr(parameters, name) for name in sections["parameters"]}, "parameters")
+        check_units(sections["scene"], "scene")
     setup = Setup(before.preset, parameters, scene, options)
     if scene.plane == "fixed" and not state.is_placed_as_in(setup):  # a moving sprocket may have left it in the floor
         setup.floor.check_above(state.position, state.parameters.link_length, "start")

@@ -157,6 +157,9 @@ def suggested_name(written: object, keys: Iterable[str] = ()) -> str:
     """The remedy for an unknown name of a field, or for one of these keys, or for a field in a wrong place."""
     if written in SECTION_OF:
         return f"give it in {SECTION_OF[str(written)]}"
+    stem = f"{spelled(written)}_" if isinstance(written, str) else ""
+    if family := [symbol for symbol in NAME_OF_SYMBOL if stem and symbol.startswith(stem)]:  # mu: of which pair?
+        return f"did you mean {' or '.join(filter(None, (', '.join(family[:-1]), family[-1])))}?"
     fields = {name: f"{section}.{name}" for name, section in SECTION_OF.items()}
     symbols = {symbol: f"{SECTION_OF[name]}.{symbol}" for symbol, name in NAME_OF_SYMBOL.items()}
     return suggestion(written, {key: key for key in keys} | fields | symbols)

@@ -98,6 +98,7 @@ def sweep(
             ``point``, beside the grid.
         samples: Samples in each cell of the grid; beside a source instead of those at the top of it.
         sampler: ``"random"`` (the default), ``"sobol"``, ``"latin_hypercube"`` or ``"saltelli"``.
+        randomisations: Independent randomisations of such a design, by default 8; errors of means come from them.
         preset: As of :func:`walk`.
         scene: Fields of :class:`Scene` that differ from their defaults.
         parameters: Fields of :class:`Parameters` that differ from the preset.
@@ -126,6 +127,9 @@ def sweep(
         OSError: The folder cannot be read or written.
         LostWorkersError: Worker processes were killed, or the scheduler of a Dask client was closed.
     """
+    if executor is not None and not hasattr(executor, "submit"):
+        wanted = "one with submit, such as concurrent.futures.ProcessPoolExecutor(), or a Dask client"
+        raise InputError(f"executor: expected {wanted}; got {shown(executor)}")
     planned, folder, own, count = _checked_call(source, out, settings, device, workers, part)
     if hasattr(executor, "get_executor"):
         count = count or sum(executor.nthreads().values())

@@ -23,7 +23,7 @@ import numpy as np
 from warpchain.files import AnyPath, Kind, checked_output, given_path, write_whole
 from warpchain.hdf5_files import hdf5_image, kind_of_hdf5, reading_hdf5
 from warpchain.inputs.arrays import AnyArray
-from warpchain.inputs.validation import InputError, InputWarning, full_name, shown, suggestion
+from warpchain.inputs.validation import InputError, InputWarning, checked_path, full_name, shown, suggestion
 from warpchain.store.block_result import BlockResult, counted, located, status_counts
 from warpchain.store.cell_statistics import CellStatistics
 from warpchain.store.folder import read_rows
@@ -207,14 +207,42 @@ class SweepResult:
         }
 
 
-def load(path: AnyPath) -> SweepResult:
+def load(path: AnyPath | Sequence[AnyPath]) -> SweepResult:
     """Read the folder of a sweep, as far as the sweep is, or a file that `warpchain merge` wrote.
 
+    Args:
+        path: the folder or the file; or several, which have different walks of one sweep, such as its parts.
+
     Raises:
-        OSError: the folder or the file cannot be read.
-        InputError: there is no sweep in it, or a file is damaged, foreign or of another version.
+        OSError: a folder or a file cannot be read.
+        InputError: there is no sweep in it, a file is damaged, foreign or of another version, or several do not fit
+            together.
     """
-    return _load_merged(path) if os.path.isfile(path) else _load_folder(path)
+    if isinstance(path, Sequence) and not isinstance(path, str | bytes):
+        return _together(path)
+    given = checked_path(path, "path")
+    return _load_merged(given) if os.path.isfile(given) else _load_folder(given)
+
+
+def _together(sources: Sequence[AnyPath]) -> SweepResult:
+    """The results of several folders and merged files as one; errors as of `load`."""
+    if not sources:
+        raise InputError("path: an empty list; give the folders of a sweep")
+    first, *others = sources
+    whole = load(first)
+    for folder in others:
+        result = load(folder)
+        if any(whole.provenance[name] != result.provenance[name] for name in ("digest", "numerics_version")):
+            raise InputError(f"{folder}: is not the sweep of {first}, with the same seed and samples; give its parts")
+        blocks = {}
+        for block, other in zip(whole.blocks.values(), result.blocks.values(), strict=True):
+            there = block.is_there
+            if (there & other.is_there).any():
+                raise InputError(f"{folder}: has walks that a folder before it has; give each part of a sweep once")
+            columns = {key: np.where(there, values, other.columns[key]) for key, values in block.columns.items()}
+            blocks[block.name] = replace(block, columns=columns, motions=np.where(there, block.motions, other.motions))
+        whole = replace(whole, blocks=blocks)
+    return whole
 
 
 def _load_folder(directory: AnyPath) -> SweepResult:
@@ -278,23 +306,9 @@ def merge(sources: AnyPath | Sequence[AnyPath], path: AnyPath) -> None:
         OSError: a folder cannot be read, or the file cannot be written, or is there already and no merged file.
         InputError: there is no sweep in a folder, a shard is damaged or foreign, or sweeps do not fit together.
     """
-    folders = [sources] if isinstance(sources, str | os.PathLike) else list(sources)
     target = given_path(path)
     checked_output(target, _MERGED)
-    first, *others = folders
-    whole = load(first)
-    for folder in others:
-        result = load(folder)
-        if any(whole.provenance[name] != result.provenance[name] for name in ("digest", "numerics_version")):
-            raise InputError(f"{folder}: is not the sweep of {first}, with the same seed and samples; give its parts")
-        blocks = {}
-        for block, other in zip(whole.blocks.values(), result.blocks.values(), strict=True):
-            there = block.is_there
-            if (there & other.is_there).any():
-                raise InputError(f"{folder}: has walks that a folder before it has; give each part of a sweep once")
-            columns = {key: np.where(there, values, other.columns[key]) for key, values in block.columns.items()}
-            blocks[block.name] = replace(block, columns=columns, motions=np.where(there, block.motions, other.motions))
-        whole = replace(whole, blocks=blocks)
+    whole = load(sources)
     write_whole(target, hdf5_image(KIND, partial(_fill, whole=whole)), _MERGED)
     if missing := whole.missing_count:
         problem = f"{missing:,} of {whole.walk_count:,} walks are missing"

@@ -26,7 +26,7 @@ from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import contact_radius
 from warpchain.inputs.setup import SECTIONS, Setup
 from warpchain.inputs.state import State
-from warpchain.inputs.validation import InputError, json_value, validated
+from warpchain.inputs.validation import InputError, checked_path, json_value, validated
 from warpchain.kernels import layout
 from warpchain.loop.stationary_loop import BEFORE, FIELDS, BeforeRelease
 from warpchain.pictures.labels import Kind
@@ -82,7 +82,9 @@ class WalkResult:
     dx: Annotated[
         float,
         Stored(
-            "m", "x of the centre of mass from the sprocket (x = 0) on, on a slope along the floor; NaN unless at rest"
+            "m",
+            "x of the centre of mass from the sprocket (x = 0) on; on a slope of the angle α x / cos α, the distance "
+            "along the floor to the point vertically below it; NaN unless at rest",
         ),
     ]
     walk_time: Annotated[float, Stored("s", "from the release to the end")]
@@ -379,6 +381,7 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
         InputError: the file is no walk, or belongs to another version of warpchain. It is a `ValueError`.
         DamagedFileError: the file is damaged, cut short or of an earlier warpchain. It is an `InputError`.
     """
+    path = checked_path(path, "path")
     if os.path.isdir(path):
         record = os.path.join(path, "walk.h5")
         if not os.path.exists(record) and os.path.exists(os.path.join(path, "sweep.h5")):
