@@ -19,7 +19,7 @@ import sys
 for name in ("fcntl", "resource", "pwd", "grp", "termios"):
     sys.modules[name] = None
 import os
-for name in ("O_NONBLOCK", "register_at_fork", "pread", "pwrite", "sched_getaffinity"):
+for name in ("O_NONBLOCK", "fork", "register_at_fork", "pread", "pwrite", "sched_getaffinity"):
     if hasattr(os, name):
         delattr(os, name)
 """
@@ -29,7 +29,8 @@ import warpchain
 walk = warpchain.walk(links=30, frequency=5.0, preset="soft", start="ellipse", walk_limit=0.01)
 walk.save("walk.h5")
 print(warpchain.load_walk("walk.h5").dx == walk.dx or walk.status.label)
-result = warpchain.sweep(links=[10], frequency=[3.0], preset="soft", start="ellipse", walk_limit=0.01, out="sweep")
+usual = {"preset": "soft", "start": "ellipse", "walk_limit": 0.01}
+result = warpchain.sweep(links=[30], frequency=[5.0], samples=1, out="sweep", **usual)
 print(result.missing_count)
 """
 
@@ -51,10 +52,10 @@ def test_a_file_locks_where_there_are_no_locks(tmp_path: Path, monkeypatch: pyte
     """A second run is refused with the file to delete; the first one removes the file when it ends."""
     monkeypatch.setattr("fcntl.flock", no_flock)
     held = tmp_path / "lock.held"
-    with pytest.warns(InputWarning, match=f"^{tmp_path}: has no flock here, so the file lock.held locks it"):
+    with pytest.warns(InputWarning, match=f"^{tmp_path}: has no flock, so the file lock.held locks it"):
         with SweepFolder.open(tmp_path, SWEEP, shard_size=SHARD_SIZE):
             who = f"in use by process {os.getpid()} on {socket.gethostname()}"
-            with pytest.raises(InputError, match=f"{who}; wait .* or delete {held} if no process runs this sweep$"):
+            with pytest.raises(InputError, match=f"{who}; wait .*, or delete lock.held there if it has ended$"):
                 SweepFolder.open(tmp_path, SWEEP, shard_size=SHARD_SIZE)
             assert held.exists()
         assert not held.exists()

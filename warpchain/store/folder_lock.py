@@ -22,14 +22,14 @@ _HOLDER: Final = re.compile(r"process \d+ on \S*")
 _NO_LOCKS: Final = frozenset({errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EINVAL})
 """Numbers (errno) by which a file system says that it has no `flock`."""
 
-_held: set[int] = set()
-"""Descriptors of the locks of this process. A forked child shares them, and would keep the folder of a killed run
-locked; so a child closes them at once."""
+_held: dict[int, Callable[[], None] | None] = {}
+"""Descriptors of the locks of this process → what removes the file `lock.held` of each. A forked child shares them, and
+would keep the folder of a killed run locked; so a child closes them at once."""
 
 
 def _give_up() -> None:
     while _held:
-        os.close(_held.pop())
+        os.close(_held.popitem()[0])
 
 
 if hasattr(os, "register_at_fork"):
@@ -68,14 +68,14 @@ def locked(folder: Path) -> Callable[[], None]:
         if release_file is not None:
             release_file()
         raise
-    _held.add(descriptor)
+    _held[descriptor] = release_file  # and the lock of `filelock`, which its end as an object would open
 
     def unlock() -> None:
         if descriptor in _held:
-            _held.remove(descriptor)
+            own = _held.pop(descriptor)
             os.close(descriptor)
-            if release_file is not None:
-                release_file()
+            if own is not None:
+                own()
 
     return unlock
 
@@ -104,7 +104,7 @@ def _locked_by_a_file(folder: Path, in_use: str) -> Callable[[], None]:
     try:
         lock.acquire()
     except Timeout:
-        raise InputError(f"{in_use}, or delete {path} if no process runs this sweep") from None
+        raise InputError(f"{in_use}, or delete {path.name} there if it has ended") from None
     text = f"{folder}: has no flock, so the file {path.name} locks it; a killed process may leave that file there"
     warnings.warn(text, InputWarning, stacklevel=5)
     return lock.release
