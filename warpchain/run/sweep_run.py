@@ -217,7 +217,7 @@ def _run_in_folder(
     needed = BYTES_OF_WALK * planned.walk_count
     if needed > (free := free_memory()):
         problem = (
-            f"{planned.walk_count:,} walks take {needed / 2**30:.2g} GB of memory, and {free / 2**30:.2g} GB are free"
+            f"{planned.walk_count:,} walks take {needed / 1e9:.2g} GB of memory, and {free / 1e9:.2g} GB are free"
         )
         raise InputError(f"samples: {problem}; give fewer samples or cells, or a machine with more memory")
     size = max(1, min(SHARD_WALKS, planned.walk_count // SHARDS))  # by the sweep only: equal sweeps leave equal files
