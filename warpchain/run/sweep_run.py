@@ -216,9 +216,7 @@ def _run_in_folder(
             at_once = 1  # the others would wait for it
     needed = BYTES_OF_WALK * planned.walk_count
     if needed > (free := free_memory()):
-        problem = (
-            f"{planned.walk_count:,} walks take {needed / 1e9:.2g} GB of memory, and {free / 1e9:.2g} GB are free"
-        )
+        problem = f"{planned.walk_count:,} walks take {needed / 1e9:.2g} GB of memory, and {free / 1e9:.2g} GB are free"
         raise InputError(f"samples: {problem}; give fewer samples or cells, or a machine with more memory")
     size = max(1, min(SHARD_WALKS, planned.walk_count // SHARDS))  # by the sweep only: equal sweeps leave equal files
     with SweepFolder.open(folder, planned, fresh=fresh, shard_size=size, part=part) as store, ExitStack() as held:
