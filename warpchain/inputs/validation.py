@@ -244,7 +244,7 @@ def plain(value: object, path: str = "value") -> Any:
     """
     left = MOST_VALUES
 
-    def converted(value: Any, depth: int, path: str = path) -> Any:
+    def converted(value: Any, depth: int, keys: tuple[object, ...] = ()) -> Any:
         nonlocal left
         left -= 1
         if left < 0:
@@ -255,11 +255,11 @@ def plain(value: object, path: str = "value") -> Any:
             value = value.to_dict("list")
         elif hasattr(value, "to_numpy"):
             value = value.to_numpy()
-        if is_masked(value):
-            raise InputError(f"{path}: {MASKED}")
+        if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+            raise InputError(f"{functools.reduce(path_of, keys, path)}: {MASKED}")
         if isinstance(value, Set | Iterator | ValuesView | memoryview):
-            kind = type(value).__name__
-            raise InputError(f"{path}: expected a list, got a {kind}, whose order or content is not fixed; use a list")
+            where, kind = functools.reduce(path_of, keys, path), type(value).__name__
+            raise InputError(f"{where}: expected a list, got a {kind}, whose order or content is not fixed; use a list")
         if isinstance(value, np.ndarray) and value.ndim == 0:
             value = value[()]
         if isinstance(value, np.generic):
@@ -270,8 +270,8 @@ def plain(value: object, path: str = "value") -> Any:
         if depth == DEEPEST:
             raise InputError(f"{path}: more than {DEEPEST} lists or mappings inside of one another; give fewer")
         if isinstance(value, Mapping):
-            return {key: converted(item, depth + 1, path_of(path, key)) for key, item in value.items()}
-        return [converted(item, depth + 1, path) for item in value]
+            return {key: converted(item, depth + 1, (*keys, key)) for key, item in value.items()}
+        return [converted(item, depth + 1, keys) for item in value]
 
     return converted(value, 0)
 
@@ -279,10 +279,10 @@ def plain(value: object, path: str = "value") -> Any:
 MASKED: Final = "expected numbers, got masked values; use an array without a mask"
 
 
-def is_masked(value: object) -> bool:
-    """Whether a value, or one inside of its lists, is an array of NumPy with masked elements."""
+def is_masked(value: object, depth: int = 3) -> bool:
+    """Whether a value, or one inside of its lists as deep as arrays go, is an array of NumPy with masked elements."""
     if isinstance(value, list | tuple):
-        return any(map(is_masked, value))
+        return depth > 0 and any(is_masked(item, depth - 1) for item in value)
     return isinstance(value, np.ma.MaskedArray) and bool(np.ma.is_masked(value))
 
 
