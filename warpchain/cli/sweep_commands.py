@@ -1,4 +1,4 @@
-"""The commands of the command line that are about sweeps: sweep, info, plot, report, merge."""
+"""The commands of the command line that are about sweeps: sweep, compile, info, plot, report, merge."""
 
 import contextlib
 import sys
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from warpchain.store.sweep_result import SweepResult
 
 _FILE: Final = "The sweep, or the bare name of one that comes with warpchain, such as figure6."
+_FILES: Final = "Sweeps, or bare names of those that come with warpchain. Default: all that come with it."
 _DEVICE: Final = "cpu, cuda (the first GPU) or cuda:N, instead of what the sweep says."
 
 AsJson = Annotated[bool, JSON]
@@ -95,6 +96,27 @@ def sweep(
         print(f"{counts[status.label]} {status.label}: {status.sentence}", file=sys.stderr)
     if failed:
         raise typer.Exit(FAILED)
+
+
+def compile_kernels(
+    sources: Annotated[list[Path] | None, argument("[FILE.yaml]...", _FILES)] = None,
+    device: Annotated[str | None, option("NAME", _DEVICE)] = None,
+) -> None:
+    """Compile the kernels of sweeps into Warp's cache, for machines or users that cannot write there.
+
+    The sweeps that come with warpchain have the kernels of walks with default settings. WARP_CACHE_PATH names the
+    folder of the cache. A kernel serves only the versions of warpchain, Warp and Python that compiled it, and
+    processors or GPUs of the same kind.
+    """
+    from warpchain.run.progress_bar import changing_line
+    from warpchain.run.sweep_run import compile_sweep
+    from warpchain.sweeps.sweep_file import shipped_sweeps
+
+    for source in sources or map(Path, shipped_sweeps()):
+        with changing_line() as show:
+            show(f"{source}: compiling kernels")
+            planned = compile_sweep(source, device)
+        print(f"{planned.name}: kernels compiled")
 
 
 def info(

@@ -1,6 +1,7 @@
 """What one walk is: its `Setup`, and the `State` of a chain that it may begin from."""
 
 import hashlib
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
@@ -9,12 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpchain.inputs.arrays import Array, checked_array
-from warpchain.inputs.floor import Floor, circles_of, floor_from
+from warpchain.inputs.floor import FARTHEST, Floor, circles_of, floor_from
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import Scene, check_parity, check_scene
 from warpchain.inputs.start_shapes import links_between
-from warpchain.inputs.validation import SECTION_OF, InputError, validated
+from warpchain.inputs.validation import SECTION_OF, InputError, InputWarning, validated
 
 DEFAULT_PRESET: Final = "paper"
 """Preset of a walk or a sweep that names none."""
@@ -22,6 +23,12 @@ WIDEST_OPENING: Final = 0.1
 """Greatest distance of two joined link ends, in link lengths; a loop whose ends are farther apart is not closed."""
 WIDEST_MISFIT: Final = 0.5
 """Greatest difference of the distance of two given joints from a link length, in link lengths."""
+
+
+FARTHEST_MOVED: Final = 0.02
+"""Greatest distance by which fitting links of one length may move a given joint, in link lengths."""
+FARTHEST_UNSAID: Final = 1e-3
+"""Greatest such distance, in link lengths, of which no warning tells."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +107,8 @@ class State:
         memory: what else the walk had at that instant; only the package reads it.
 
     Raises:
-        InputError: an array has another shape or holds no finite numbers, or the loop is not closed.
+        InputError: an array has another shape, holds no finite numbers or places more than 10 km away, or the loop is
+            not closed.
     """
 
     position: Array
@@ -119,6 +127,9 @@ class State:
             shapes |= {"origin": (3,), "axes": (2, 3), "plane_rates": (3,)}
         for name, shape in shapes.items():
             object.__setattr__(self, name, checked_array(getattr(self, name), name, *shape))
+        for name in ("position", "origin") if self.origin is not None else ("position",):
+            if (far := float(np.abs(getattr(self, name)[..., :2]).max())) > FARTHEST:
+                raise InputError(f"{name}: a place {far:.6g} m from the origin; expected at most {FARTHEST:g} m, in m")
         if self.axes is not None and not np.allclose(self.axes @ self.axes.T, np.eye(2), atol=1e-9):
             raise InputError("axes: not two directions at right angles; give unit vectors")
         clock = float(self.memory.get("state/time", 0.0))
@@ -169,12 +180,23 @@ class State:
 
         Raises:
             InputError: two neighbours are not about a link length apart: the loop is not closed, or lengths are in
-                another unit; or an array or the number of links is refused.
+                another unit; a joint would have to move by more than 2 % of a link length; or an array or the number
+                of links is refused.
+
+        An `InputWarning` says how far the joints moved if one of them moved by more than 0.1 % of a link length.
         """
         places = checked_array(joints, "joints", "n", 2)
         rates = np.zeros_like(places) if velocity is None else checked_array(velocity, "velocity", *places.shape)
         setup = _setup(len(places), parameters, "joints")
-        position, rate = links_between(*_fitted(places, rates, setup.parameters.link_length))
+        length = setup.parameters.link_length
+        fitted, rates = _fitted(places, rates, length)
+        moved = np.linalg.norm(fitted - places, axis=1) / length
+        text = f"joints: to fit links of {length:g} m joint {moved.argmax()} moves by {moved.max():.2%} of a link"
+        if moved.max() > FARTHEST_MOVED:
+            raise InputError(f"{text}, more than {FARTHEST_MOVED:.0%}; measure joints or link_length more exactly")
+        if moved.max() > FARTHEST_UNSAID:
+            warnings.warn(f"{text} (mean {moved.mean():.2%}); the walk begins from there", InputWarning, stacklevel=2)
+        position, rate = links_between(fitted, rates)
         return cls(position=position, velocity=rate, setup=setup)
 
     @property

@@ -11,6 +11,7 @@ each walk in a group named by the place of the walk in a flat column, as in a sa
 
 import json
 import os
+import time
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -20,14 +21,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from warpchain.files import AnyPath, Kind, checked_output, given_path, write_whole
+from warpchain.files import AnyPath, Kind, checked_output, clear_parts, given_path, write_whole
 from warpchain.hdf5_files import hdf5_image, kind_of_hdf5, reading_hdf5
 from warpchain.inputs.arrays import AnyArray
 from warpchain.inputs.validation import InputError, InputWarning, checked_path, full_name, shown, suggestion
 from warpchain.store.block_result import BlockResult, counted, located, status_counts
 from warpchain.store.cell_statistics import CellStatistics
 from warpchain.store.folder import read_rows
-from warpchain.store.shards import read_manifest, stamp, stored_sweep
+from warpchain.store.shards import Manifest, read_manifest, stamp, stored_sweep
 from warpchain.sweeps.plan import Sweep
 from warpchain.walks.rows import COLUMNS, STORED_COLUMNS, derived_columns, drawn_column, quantity_of
 from warpchain.walks.walk_result import WalkResult
@@ -40,6 +41,8 @@ if TYPE_CHECKING:
 
 KIND: Final = "warpchain sweep result"
 REMEDY: Final = "merge the folders again, or fetch another copy of the file"
+TRIES, PAUSE = 100, 0.02
+"""Times that a folder is read in which shards come and go, and time [s] between them."""
 WANTED: Final = "give a folder of a sweep or a merged file; a saved walk is for plot, animate and load_walk"
 
 
@@ -246,16 +249,26 @@ def _together(sources: Sequence[AnyPath]) -> SweepResult:
 
 
 def _load_folder(directory: AnyPath) -> SweepResult:
-    while True:
-        manifest, begun = read_manifest(directory), stamp(directory)
+    for left in reversed(range(TRIES)):
+        begun, manifest = _seen(directory)
         try:
             rows, motions = read_rows(directory, manifest)
             break
-        except (OSError, InputError):
-            if stamp(directory) == begun:  # else a run has begun anew or added samples meanwhile
+        except (OSError, InputError) as error:
+            # A run may begin anew meanwhile, which deletes shards and then replaces sweep.h5, or add samples.
+            is_deleting = isinstance(error, FileNotFoundError)
+            if not left or not (is_deleting or stamp(directory) != begun):
                 raise
+            time.sleep(PAUSE * is_deleting)
     provenance = {"digest": manifest.sweep.digest(), "numerics_version": manifest.numerics_version}
     return _result(manifest.sweep, provenance | {"versions": manifest.versions}, rows, motions)
+
+
+def _seen(directory: AnyPath) -> tuple[str, Manifest]:
+    """Stamp and manifest of a folder."""
+    if os.path.lexists(Path(directory) / "sweep.h5"):
+        return stamp(directory), read_manifest(directory)
+    return "", read_manifest(directory)  # says what is wrong
 
 
 def _load_merged(path: AnyPath) -> SweepResult:
@@ -308,6 +321,7 @@ def merge(sources: AnyPath | Sequence[AnyPath], path: AnyPath) -> None:
     """
     target = given_path(path)
     checked_output(target, _MERGED)
+    clear_parts(target)
     whole = load(sources)
     write_whole(target, hdf5_image(KIND, partial(_fill, whole=whole)), _MERGED)
     if missing := whole.missing_count:
