@@ -33,8 +33,8 @@ JSON = "--json"  # An option of most commands, which is explained once
 
 SAMPLER_MEANINGS = {
     "random": "independent samples",
-    "sobol": "scrambled Sobol' sequence; a power of two of samples",
-    "latin_hypercube": "latin hypercube",
+    "sobol": "scrambled Sobol' sequences; a power of two of samples",
+    "latin_hypercube": "latin hypercubes",
     "saltelli": "points for Sobol indices: each sample of d drawn quantities takes d + 2 walks; a power of two of "
     "samples",
 }

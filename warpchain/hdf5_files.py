@@ -1,11 +1,15 @@
 """HDF5 files of results: equal content gives equal bytes, and a checksum tells of damage.
 
-Behind the HDF5 content, where the HDF5 library does not look, stands a line with its SHA-256:
+The first attribute of a file, `checksum`, holds the length of the file and the SHA-256 of all its bytes but these 64
+digits:
 
-    warpchain SHA-256: HEX
+    warpchain SHA-256 of 0000000000104179 bytes: HEX
 
-It is compared before that library gets a byte, because damage may make it hang or crash. A user block before the
-content was tried instead: xarray then does not know the file by itself.
+The checksum is compared before the HDF5 library gets a byte, because damage may make that library hang or crash. HDF5
+keeps texts of attributes in a heap without checksums of its own, so that the digits can be filled in afterwards. Other
+programs that open a file for writing and change nothing leave it as it is. Two other places were tried: behind the
+content, where such a program cuts the checksum off; and a user block before it, with which xarray does not recognise
+the file.
 
 Fields of a dataclass that a file keeps are annotated with `Stored`; `write_fields` and `read_fields` go by that.
 """
@@ -22,15 +26,17 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Final, NamedTuple, get_args
 import numpy as np
 
 from warpchain.files import AnyPath, naming
-from warpchain.inputs.validation import DamagedFileError, InputError
+from warpchain.inputs.validation import ChangedFileError, DamagedFileError, InputError
 from warpchain.version import FORMAT_VERSION
 
 if TYPE_CHECKING:
     import h5py
 
 _SIGNATURE: Final = b"\x89HDF\r\n\x1a\n"
-_LINE: Final = "\nwarpchain SHA-256: {}\n"
-_LINE_LENGTH: Final = len(_LINE.format("0" * 64))
+_CHECKSUM: Final = "warpchain SHA-256 of {:016d} bytes: {}"
+_PREFIX: Final = b"warpchain SHA-256 of "
+_HEAD: Final = 2**16
+"""Number of bytes at the beginning of a file that hold its checksum and its kind."""
 _FIXED: Final[dict[str, Any]] = {"libver": ("v108", "v108"), "track_order": True}
 """Version bounds without which equal content would not give equal bytes; they also leave out times."""
 
@@ -138,14 +144,20 @@ def hdf5_image(form: Format, fill: "Callable[[h5py.File], None]") -> bytes:
     """
     import h5py
 
-    image = io.BytesIO()
+    image, unset = io.BytesIO(), _CHECKSUM.format(0, "0" * 64)
     with h5py.File(image, "w", **_FIXED) as file:
+        file.attrs["checksum"] = unset
         file.attrs["format"], file.attrs["format_version"] = form.kind, FORMAT_VERSION
         file.attrs["format_digest"] = form.digest
         fill(file)
-    image.seek(0, os.SEEK_END)
-    image.write(_LINE.format(hashlib.sha256(image.getvalue()).hexdigest()).encode())
-    return image.getvalue()
+    content = image.getbuffer()
+    place = bytes(content[:_HEAD]).index(unset.encode())
+    stop = place + len(unset)
+    content[place:stop] = _CHECKSUM.format(len(content), "0" * 64).encode()
+    digest = hashlib.sha256(content[: stop - 64])
+    digest.update(content[stop:])
+    content[stop - 64 : stop] = digest.hexdigest().encode()
+    return bytes(content)
 
 
 @contextmanager
@@ -157,35 +169,61 @@ def reading_hdf5(path: AnyPath, form: Format | None, remedy: str, wanted: str | 
 
     Raises:
         OSError: it cannot be read.
-        InputError: it is no regular file, of another kind or of another version.
-        DamagedFileError: it is damaged, cut short or of an earlier warpchain.
+        InputError: it is no regular file, of another kind or of another version, or warpchain did not write it.
+        DamagedFileError: it is damaged or cut short; a `ChangedFileError` if another program
+            has changed it.
     """
     import h5py
 
-    with open_regular(path) as content, naming(path, "read"):
-        head = content.read(len(_SIGNATURE))
-        left = content.seek(0, os.SEEK_END) - _LINE_LENGTH
-        content.seek(max(0, left))
-        end = content.read()
-        content.seek(0)
-        digest = hashlib.sha256()
-        while left > 0 and (piece := content.read(min(left, 2**20))):
+    # HDF5 reads the file through Python: opened by its name, the file could not be open elsewhere in this process with
+    # other flags of locking, as xarray has it.
+    with open_regular(path) as content:
+        _check(content, path, remedy, wanted)
+        with h5py.File(content, "r") as file:
+            _check_format(file, path, form, remedy, wanted)
+            yield file
+
+
+def _check_format(file: "h5py.File", path: AnyPath, form: Format | None, remedy: str, wanted: str | None) -> None:
+    """Check format and version of a file; errors as of `reading_hdf5`."""
+    if form is not None and (found := file.attrs["format"]) != form.kind:
+        raise InputError(f"{path}: a {found}, not a {form.kind}; {wanted or 'move it out of this folder'}")
+    if (version := int(file.attrs["format_version"])) != FORMAT_VERSION:
+        later = f", but this warpchain reads {FORMAT_VERSION}; update warpchain"
+        earlier = f" of an earlier warpchain, which reads it; {remedy}"
+        raise InputError(f"{path}: format version {version}{later if version > FORMAT_VERSION else earlier}")
+    if form is not None and file.attrs.get("format_digest") != form.digest:
+        raise InputError(f"{path}: has other fields than this warpchain reads, of the same version; {remedy}")
+
+
+def _check(content: BinaryIO, path: AnyPath, remedy: str, wanted: str | None) -> None:
+    """Compare a file with its checksum; errors as of `reading_hdf5`."""
+    with naming(path, "read"):
+        head, size = content.read(_HEAD), content.seek(0, os.SEEK_END)
+        place = head.find(_PREFIX)
+        stop = place + len(_CHECKSUM.format(0, "0" * 64))
+        content.seek(stop)
+        digest = hashlib.sha256(head[: stop - 64])
+        while piece := content.read(2**20):
             digest.update(piece)
-            left -= len(piece)
-    if end != _LINE.format(digest.hexdigest()).encode():
-        if wanted and head != _SIGNATURE and b"warpchain SHA-256: " not in end:
-            raise InputError(f"{path}: not an HDF5 file; {wanted}")
-        raise DamagedFileError(f"{path}: damaged, cut short or of an earlier warpchain; {remedy}")
-    with h5py.File(path, "r", locking=False) as file:
-        if form is not None and (found := file.attrs["format"]) != form.kind:
-            raise InputError(f"{path}: a {found}, not a {form.kind}; {wanted or 'move it out of this folder'}")
-        if (version := int(file.attrs["format_version"])) != FORMAT_VERSION:
-            later = f", but this warpchain reads {FORMAT_VERSION}; update warpchain"
-            earlier = f" of an earlier warpchain, which reads it; {remedy}"
-            raise InputError(f"{path}: format version {version}{later if version > FORMAT_VERSION else earlier}")
-        if form is not None and file.attrs.get("format_digest") != form.digest:
-            raise InputError(f"{path}: has other fields than this warpchain reads, of the same version; {remedy}")
-        yield file
+        content.seek(0)
+    if place >= 0 and head[place:stop] == _CHECKSUM.format(size, digest.hexdigest()).encode():
+        return
+    if place < 0 and (size or wanted):  # in the folder of a sweep an empty file is torn
+        what = "of an earlier warpchain, or damaged" if b"warpchain " in head else "not an HDF5 file of warpchain"
+        what = what if head.startswith(_SIGNATURE) else "not an HDF5 file"
+        raise InputError(f"{path}: {what}; {wanted or 'move it out of this folder, or give another folder'}")
+    end = int.from_bytes(head[28:36], "little")  # of the content, as the HDF5 library notes it in its head
+    if end == size and not head[place:].startswith(_CHECKSUM.format(size, "").encode()):
+        raise ChangedFileError(f"{path}: another program has changed it; {remedy}")
+    raise DamagedFileError(f"{path}: damaged or cut short; {remedy}")
+
+
+def claims_to_be(path: AnyPath, kind: str) -> bool:
+    """Whether a regular file is of a kind by its beginning, damaged or not, or is empty, as a torn one may be."""
+    with open_regular(path) as content, naming(path, "read"):
+        head = content.read(_HEAD)
+    return not head or (_PREFIX in head and kind.encode() in head)
 
 
 def kind_of_hdf5(path: AnyPath, wanted: str) -> str:
@@ -201,7 +239,8 @@ def open_regular(path: AnyPath) -> BinaryIO:
     """
     try:
         with naming(path, "read"):
-            file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK))
+            at_once = getattr(os, "O_NONBLOCK", 0)  # which Windows does not have
+            file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | at_once))
     except IsADirectoryError:
         raise InputError(f"{path}: is a folder, not a file; give another path") from None
     if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):

@@ -115,7 +115,7 @@ def test_cells(folder: Path, page: str) -> None:
     dx = load(folder).blocks["rest"].dx
     sample = dx[0, 1, 1:]
     mean, sd = sample.mean(), sample.std(ddof=1)
-    assert rows[2] == ["60", "20", f"{mean:.4f}", f"{sd:.4f}", f"{sd / 2**0.5:.4f}", "2", "1"]
+    assert rows[2] == ["60", "20", f"{mean:.4f}*", f"{sd:.4f}", f"{sd / 2**0.5:.4f}", "2", "1"]
     assert rows[5][-1] == "not run yet" and rows[7][-3:] == ["2", "0", "1"]
 
 

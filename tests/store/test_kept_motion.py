@@ -141,7 +141,7 @@ def test_damage_to_a_motion_is_seen(kept: Path, tmp_path: Path) -> None:
     content[content.index(wanted) + 11] ^= 4
     path.write_bytes(content)
     for read in (lambda: result.series(links=30, frequency=5, sample=3), lambda: load(tmp_path)):
-        with pytest.raises(InputError, match=f"{path}: damaged, .*; delete it and run the sweep again"):
+        with pytest.raises(InputError, match=f"{path}: damaged .*; move it out of this folder and run the sweep again"):
             read()
     with pytest.warns(InputWarning, match=f"{path}: .*; its walks are computed again"):
         sweep(KEPT, tmp_path)

@@ -16,7 +16,7 @@ from warpchain.chain.resolution import resolve
 from warpchain.inputs.distributions import TABLE, Gaussian, Uniform, draw, random_generator
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import InputError
-from warpchain.sweeps.designs import design_points, sobol_indices
+from warpchain.sweeps.designs import RANDOMISATIONS, design_points, sobol_indices
 from warpchain.sweeps.plan import load_sweep
 
 # Random numbers
@@ -192,8 +192,8 @@ def test_distributions(sampler: str, samples: int) -> None:
         result = stats.kstest(values[name], lambda x, w=whole, a=low, b=high: (w.cdf(x) - a) / (b - a))
         assert result.pvalue > 1e-3, name
         assert lower < values[name].min() and values[name].max() < upper, name
-        # Designed points fill every quantity far more evenly than random ones, whose distance is about 0.87/√N.
-        assert sampler == "random" or result.statistic < 2.5 / samples, name
+        # Each of 8 randomisations has a point in every N/8-th; the distance of random points is about 0.87/√N.
+        assert sampler == "random" or result.statistic < RANDOMISATIONS / samples, name
     correlation = np.corrcoef(np.array(list(values.values()))) - np.eye(len(values))
     assert np.abs(correlation).max() < 5 / math.sqrt(samples)
 

@@ -44,7 +44,7 @@ def test_foreign_files_are_refused(tmp_path: Path) -> None:
     with h5py.File(path, "w") as file:
         file["x"] = 1.0
     for content, problem in (
-        (path.read_bytes(), "damaged, cut short or of an earlier warpchain"),
+        (path.read_bytes(), "not an HDF5 file of warpchain"),
         (b"dx = 0.6\n", "not an HDF5 file"),
         (b"", "not an HDF5 file"),
         (hdf5_image(Format.of("another kind"), lambda file: None), "a another kind, not a warpchain walk"),

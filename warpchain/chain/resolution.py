@@ -14,6 +14,7 @@ from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.parameters import preset as parameter_preset
 from warpchain.inputs.scene import OF_LINKS, Scene
+from warpchain.inputs.unit_slips import check_units
 from warpchain.inputs.validation import InputError, Section, checked, validated
 
 Values = Mapping[str, object]
@@ -59,6 +60,9 @@ def continued(state: State, sections: Mapping[str, Values]) -> Setup:
     for name in OF_THE_WALK[:2]:
         if (end := getattr(scene, name)) is not None and end < state.time:
             raise InputError(f"{name}: {end:g} s is before the state at {state.time:g} s; give a later time")
+    if not options.unusual_values:
+        check_units({name: getattr(parameters, name) for name in sections["parameters"]}, "parameters")
+        check_units(sections["scene"], "scene")
     if scene.plane == "fixed" and not state.is_placed_as_in(setup):  # a moving sprocket may have left it in the floor
         setup.floor.check_above(state.position, state.parameters.link_length, "start")
     return replace(setup, start=replace(state, setup=replace(setup, start=None)))

@@ -79,9 +79,12 @@ def walk(
     from warpchain.results.one_walk import run_walk
     from warpchain.results.walk_result import WalkResult
     from warpchain.run.progress_bar import changing_line, walk_progress_text
+    from warpchain.sweeps.block import refuse_axes
 
     named = {"links": links, "frequency": frequency, "start": start}
     given = _given_values(named | {"method": method, "tolerance": tolerance, "device": device}, assignments or [])
+    for section in given.values():
+        refuse_axes(section)
     own: Mapping[str, Mapping[str, Any]] = {}
     number = None if seed is None else checked(parse_yaml(seed, "seed"), "seed", Seed)
     if like is not None:

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from warpchain.inputs.arrays import Array, checked_array
-from warpchain.inputs.validation import InputError, checked
+from warpchain.inputs.validation import InputError, checked, shown
 from warpchain.results.walk_result import WalkResult
 
 GRAVITY: Final = 9.809
@@ -168,6 +168,8 @@ class Film:
 
 def film_of(walk: WalkResult, camera: Camera | None = CAREFUL, seed: int = 0) -> Film:
     """A film of a simulated walk with series and frames, with the errors of a camera; None: without any."""
+    if not isinstance(walk, WalkResult):
+        raise InputError(f"walk: expected a WalkResult, got {shown(walk)}; give what warpchain.walk returns")
     if not len(walk.time) or not len(walk.frame_time):
         raise InputError("walk: it has no series or no frames; record both")
     scene, random = walk.setup.scene, np.random.default_rng(seed)

@@ -90,6 +90,9 @@ class Options(Section):
     soften_drive: bool = False
     """whether joints are softened on the sprocket: softest until it has spun up, then as soft as the loop's tension
     allows; within 0.03 s after the release they regain their own values"""
+    unusual_values: bool = False
+    """whether lengths, masses, moments of inertia and gravity far from Table 1's are meant; otherwise a value more than
+    10 times as large, or less than a tenth, is refused as a probable mistake of its unit"""
     device: Annotated[str, AfterValidator(_supported_device)] = "cpu"
     """device that runs the walks: cpu, cuda (the first GPU) or cuda:N"""
 

@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from warpchain.files import AnyPath, Kind, checked_output, write_whole
 from warpchain.inputs.arrays import AnyArray
 from warpchain.inputs.validation import short
-from warpchain.pictures.labels import cell_table, cell_text, cell_values, unit_text
+from warpchain.pictures.labels import cell_notes, cell_table, cell_text, cell_values, unit_text
 from warpchain.pictures.style import image, png
 from warpchain.reports.sweep_figures import figures
 from warpchain.results.block_result import BlockResult
@@ -102,6 +102,7 @@ def _cells(result: SweepResult) -> str:
         "<p>Mean, standard deviation (divisor count − 1) and standard error of the mean of the distance walked Δx, "
         "over the walks at rest.</p>"
     ]
+    parts += [f"<p>{escape(note)}.</p>" for note in cell_notes(result.cell_statistics().values())]
     for block in result.blocks.values():
         found = block.statistics("dx")
         head, rows = cell_table(found)

@@ -21,7 +21,7 @@ from warpchain.chain.setup import Setup, State
 from warpchain.files import write_whole
 from warpchain.hdf5_files import Format, hdf5_image, put, read_fields, reading_hdf5, write_fields
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.validation import InputError, json_value, validated
+from warpchain.inputs.validation import InputError, checked_path, json_value, validated
 from warpchain.loop.stationary_loop import FIELDS
 from warpchain.pictures.labels import Kind
 from warpchain.status import Status
@@ -183,6 +183,7 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
         InputError: the file is no walk, or belongs to another version of warpchain. It is a `ValueError`.
         DamagedFileError: the file is damaged, cut short or of an earlier warpchain. It is an `InputError`.
     """
+    path = checked_path(path, "path")
     if os.path.isdir(path):
         record = os.path.join(path, "walk.h5")
         if not os.path.exists(record) and os.path.exists(os.path.join(path, "sweep.h5")):

@@ -23,7 +23,7 @@ from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset as parameter_preset
 from warpchain.inputs.scene import COMPOUND, Scene
 from warpchain.inputs.validation import FIELDS, SECTION_OF, InputError, checked, json_value, path_of, shown, validated
-from warpchain.sweeps.designs import walks_per_sample
+from warpchain.sweeps.designs import independent_groups, walks_per_sample
 from warpchain.walks.landmarks import least
 
 Value = float | int | str | tuple[Any, ...] | None
@@ -57,6 +57,7 @@ class Block:
         distributions: name → distribution, in the order of drawing.
         independent: names of those that each cell draws by itself, also along axes with the same samples.
         sampler: one of `warpchain.sweeps.designs.SAMPLERS`.
+        randomisations: number of independent randomisations of designed samples; random ones need none.
         samples_given: samples per cell, as the file says.
         first_cell: number of the block's first cell among all cells of the sweep.
         stride: number of all cells of the sweep.
@@ -73,6 +74,7 @@ class Block:
     distributions: Mapping[str, Distribution]
     independent: tuple[str, ...]
     sampler: str
+    randomisations: int
     samples_given: int
     first_cell: int = 0
     stride: int = 0
@@ -87,6 +89,11 @@ class Block:
     def samples(self) -> int:
         """Walks in each cell; for `saltelli` all walks of all samples."""
         return self.samples_given * walks_per_sample(self.sampler, len(self.distributions))
+
+    @property
+    def groups(self) -> NDArray[np.int64]:
+        """Number of the group of each walk of a cell, see `independent_groups`."""
+        return independent_groups(self.sampler, self.samples, len(self.distributions), self.randomisations)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -161,8 +168,12 @@ class Block:
 
         They lie along the axes, one for all samples, shape (…, 1).
         """
-        cells, section = list(self.cells_along((name, "preset"))), SECTION_OF[name]
-        values = [least(getattr(getattr(setup, section), name)) for setup in self.fixed_in(cells)]
+        return self.over_cells((name, "preset"), lambda setup: least(getattr(getattr(setup, SECTION_OF[name]), name)))
+
+    def over_cells(self, names: Container[str], value_of: Callable[[Setup], float]) -> NDArray[Any]:
+        """A number of the `fixed` setup of each cell, which depends on some quantities only, shape (…, 1)."""
+        cells = list(self.cells_along(names))
+        values = [value_of(setup) for setup in self.fixed_in(cells)]
         sizes = [1 + max(places) for places in zip(*cells, strict=True)]
         return np.broadcast_to(np.reshape(values, (*sizes, 1)), (*self.shape[:-1], 1))
 
@@ -185,6 +196,7 @@ class Block:
             **({} if self.preset is None else {"preset": self.preset}),
             "samples": self.samples_given,
             "sampler": self.sampler,
+            **({} if self.sampler == "random" else {"randomisations": self.randomisations}),
             **{section: getattr(first, section).model_dump(exclude=replaced) for section in SECTIONS},
             "distributions": {"all": "fixed"} | {name: each.canonical() for name, each in self.distributions.items()},
             **({"independent": list(self.independent)} if self.independent else {}),
@@ -257,6 +269,14 @@ def named_axis(kind: Any) -> Any:
     """Annotation of the values of an axis whose values may be lists: name → value."""
     named = Annotated[dict[Name, kind], Field(min_length=1, max_length=AXIS_LIMIT)]
     return Annotated[named, BeforeValidator(_with_names, json_schema_input_type=named)]
+
+
+def refuse_axes(values: Mapping[str, object]) -> None:
+    """Refuse values of a walk, by names of fields, that are axes of a sweep, in one line that names `sweep`."""
+    for name, value in validation.by_name(values).items():
+        if name in FIELDS and is_axis(name, given := validation.plain(value, name)):
+            problem = f"{shown(given)} is several values, and a walk has one"
+            raise InputError(f"{SECTION_OF[name]}.{name}: {problem}; use warpchain.sweep or a sweep file for a grid")
 
 
 def is_axis(name: str, given: object) -> bool:

@@ -27,6 +27,7 @@ from warpchain.inputs.distributions import DRAW_LIMIT, Distribution, draw, rando
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS
 from warpchain.inputs.scene import Scene
+from warpchain.inputs.unit_slips import check_units
 from warpchain.inputs.validation import InputError
 from warpchain.sweeps.block import Block
 from warpchain.sweeps.designs import design_points, walks_per_sample
@@ -141,6 +142,8 @@ class Sweep:
                     if distribution != checked.get(name) and distribution.share() < LEAST_SHARE:
                         path, law = f"{block.path}.distributions.{name}", distribution.canonical()
                         raise InputError(f"{path}: less than {LEAST_SHARE:.0%} of {law} is physical; give uniform")
+                    if distribution != checked.get(name) and not fixed.options.unusual_values:
+                        check_units({name: distribution.quantile(0.5)}, f"{block.path}.distributions")
                 checked = distributions
                 self._first_possible(block, cell, fixed, distributions, 0, designed=False)
 
@@ -169,10 +172,11 @@ class Sweep:
         stream = block.first_stream + number
         rng, problem = random_generator(self.seed, stream, row), ""
         own = {name: laws[name] for name in block.independent}
-        of_cell = random_generator(self.seed, stream, row, 1, *cell)
+        of_cell = random_generator(self.seed, stream, row, 1, *cell) if own else rng
         makers: list[Callable[[], Point]] = [lambda: draw(laws, rng)] * DRAW_LIMIT
         if designed:
-            matrix = design_points(block.sampler, self.seed, stream, block.samples_given, len(laws))
+            given = block.samples_given, len(laws), block.randomisations
+            matrix = design_points(block.sampler, self.seed, stream, *given)
             fractions = iter(matrix[row].tolist())
             makers = [lambda: {name: each.quantile(next(fractions)) for name, each in laws.items()}, *makers]
         for point in makers:
