@@ -25,7 +25,7 @@ from warpchain.sweeps.designs import SAMPLERS
 from warpchain.sweeps.recording import FRAME_INTERVAL, SERIES_INTERVAL, Frames
 from warpchain.sweeps.sweep_file import BlockKeys, BlockOfFile, SweepFile
 from warpchain.walks.rows import COLUMNS
-from warpchain.walks.walk_result import STORED
+from warpchain.walks.walk_numbers import STORED
 
 FOLDER = Path(__file__).parent / "reference"
 NOTE = "<!-- Written by docs/generate_reference.py; change the code, then run that script. -->\n"

@@ -21,7 +21,7 @@ import stat
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any, BinaryIO, Final, get_args
+from typing import TYPE_CHECKING, Any, BinaryIO, Final, NamedTuple, get_args
 
 import numpy as np
 
@@ -64,10 +64,31 @@ class Stored:
         shape = f"{self.meaning}, shape ({', '.join(sizes)}{',' * (len(sizes) == 1)})"
         return f"{shape}; none {self.empty}" if self.empty else shape
 
+    @property
+    def digested(self) -> list[object]:
+        """What a file depends on; the wording of meanings it does not."""
+        return [self.unit, self.shape, list(self.keys)]
+
     def path(self, name: str) -> str:
         """Where a file keeps the field of this name."""
         group = {"": "summary", "t": "series", "f": "frames"}[self.shape[:1]]
         return f"{group}/{name.removeprefix('frame_')}"
+
+
+class Format(NamedTuple):
+    """The format of one kind of file: its name, and a digest of the table of its fields.
+
+    A field that is added, renamed or measured otherwise makes another format, also if nobody raised `FORMAT_VERSION`.
+    """
+
+    kind: str
+    digest: str
+
+    @classmethod
+    def of(cls, kind: str, *tables: Mapping[str, Any]) -> "Format":
+        """The format of files with the fields of some tables: name → `Stored`, or what else the content depends on."""
+        named = [[(name, getattr(field, "digested", field)) for name, field in table.items()] for table in tables]
+        return cls(kind, hashlib.sha256(repr(named).encode()).hexdigest()[:16])
 
 
 def stored_fields(kind: type) -> dict[str, Stored]:
@@ -116,8 +137,8 @@ def read_fields(group: "h5py.Group", kept: Mapping[str, Stored], links: int) -> 
     return values
 
 
-def hdf5_image(kind: str, fill: "Callable[[h5py.File], None]") -> bytes:
-    """The bytes of an HDF5 file of some kind that `fill` fills; equal content gives equal bytes.
+def hdf5_image(form: Format, fill: "Callable[[h5py.File], None]") -> bytes:
+    """The bytes of an HDF5 file of some format that `fill` fills; equal content gives equal bytes.
 
     It is made in memory: on a full disk HDF5 neither says what is wrong nor closes the file.
     """
@@ -126,7 +147,8 @@ def hdf5_image(kind: str, fill: "Callable[[h5py.File], None]") -> bytes:
     image, unset = io.BytesIO(), _CHECKSUM.format(0, "0" * 64)
     with h5py.File(image, "w", **_FIXED) as file:
         file.attrs["checksum"] = unset
-        file.attrs["format"], file.attrs["format_version"] = kind, FORMAT_VERSION
+        file.attrs["format"], file.attrs["format_version"] = form.kind, FORMAT_VERSION
+        file.attrs["format_digest"] = form.digest
         fill(file)
     content = image.getbuffer()
     place = bytes(content[:_HEAD]).index(unset.encode())
@@ -139,8 +161,8 @@ def hdf5_image(kind: str, fill: "Callable[[h5py.File], None]") -> bytes:
 
 
 @contextmanager
-def reading_hdf5(path: AnyPath, kind: str | None, remedy: str, wanted: str | None = None) -> "Iterator[h5py.File]":
-    """An HDF5 file that `hdf5_image` made, undamaged and of a kind, or of any if that is None.
+def reading_hdf5(path: AnyPath, form: Format | None, remedy: str, wanted: str | None = None) -> "Iterator[h5py.File]":
+    """An HDF5 file that `hdf5_image` made, undamaged and of a format, or of any if that is None.
 
     The remedy says what to do about a damaged or an older file; `wanted`, which file to give instead of one of another
     kind, is None of files that a sweep has in its folder.
@@ -158,18 +180,20 @@ def reading_hdf5(path: AnyPath, kind: str | None, remedy: str, wanted: str | Non
     with open_regular(path) as content:
         _check(content, path, remedy, wanted)
         with h5py.File(content, "r") as file:
-            _check_kind(file, path, kind, remedy, wanted)
+            _check_format(file, path, form, remedy, wanted)
             yield file
 
 
-def _check_kind(file: "h5py.File", path: AnyPath, kind: str | None, remedy: str, wanted: str | None) -> None:
-    """Check kind and version of a file; errors as of `reading_hdf5`."""
-    if kind is not None and (found := file.attrs["format"]) != kind:
-        raise InputError(f"{path}: a {found}, not a {kind}; {wanted or 'move it out of this folder'}")
+def _check_format(file: "h5py.File", path: AnyPath, form: Format | None, remedy: str, wanted: str | None) -> None:
+    """Check format and version of a file; errors as of `reading_hdf5`."""
+    if form is not None and (found := file.attrs["format"]) != form.kind:
+        raise InputError(f"{path}: a {found}, not a {form.kind}; {wanted or 'move it out of this folder'}")
     if (version := int(file.attrs["format_version"])) != FORMAT_VERSION:
         later = f", but this warpchain reads {FORMAT_VERSION}; update warpchain"
         earlier = f" of an earlier warpchain, which reads it; {remedy}"
         raise InputError(f"{path}: format version {version}{later if version > FORMAT_VERSION else earlier}")
+    if form is not None and file.attrs.get("format_digest") != form.digest:
+        raise InputError(f"{path}: has other fields than this warpchain reads, of the same version; {remedy}")
 
 
 def _check(content: BinaryIO, path: AnyPath, remedy: str, wanted: str | None) -> None:

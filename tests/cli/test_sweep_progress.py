@@ -10,9 +10,9 @@ import yaml
 from tests.run.test_sweep_run import TINY
 from tests.support import synthetic_sweep
 from tests.support.command_line import Command
+from warpchain.results import one_walk
 from warpchain.run import progress_bar
 from warpchain.run.single_walk import walk
-from warpchain.walks import one_walk
 
 
 def test_without_a_terminal_lines_of_progress_are_printed(

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from warpchain.inputs.setup import resolve
+from warpchain.chain.resolution import resolve
 from warpchain.run.sweep_run import kinds_of_kernels
 from warpchain.sweeps.plan import load_sweep
 from warpchain.sweeps.sweep_file import shipped_sweeps

@@ -10,8 +10,8 @@ from tests.oracle_model import contact_equations, motion_equations
 from tests.oracle_model.circular_loop import circular_loop
 from tests.support.arrays import Array
 from tests.support.presets import PAPER, SOFT
+from warpchain.chain.start_shapes import ellipse, lay_chain, links_between
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.start_shapes import ellipse, lay_chain, links_between
 from warpchain.kernels.methods.method import method_names
 from warpchain.run.simulation import Trajectory
 

@@ -12,8 +12,8 @@ import warpchain
 from warpchain.inputs.scene import Scene
 from warpchain.inputs.validation import InputError, InputWarning, validated
 from warpchain.inputs.yaml_files import parse_yaml
+from warpchain.results.walk_result import WalkResult
 from warpchain.sweeps.plan import load_sweep
-from warpchain.walks.walk_result import WalkResult
 
 N = 12
 LENGTH = warpchain.preset("paper").link_length

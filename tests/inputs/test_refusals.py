@@ -14,7 +14,7 @@ import pytest
 
 import warpchain
 from tests.support.setups import setup_walk
-from warpchain.inputs.setup import SECTIONS, resolve
+from warpchain.chain.resolution import SECTIONS, resolve
 from warpchain.inputs.validation import LONGEST_LINE, SECTION_OF, InputError, field_limits
 from warpchain.inputs.yaml_files import LARGEST_FILE, read_yaml
 from warpchain.kernels.methods.method import find_method, method_names

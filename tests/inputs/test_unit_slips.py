@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from tests.support.sweep_content import content
-from warpchain.inputs.setup import resolve
+from warpchain.chain.resolution import resolve
 from warpchain.inputs.unit_slips import USUAL
 from warpchain.inputs.validation import SECTION_OF, InputError
 from warpchain.sweeps.plan import load_sweep

@@ -17,8 +17,8 @@ from warpchain.pictures.grid_figure import MOST_PANELS
 from warpchain.pictures.style import NothingToShow
 from warpchain.reports.sweep_figures import figures
 from warpchain.reports.sweep_page import write_report
+from warpchain.results.sweep_result import load, merge
 from warpchain.status import Status
-from warpchain.store.sweep_result import load, merge
 from warpchain.sweeps.plan import PlannedWalk
 
 FRICTION = [0.4, 0.1, 0.2, 0.6]

@@ -13,8 +13,8 @@ from scipy import stats
 from tests.support.made_sweeps import FIGURE_6, SMALL, distance, make_sweep
 from warpchain.pictures.style import GREEN, RED, NothingToShow, Picture
 from warpchain.reports.sweep_figures import figure6, figures, sensitivities, sensitivity
+from warpchain.results.sweep_result import SweepResult
 from warpchain.status import Status
-from warpchain.store.sweep_result import SweepResult
 from warpchain.sweeps.plan import PlannedWalk
 
 

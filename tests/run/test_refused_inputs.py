@@ -12,7 +12,7 @@ from tests.support.presets import SOFT
 from tests.support.setups import setup_walk
 from warpchain import Chains, InputError, simulate, walk
 from warpchain.engine.batch import Batch
-from warpchain.walks import one_walk
+from warpchain.results import one_walk
 
 SETUP = setup_walk("soft", {})
 POSITION, VELOCITY = circular_loop(8, SOFT, 1.0)

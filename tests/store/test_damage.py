@@ -13,10 +13,10 @@ from tests.support.command_line import Command
 from tests.support.made_walks import make_walk
 from tests.support.synthetic_sweep import SWEEP, run
 from warpchain.inputs.validation import InputError
+from warpchain.results.sweep_result import load, merge
+from warpchain.results.walk_result import load_walk
 from warpchain.store.folder import SweepFolder
-from warpchain.store.sweep_result import load, merge
 from warpchain.version import FORMAT_VERSION
-from warpchain.walks.walk_result import load_walk
 
 FLIPS, SECTOR = 200, 512
 

@@ -19,11 +19,11 @@ from tests.support import synthetic_sweep
 from tests.support.stopped_calls import is_stopped
 from tests.support.synthetic_sweep import LONG_SWEEP, SHARD_SIZE, SWEEP, content, run, synthetic_rows, write
 from warpchain.inputs.validation import InputError, InputWarning
+from warpchain.results.sweep_result import load
 from warpchain.run.sweep_run import run_shards
 from warpchain.store import shards
 from warpchain.store.folder import SweepFolder
 from warpchain.store.shards import Manifest, read_manifest, stamp, write_shard
-from warpchain.store.sweep_result import load
 from warpchain.sweeps.plan import Sweep, load_sweep
 from warpchain.version import NUMERICS_VERSION
 

@@ -11,8 +11,8 @@ import pytest
 
 from tests.support.synthetic_sweep import SHARD_SIZE, SWEEP, run
 from warpchain.inputs.validation import InputError, InputWarning
+from warpchain.results.sweep_result import load
 from warpchain.store.folder import SweepFolder
-from warpchain.store.sweep_result import load
 
 WITHOUT = """
 import sys

@@ -12,8 +12,8 @@ import pytest
 
 from tests.support.command_line import Command
 from tests.support.synthetic_sweep import SWEEP, run
-from warpchain.store import sweep_result
-from warpchain.store.sweep_result import load, merge
+from warpchain.results import sweep_result
+from warpchain.results.sweep_result import load, merge
 
 
 def test_a_sweep_that_memory_cannot_hold_makes_no_folder(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:

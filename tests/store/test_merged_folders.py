@@ -15,8 +15,8 @@ from tests.support.made_walks import assert_same
 from tests.support.sweep_content import blocks, content
 from tests.support.synthetic_sweep import run, synthetic_sweep
 from warpchain.inputs.validation import InputError, InputWarning
+from warpchain.results.sweep_result import load, merge
 from warpchain.run.sweep_run import sweep
-from warpchain.store.sweep_result import load, merge
 
 
 @pytest.mark.parametrize(

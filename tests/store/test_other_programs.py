@@ -12,10 +12,10 @@ from tests.support.command_line import Command
 from tests.support.made_walks import make_walk
 from tests.support.synthetic_sweep import SHARD_SIZE, SWEEP, content, run, synthetic_sweep
 from warpchain.inputs.validation import ChangedFileError, DamagedFileError, InputError, InputWarning
+from warpchain.results.sweep_result import load, merge
+from warpchain.results.walk_result import load_walk
 from warpchain.store.folder import SweepFolder
 from warpchain.store.shards import read_manifest
-from warpchain.store.sweep_result import load, merge
-from warpchain.walks.walk_result import load_walk
 
 ONE_BLOCK = synthetic_sweep({"name": "main", "grid": {"links": [60, 90]}, "samples": 30})
 

@@ -14,9 +14,9 @@ import warp as wp
 from tests.support.arrays import Array
 from tests.support.blocks_under_test import floor_with
 from tests.support.unlike_links import UnlikeLinks
+from warpchain.chain.floor import Floor
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import start_device
-from warpchain.inputs.floor import Floor
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
@@ -51,9 +51,9 @@ def model_of(chains: Sequence[tuple[int, Parameters | UnlikeLinks]]) -> Model:
     batch = Batch(len(chains), max(links for links, _ in chains), Options())
     for world, (links, chain) in enumerate(chains):
         if isinstance(chain, UnlikeLinks):
-            batch.set_chain(world, chain.parameters, links, own=chain.own)
+            batch.worlds[world].set_chain(chain.parameters, links, own=chain.own)
         else:
-            batch.set_chain(world, chain, links)
+            batch.worlds[world].set_chain(chain, links)
     return batch.model
 
 

@@ -9,9 +9,9 @@ import pytest
 from tests.support.sweep_content import content
 from warpchain.inputs.validation import InputError
 from warpchain.status import Status
-from warpchain.store.cell_statistics import CellStatistics
 from warpchain.sweeps.designs import RANDOMISATIONS, SAMPLERS, independent_groups
 from warpchain.sweeps.plan import Sweep, load_sweep
+from warpchain.walks.cell_statistics import CellStatistics
 
 SEEDS = 24
 DRAWN = {"floor_friction": (0.2, 0.4), "phase": (0.0, 1.0), "clearance": (0.005, 0.015), "gravity": (9.0, 10.0)}

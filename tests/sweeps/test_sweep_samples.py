@@ -12,10 +12,9 @@ from scipy import stats
 
 from tests.support.setups import setup_walk
 from tests.support.sweep_content import TABLE_1, UNIFORM, blocks, content, drawn
-from warpchain.inputs.distributions import TABLE, Gaussian, Uniform, draw, placed, random_generator
+from warpchain.chain.resolution import resolve
+from warpchain.inputs.distributions import TABLE, Gaussian, Uniform, draw, random_generator
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.scene import check_scene, fewest_links
-from warpchain.inputs.setup import resolve
 from warpchain.inputs.validation import InputError
 from warpchain.sweeps.designs import RANDOMISATIONS, design_points, sobol_indices
 from warpchain.sweeps.plan import load_sweep
@@ -57,7 +56,7 @@ def test_first_sample_is_that_of_a_single_walk() -> None:
         sweep = load_sweep(content(seed=seed, **parts, grid={"tolerance": [1e-3, 1e-7]}))
         assert sweep.planned(0).setup == setup_walk("soft", settings | {"tolerance": 1e-3}, seed)
         base = resolve("soft", **parts, options={"tolerance": 1e-7})
-        laws = placed({name: law for name, law in TABLE.items() if name != "floor_friction"}, base)
+        laws = base.placed({name: law for name, law in TABLE.items() if name != "floor_friction"})
         sample = base.with_drawn(draw(laws, random_generator(seed, 1, 2)))
         assert sweep.planned(sweep.indices[5]).setup == sample
 
@@ -213,7 +212,7 @@ def test_every_planned_walk_is_possible(sampler: str) -> None:
     """A sample whose chain does not reach round its sprocket is drawn again as a whole, the d + 2 walks together."""
     radius = 0.0602  # 32 links reach round 64.68 mm, where the joints ride if the radius is 60.48 mm
     base = resolve("soft", scene={"links": 32}, options={}, parameters={"sprocket_radius": radius})
-    assert fewest_links(base.scene, base.parameters) == 32
+    assert base.fewest_links == 32
     with pytest.raises(InputError):
         resolve("soft", scene={"links": 32}, options={}, parameters={"sprocket_radius": radius + 0.0005})
     names = ["sprocket_radius", "phase"]
@@ -229,7 +228,7 @@ def test_every_planned_walk_is_possible(sampler: str) -> None:
     )
     walks = [sweep.planned(index) for index in sweep.indices.tolist()]
     for walk in walks:
-        check_scene(walk.setup.scene, walk.setup.parameters)
+        walk.setup.checked()
     per_sample = 4 if sampler == "saltelli" else 1
     values = drawn(sweep, sweep.walk_count).reshape(2, 64, per_sample, 2)
     redrawn = (values[0] != values[1]).any(axis=(1, 2))

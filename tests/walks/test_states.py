@@ -13,7 +13,7 @@ from scipy.optimize import minimize
 import warpchain
 from tests.oracle_model.motion_equations import gravitational_energy, kinetic_energy
 from warpchain import InputError, State, WalkResult
-from warpchain.walks.walk_result import MOTION, NUMBERS
+from warpchain.walks.walk_numbers import MOTION, NUMBERS
 
 SPUN = {"links": 36, "frequency": 15.0, "start": "spinning"}
 ELLIPSE = {"links": 36, "frequency": 20.0, "start": "ellipse", "preset": "soft", "method": "dp5"}

@@ -14,12 +14,12 @@ from warpchain.engine.tallies import LOST
 from warpchain.files import checked_output, make_folder, naming, remove_output
 from warpchain.inputs.validation import InputError, json_value, one_line, printable
 from warpchain.pictures.labels import COUNTS, SPREADS, Kind, cell_notes, cell_table
+from warpchain.results.walk_result import WalkResult, load_walk
 from warpchain.status import Status
 from warpchain.walks.landmarks import FAULTS
-from warpchain.walks.walk_result import WalkResult, load_walk
 
 if TYPE_CHECKING:
-    from warpchain.store.sweep_result import SweepResult
+    from warpchain.results.sweep_result import SweepResult
 
 RECORD: Final = "walk.h5"
 _PICTURES: Final = (*(f"{kind}.png" for kind in get_args(Kind)), "walk.gif")
@@ -134,11 +134,11 @@ def _walk_rows(result: WalkResult) -> Iterator[tuple[str, str]]:
 def saved(path: Path, wanted: str) -> "WalkResult | SweepResult":
     """The walk or the sweep of a file or a folder; else an `InputError` says what is `wanted` in its place."""
     from warpchain.hdf5_files import kind_of_hdf5
-    from warpchain.store.sweep_result import KIND, load
+    from warpchain.results.sweep_result import MERGED, load
 
     record = path / RECORD if os.path.isfile(path / RECORD) else path
     is_sweep = record.is_dir() or (record.suffix != ".h5" and not record.exists())
-    return load(record) if is_sweep or kind_of_hdf5(record, wanted) == KIND else load_walk(record)
+    return load(record) if is_sweep or kind_of_hdf5(record, wanted) == MERGED.kind else load_walk(record)
 
 
 def try_walk_folder(folder: Path) -> None:

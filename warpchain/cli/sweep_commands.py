@@ -11,7 +11,7 @@ from warpchain.cli.walk_commands import FAILED
 from warpchain.cli.words import JSON, argument, option, output, output_path
 
 if TYPE_CHECKING:
-    from warpchain.store.sweep_result import SweepResult
+    from warpchain.results.sweep_result import SweepResult
 
 _FILE: Final = "The sweep, or the bare name of one that comes with warpchain, such as figure6."
 _FILES: Final = "Sweeps, or bare names of those that come with warpchain. Default: all that come with it."
@@ -128,7 +128,7 @@ def info(
     Of a merged file the checksum is compared first.
     """
     from warpchain.cli.output import print_sweep
-    from warpchain.store.sweep_result import load
+    from warpchain.results.sweep_result import load
 
     print_sweep(load(directories), directories[0] if len(directories) == 1 else None, as_json)
 
@@ -158,11 +158,11 @@ def plot(
     from warpchain.inputs.validation import InputError, printable
     from warpchain.pictures.labels import kinds_of
     from warpchain.reports.sweep_figures import figures
-    from warpchain.walks.walk_result import WalkResult
+    from warpchain.results.walk_result import WalkResult
 
     path, *others = paths
     if others:
-        from warpchain.store.sweep_result import load
+        from warpchain.results.sweep_result import load
 
         found: WalkResult | SweepResult = load(paths)
     else:
@@ -219,7 +219,7 @@ def merge(
 ) -> None:
     """Put the results of a folder, or of all parts of a sweep, into one file, which xarray opens."""
     from warpchain.inputs.validation import printable
-    from warpchain.store.sweep_result import merge as merge_shards
+    from warpchain.results.sweep_result import merge as merge_shards
 
     merge_shards(directories, path)
     print(printable(str(path)))

@@ -23,10 +23,9 @@ from pydantic import InstanceOf
 from warpchain.films.film import CAREFUL, CLOCK, Camera, Film, edges, summary
 from warpchain.inputs.arrays import Array, checked_array
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.scene import loop_speed
 from warpchain.inputs.validation import InputError, checked
-from warpchain.store.block_result import BlockResult
-from warpchain.store.sweep_result import SweepResult
+from warpchain.results.block_result import BlockResult
+from warpchain.results.sweep_result import SweepResult
 from warpchain.walks.rows import MISSING
 
 FOUND: Final = (
@@ -112,7 +111,7 @@ class Bank:
                     links=int(result.axes["links"][links]),
                     frequency=float(result.axes["frequency"][frequency]),
                     outline=edges(group["frames/joints"][0].astype(float)),
-                    speed=loop_speed(setup.scene, setup.parameters),
+                    speed=setup.loop_speed,
                 )
         places = np.moveaxis(np.arange(drawn[..., 0].size).reshape(shape[0] * shape[1], -1, shape[-1]), 2, 0)
         chains = np.flatnonzero(np.isin(places, list(walks)).all(axis=(1, 2)))

@@ -7,9 +7,8 @@ import numpy as np
 from pydantic import Field
 
 from warpchain.inputs.arrays import Array, checked_array
-from warpchain.inputs.scene import loop_speed
 from warpchain.inputs.validation import InputError, checked, shown
-from warpchain.walks.walk_result import WalkResult
+from warpchain.results.walk_result import WalkResult
 
 GRAVITY: Final = 9.809
 """As of Table 1 [m/s²]."""
@@ -180,7 +179,7 @@ def film_of(walk: WalkResult, camera: Camera | None = CAREFUL, seed: int = 0) ->
         links=scene.links,
         frequency=scene.frequency,
         outline=edges(walk.frame_joints[0]),
-        speed=loop_speed(scene, walk.setup.parameters),
+        speed=walk.setup.loop_speed,
     )
     return exact if camera is None else exact.seen(camera, camera.errors(random), random)
 

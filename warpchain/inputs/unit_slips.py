@@ -1,6 +1,6 @@
 """Values that are probably in another unit than meant: lengths in mm, masses in g.
 
-Every walk and every cell of a sweep is asked about them, see `warpchain.inputs.setup.combined`. Coefficients of joints,
+Every walk and every cell of a sweep is asked about them, see `Setup.checked`. Coefficients of joints,
 such as k, b and ω_c, are left out: they are chosen over decades.
 """
 

@@ -1,4 +1,4 @@
-"""Figures and moving pictures of one walk; they know the shape of a walk, not its class."""
+"""Figures and moving pictures of one walk, and of a quantity over a grid: they draw what `walks` knows."""
 
 import os
 import sys

@@ -25,8 +25,9 @@ from warpchain.inputs.arrays import Array
 from warpchain.inputs.validation import InputError, checked, short
 from warpchain.pictures import chain
 from warpchain.pictures.chain import center_in_room, checked_joints
-from warpchain.pictures.labels import Walk, headline
+from warpchain.pictures.labels import headline
 from warpchain.pictures.style import BLUE, GROUND, INK, InlineFigure, tidy
+from warpchain.walks.walk_numbers import WalkNumbers as Walk
 
 WIDTH, TALLEST = 960, 560
 """Greatest width and height of a picture [pixels]."""

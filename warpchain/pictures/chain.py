@@ -14,11 +14,10 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_hex
 from matplotlib.patches import Circle, Patch, Polygon
 
+from warpchain.chain.sprocket_motion import sprocket_places
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.scene import link_values
-from warpchain.inputs.sprocket_motion import sprocket_places
-from warpchain.pictures.labels import Walk
 from warpchain.pictures.style import DASHES, FAINT, GROUND, INK
+from warpchain.walks.walk_numbers import WalkNumbers as Walk
 
 SIDE: Final = np.eye(3)
 ABOVE: Final = np.eye(3)[[0, 2, 1]]
@@ -48,7 +47,7 @@ def center_in_room(walk: Walk) -> Array:
 
 def circle_radii(walk: Walk) -> Array:
     """Radius of the circles of each link [m], shape (n,)."""
-    return link_values(walk.setup.scene, walk.setup.parameters).radius
+    return walk.setup.link_values.radius
 
 
 def link_outlines(joints: Array, radius: Array | float) -> Array:

@@ -7,7 +7,7 @@ the lines, or the rows of a map if both have many values; all other axes give pa
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from matplotlib import colormaps
@@ -22,9 +22,7 @@ from warpchain.inputs.validation import InputError, shown
 from warpchain.pictures import labels, style
 from warpchain.pictures.labels import math_symbol, short_texts, unit_text, with_unit
 from warpchain.pictures.style import BLUE, FAINT, GROUND, LINE_COLORS, RED, AnyFigure, NothingToShow, panel_grid, tidy
-
-if TYPE_CHECKING:
-    from warpchain.store.cell_statistics import CellStatistics
+from warpchain.walks.cell_statistics import CellStatistics
 
 MOST_LINES: Final = len(LINE_COLORS)
 """Greatest number of lines in a panel, unless lines are asked for."""

@@ -2,21 +2,15 @@
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+from typing import Any, Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import DIMENSIONLESS, FIELDS, SECTION_OF, field_unit, short
-
-if TYPE_CHECKING:
-    from warpchain.store.cell_statistics import CellStatistics
-    from warpchain.walks.walk_result import WalkResult
-
-    Walk = WalkResult
-else:
-    Walk = object
+from warpchain.walks.cell_statistics import CellStatistics
+from warpchain.walks.walk_numbers import WalkNumbers as Walk
 
 Kind = Literal["film_strip", "height_and_speed", "loop", "energy", "tilt"]
 """Figures of a walk; `tilt` only of one whose plane tilts."""

@@ -22,7 +22,7 @@ from warpchain.inputs.validation import InputError, shown
 from warpchain.loop.stationary_loop import StationaryLoop
 from warpchain.pictures import chain
 from warpchain.pictures.chain import center_in_room, checked_joints
-from warpchain.pictures.labels import Kind, Walk, setting
+from warpchain.pictures.labels import Kind, setting
 from warpchain.pictures.style import (
     BLUE,
     DASHES,
@@ -37,6 +37,7 @@ from warpchain.pictures.style import (
     tidy,
 )
 from warpchain.status import Status
+from warpchain.walks.walk_numbers import WalkNumbers as Walk
 
 FALLEN: Final = 45.0
 """Tilt beyond which a chain has fallen over [degrees]."""

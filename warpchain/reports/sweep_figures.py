@@ -15,6 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from warpchain.inputs.arrays import AnyArray, Array
+from warpchain.inputs.starts import STARTS
 from warpchain.pictures import labels
 from warpchain.pictures.grid_figure import draw_grid
 from warpchain.pictures.labels import cell_values, quantity_name, quantity_text
@@ -33,18 +34,14 @@ from warpchain.pictures.style import (
     survivor_handles,
     tidy,
 )
+from warpchain.results.block_result import BlockResult
+from warpchain.results.sweep_result import SweepResult
 from warpchain.status import Status
-from warpchain.store.block_result import BlockResult
-from warpchain.store.sweep_result import SweepResult
 from warpchain.sweeps.designs import sobol_indices, walks_per_sample
 from warpchain.walks.rows import quantity_of
 
-_STARTS: Final = {
-    "rest": ("started at rest", RED, "o"),
-    "ellipse": ("started as an ellipse", GREEN, "D"),
-    "spinning": ("started spinning", BLUE, "s"),
-}
-"""How the chain started → legend, colour, marker."""
+_LOOKS: Final = {"rest": (RED, "o"), "ellipse": (GREEN, "D"), "spinning": (BLUE, "s")}
+"""How the chain started → colour and marker; of other starts the first among `_OTHERS` that are left."""
 _OTHERS: Final = (*zip((BLUE, *LINE_COLORS[3:6]), "^vP*", strict=True), *[(INK, "X")] * 100)
 """Colour and marker of further blocks of the same start."""
 
@@ -108,9 +105,10 @@ def figure6(result: SweepResult) -> Picture:
             of_point = {name: sets[0] for name, sets in block.planned.points.items()}  # there is one set at most
             values = {**given["scene"], **of_point, **cell_values(block.axes, place)}
             if values["start"] not in own:
-                label, color, marker = _STARTS[values["start"]]
+                label, further = STARTS[values["start"]].legend, _OTHERS[max(0, len(looks) - 1)]
+                color, marker = _LOOKS.get(values["start"], further)
                 if label in looks:  # of another block with this start
-                    label, (color, marker) = f"{block.name}, {label}", _OTHERS[len(looks) - 1]
+                    label, (color, marker) = f"{block.name}, {label}", further
                 own[values["start"]], looks[label] = label, {"color": color, "marker": marker}
             numbers = found.mean, found.sd, found.of_survivors, found.at_least
             row = float(values["frequency"]), *(float(each[place]) for each in numbers)

@@ -23,12 +23,12 @@ from warpchain.inputs.validation import short
 from warpchain.pictures.labels import cell_notes, cell_table, cell_text, cell_values, unit_text
 from warpchain.pictures.style import image, png
 from warpchain.reports.sweep_figures import figures
+from warpchain.results.block_result import BlockResult
+from warpchain.results.sweep_result import SweepResult, load
+from warpchain.results.walk_result import WalkResult
 from warpchain.status import Status
-from warpchain.store.block_result import BlockResult
-from warpchain.store.sweep_result import SweepResult, load
 from warpchain.version import VERSION
 from warpchain.walks.landmarks import FAULTS
-from warpchain.walks.walk_result import WalkResult
 
 _MOST_LISTED: Final = 100
 """Greatest number of walks with the same status or fault that are listed one by one."""

@@ -1,15 +1,16 @@
 """One walk, from a user's few words to its result."""
 
-from typing import Any, Literal
+from typing import Any
 
+from warpchain.chain.resolution import continued, resolve, takes_fields
+from warpchain.chain.setup import DEFAULT_PRESET, Setup, State
 from warpchain.inputs.distributions import Seed
-from warpchain.inputs.setup import DEFAULT_PRESET, Setup, continued, resolve, takes_fields
-from warpchain.inputs.state import State
+from warpchain.inputs.starts import StartWord
 from warpchain.inputs.validation import InputError, by_name, by_section, checked, shown
+from warpchain.results.one_walk import OnProgress, run_walk
+from warpchain.results.walk_result import WalkResult
 from warpchain.run.progress_bar import changing_line, walk_progress_text
 from warpchain.sweeps.block import refuse_axes
-from warpchain.walks.one_walk import OnProgress, run_walk
-from warpchain.walks.walk_result import WalkResult
 
 
 @takes_fields("parameters", "scene", "options")
@@ -20,7 +21,7 @@ def walk(
     preset: str | None = None,
     method: str | None = None,
     tolerance: float | None = None,
-    start: Literal["rest", "spinning", "ellipse"] | State | None = None,
+    start: StartWord | State | None = None,
     setup: Setup | None = None,
     seed: int | None = None,
     frame_interval: float | None = 2e-3,

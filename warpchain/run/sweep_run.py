@@ -20,11 +20,12 @@ from typing import Annotated, Any, Final
 import numpy as np
 from pydantic import Field
 
+from warpchain.chain.resolution import Values, takes_fields
+from warpchain.chain.setup import DEFAULT_PRESET, Setup
 from warpchain.engine.devices import gpu_turn, has_gpu_turn, start_device
 from warpchain.engine.processors import free_memory, processors
 from warpchain.files import AnyPath
 from warpchain.inputs.options import Options, on_gpu
-from warpchain.inputs.setup import DEFAULT_PRESET, Setup, Values, takes_fields
 from warpchain.inputs.validation import (
     SECTION_OF,
     InputError,
@@ -37,13 +38,13 @@ from warpchain.inputs.validation import (
     shown,
     validated,
 )
+from warpchain.results.sweep_result import SweepResult, load
 from warpchain.run import progress_bar
 from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text
 from warpchain.run.workers import Pulse, losses_named, pulsing_threads
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
 from warpchain.store.shards import Part, Shard, check_numerics, opened_shard, rows_of, stamp, write_shard
-from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.block import is_axis
 from warpchain.sweeps.plan import PlannedWalk, Source, Sweep, load_sweep
 from warpchain.sweeps.sweep_file import VERSION, BlockKeys
@@ -306,7 +307,7 @@ def run_shards(planned: Sweep, directory: str, seal: str, shards: Sequence[Shard
                 pulse.beat()
             fill_row(rows[shard][row], run.outcome(), under_way.pop(number).drawn)
             if keeps[number].series_every is not None:
-                motions[shard][row] = run.recorder.motion(run.datum)
+                motions[shard][row] = run.motion()
             if (rows[shard]["status"] != MISSING).all():
                 write_shard(directory, seal, shard, rows.pop(shard), motions.pop(shard))
 

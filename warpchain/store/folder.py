@@ -145,7 +145,7 @@ def read_rows(
         except DamagedFileError as error:
             if damaged is None or isinstance(error, ChangedFileError):
                 raise
-            if not claims_to_be(path := Path(directory) / "shards" / name, shards.KIND):
+            if not claims_to_be(path := Path(directory) / "shards" / name, shards.SHARD.kind):
                 raise InputError(f"{path}: not a shard of this sweep; move it out of this folder") from None
             damaged[name] = str(error).partition("; ")[0]
             continue

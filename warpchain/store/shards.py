@@ -27,14 +27,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.files import AnyPath, naming, write_whole
-from warpchain.hdf5_files import claims_to_be, hdf5_image, open_regular, reading_hdf5
+from warpchain.hdf5_files import Format, claims_to_be, hdf5_image, open_regular, reading_hdf5
 from warpchain.inputs.validation import DamagedFileError, InputError
 from warpchain.sweeps.designs import EXTENSIBLE
 from warpchain.sweeps.plan import Sweep
 from warpchain.sweeps.sweep_file import fields_of
 from warpchain.version import NUMERICS_VERSION, package_versions
-from warpchain.walks.rows import KEYS, MISSING, Rows, row_type
-from warpchain.walks.walk_result import write_motion
+from warpchain.walks.rows import KEYS, MISSING, STORED_COLUMNS, Rows, row_type
+from warpchain.walks.walk_numbers import MOTION, write_motion
 
 if TYPE_CHECKING:
     import h5py
@@ -45,8 +45,8 @@ OWN: Final = ("sweep.h5", "sweep.yaml", "shards", "log.txt")
 """What a sweep has in its folder, beside the lock."""
 EARLIER: Final = "sweep.json"
 """What earlier versions have there instead of sweep.h5."""
-MANIFEST: Final = "warpchain sweep"
-KIND: Final = "warpchain shard"
+MANIFEST: Final = Format.of("warpchain sweep")
+SHARD: Final = Format.of("warpchain shard", STORED_COLUMNS, MOTION, dict(KEYS.fields or {}))
 _NAME: Final = re.compile(r"\d{6,}\.h5")
 FOREIGN: Final = "a shard of another sweep; move it out of this folder"
 REBUILT: Final = "run the sweep in this folder again, which writes the file anew and keeps all shards"
@@ -218,7 +218,7 @@ def write_shard(
         for row in sorted(motions):
             write_motion(file.create_group(f"motion/{row}", track_order=True), motions[row], np.float32)
 
-    write_whole(Path(directory) / "shards" / shard.name, hdf5_image(KIND, fill))
+    write_whole(Path(directory) / "shards" / shard.name, hdf5_image(SHARD, fill))
 
 
 def rows_of(file: "h5py.File", kind: np.dtype[np.void]) -> Rows:
@@ -249,7 +249,7 @@ def opened_shard(directory: AnyPath, name: str, digest: str, numerics: int) -> "
     An `OSError` says that it cannot be read, an `InputError` that it is damaged or belongs elsewhere.
     """
     path = Path(directory) / "shards" / name
-    with reading_hdf5(path, KIND, "move it out of this folder and run the sweep again, for its walks only") as file:
+    with reading_hdf5(path, SHARD, "move it out of this folder and run the sweep again, for its walks only") as file:
         if (file.attrs["name"], file.attrs["digest"]) != (name, digest):
             raise InputError(f"{path}: {FOREIGN}")
         if (own := int(file.attrs["numerics_version"])) != numerics:
@@ -264,7 +264,7 @@ def own_shards(directory: AnyPath) -> Iterator[Path]:
     with naming(folder, "read"):
         there = sorted(folder.iterdir()) if folder.is_dir() else []
     for path in there:
-        if _NAME.fullmatch(path.name) and path.is_file() and not path.is_symlink() and claims_to_be(path, KIND):
+        if _NAME.fullmatch(path.name) and path.is_file() and not path.is_symlink() and claims_to_be(path, SHARD.kind):
             yield path
 
 

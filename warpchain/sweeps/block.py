@@ -15,11 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, Field, ValidationError, ValidationInfo, WrapValidator
 
+from warpchain.chain.resolution import SECTIONS
+from warpchain.chain.setup import Setup
 from warpchain.inputs import validation
 from warpchain.inputs.distributions import Distribution, Gaussian
+from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset as parameter_preset
 from warpchain.inputs.scene import COMPOUND, Scene
-from warpchain.inputs.setup import SECTIONS, Setup, combined, options_beside
 from warpchain.inputs.validation import FIELDS, SECTION_OF, InputError, checked, json_value, path_of, shown, validated
 from warpchain.sweeps.designs import independent_groups, walks_per_sample
 from warpchain.walks.landmarks import least
@@ -124,7 +126,7 @@ class Block:
         axes = self.axes | {name: tuple(values.values()) for name, values in self.named.items()}
         kept = lru_cache(2**14)  # more than an axis has values
         scene = kept(lambda at: validated(Scene, {**sections["scene"], **dict(at)}, "scene"))
-        options = kept(lambda plane, at: options_beside(plane, {**sections["options"], **dict(at)}))
+        options = kept(lambda tilts, at: Options.chosen({**sections["options"], **dict(at)}, tilts=tilts))
         changed = kept(lambda name, at: parameter_preset(name).with_values({**sections["parameters"], **dict(at)}))
         for cell in cells:
             at: dict[str, _Place] = dict.fromkeys(SECTIONS, ())
@@ -138,7 +140,7 @@ class Block:
                     at[SECTION_OF[field]] += ((field, column[place]),)
             try:
                 own, parameters = scene(at["scene"]), changed(preset, at["parameters"])
-                yield combined(preset, parameters, own, options(own.plane, at["options"]))
+                yield Setup(preset, parameters, own, options(own.plane == "tilting", at["options"])).checked()
             except InputError as error:
                 raise InputError(self._located(error, cell)) from None
 

@@ -10,18 +10,19 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.chain.setup import Setup
 from warpchain.inputs.arrays import AnyArray
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.setup import Setup
 from warpchain.inputs.validation import InputError, InputWarning, by_name, checked, plain, shown, suggestion
+from warpchain.results.walk_result import WalkResult
 from warpchain.status import Status
-from warpchain.store.cell_statistics import CellStatistics
 from warpchain.sweeps.block import POINT, Block
 from warpchain.sweeps.plan import Sweep
 from warpchain.walks import rows
+from warpchain.walks.cell_statistics import CellStatistics
 from warpchain.walks.landmarks import LENGTHS
 from warpchain.walks.rows import COLUMNS, MISSING, Column, quantity_of
-from warpchain.walks.walk_result import WalkResult, read_motion
+from warpchain.walks.walk_numbers import read_motion
 
 if TYPE_CHECKING:
     import h5py
@@ -202,7 +203,7 @@ class BlockResult:
             raise InputError(f"{', '.join(words)}: given together with index; leave one out")
         else:
             _, place = located([self], index)
-        from warpchain.walks.one_walk import run_walk
+        from warpchain.results.one_walk import run_walk
 
         recording = {"frame_interval": frame_interval, "record_before": record_before, "record_loads": record_loads}
         walk = run_walk(self.setup_at(place), seed=self.origin.seed, **recording)  # type: ignore[arg-type]

@@ -22,16 +22,17 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from warpchain.files import AnyPath, Kind, checked_output, clear_parts, given_path, write_whole
-from warpchain.hdf5_files import hdf5_image, kind_of_hdf5, reading_hdf5
+from warpchain.hdf5_files import Format, hdf5_image, kind_of_hdf5, reading_hdf5
 from warpchain.inputs.arrays import AnyArray
 from warpchain.inputs.validation import InputError, InputWarning, checked_path, full_name, shown, suggestion
-from warpchain.store.block_result import BlockResult, counted, located, status_counts
-from warpchain.store.cell_statistics import CellStatistics
+from warpchain.results.block_result import BlockResult, counted, located, status_counts
+from warpchain.results.walk_result import WalkResult
 from warpchain.store.folder import read_rows
 from warpchain.store.shards import Manifest, read_manifest, stamp, stored_sweep
 from warpchain.sweeps.plan import Sweep
+from warpchain.walks.cell_statistics import CellStatistics
 from warpchain.walks.rows import COLUMNS, STORED_COLUMNS, derived_columns, drawn_column, quantity_of
-from warpchain.walks.walk_result import WalkResult
+from warpchain.walks.walk_numbers import MOTION
 
 if TYPE_CHECKING:
     import h5py
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure, SubFigure
 
-KIND: Final = "warpchain sweep result"
+MERGED: Final = Format.of("warpchain sweep result", COLUMNS, MOTION)
 REMEDY: Final = "merge the folders again, or fetch another copy of the file"
 TRIES, PAUSE = 100, 0.02
 """Times that a folder is read in which shards come and go, and time [s] between them."""
@@ -272,8 +273,8 @@ def _seen(directory: AnyPath) -> tuple[str, Manifest]:
 
 
 def _load_merged(path: AnyPath) -> SweepResult:
-    opened = partial(reading_hdf5, Path(path).absolute(), KIND, REMEDY, WANTED)
-    with reading_hdf5(path, KIND, REMEDY, WANTED) as file:
+    opened = partial(reading_hdf5, Path(path).absolute(), MERGED, REMEDY, WANTED)
+    with reading_hdf5(path, MERGED, REMEDY, WANTED) as file:
         sweep = stored_sweep(path, json.loads(file.attrs["sweep"]))
         provenance = {"digest": file.attrs["digest"], "numerics_version": int(file.attrs["numerics_version"])}
         provenance["versions"] = json.loads(file.attrs["versions"])
@@ -323,7 +324,7 @@ def merge(sources: AnyPath | Sequence[AnyPath], path: AnyPath) -> None:
     checked_output(target, _MERGED)
     clear_parts(target)
     whole = load(sources)
-    write_whole(target, hdf5_image(KIND, partial(_fill, whole=whole)), _MERGED)
+    write_whole(target, hdf5_image(MERGED, partial(_fill, whole=whole)), _MERGED)
     if missing := whole.missing_count:
         problem = f"{missing:,} of {whole.walk_count:,} walks are missing"
         remedy = "merge again with all parts, once they have run"
@@ -333,7 +334,7 @@ def merge(sources: AnyPath | Sequence[AnyPath], path: AnyPath) -> None:
 def _is_merged(path: Path) -> bool:
     """Whether `merge` has written this file, and nothing has damaged it since; an `OSError` if it cannot be read."""
     try:
-        return not path.is_symlink() and path.is_file() and kind_of_hdf5(path, WANTED) == KIND
+        return not path.is_symlink() and path.is_file() and kind_of_hdf5(path, WANTED) == MERGED.kind
     except InputError:
         return False
 

@@ -1,28 +1,36 @@
 """What one walk is: its `Setup`, and the `State` of a chain that it may begin from."""
 
 import hashlib
+import math
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Final
+from functools import cached_property
+from typing import Any, Final, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpchain.chain.floor import Floor, circles_of, floor_from
+from warpchain.chain.link_values import LinkValues, link_values
+from warpchain.chain.outlines import fitted
+from warpchain.chain.start_shapes import links_between
 from warpchain.inputs.arrays import Array, checked_array
-from warpchain.inputs.floor import FARTHEST, Floor, circles_of, floor_from
-from warpchain.inputs.options import Options
+from warpchain.inputs.compound_fields import FARTHEST
+from warpchain.inputs.distributions import Distribution, Gaussian
+from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL, Options
 from warpchain.inputs.parameters import Parameters, preset
-from warpchain.inputs.scene import Scene, check_parity, check_scene
-from warpchain.inputs.start_shapes import links_between
-from warpchain.inputs.validation import SECTION_OF, InputError, InputWarning, validated
+from warpchain.inputs.scene import Scene, check_links_on_gpu
+from warpchain.inputs.unit_slips import check_units
+from warpchain.inputs.validation import SECTION_OF, InputError, InputWarning, shown, validated
+from warpchain.kernels.methods.method import find_method
 
 DEFAULT_PRESET: Final = "paper"
 """Preset of a walk or a sweep that names none."""
 WIDEST_OPENING: Final = 0.1
 """Greatest distance of two joined link ends, in link lengths; a loop whose ends are farther apart is not closed."""
-WIDEST_MISFIT: Final = 0.5
-"""Greatest difference of the distance of two given joints from a link length, in link lengths."""
+LEAST_SPROCKET: Final = 1e-3
+"""Least distance of the joints from the sprocket's centre, in link lengths; far smaller ones are lost in rounding."""
 
 
 FARTHEST_MOVED: Final = 0.02
@@ -37,6 +45,8 @@ class Setup:
 
     `preset` is the name of the one that the parameters started from. Without a `start` the walk begins as the scene
     says; with one, the scene has values that matter before the release from the walk that the state was taken from.
+
+    What follows from these values alone is a property, and is computed once.
     """
 
     preset: str
@@ -48,13 +58,69 @@ class Setup:
     @property
     def has_drive(self) -> bool:
         """Whether the walk begins on a sprocket."""
-        return self.start is None and self.scene.start != "ellipse"
+        return self.start is None and self.scene.is_on_sprocket
 
-    @property
+    @cached_property
+    def link_values(self) -> LinkValues:
+        """What each link and joint of the chain has of its own."""
+        return link_values(self.scene, self.parameters)
+
+    @cached_property
     def floor(self) -> Floor:
         """The floor of the walk."""
         usual = self.parameters.floor_restitution, self.parameters.floor_friction
         return floor_from(self.scene.floor, self.scene.slope, usual)
+
+    @property
+    def settling_time(self) -> float:
+        """Time [s] for which the chain settles on the sprocket before that turns; 0 unless it starts at rest."""
+        if self.scene.start != "rest":
+            return 0.0
+        if self.scene.settle_time is not None:
+            return self.scene.settle_time
+        return 2.0 if self.scene.clearance_of == "hanging" else 0.1
+
+    @cached_property
+    def riding_radius(self) -> float:
+        """Height [m] of the joints above a surface that the chain rides on: half of them are at least so high."""
+        if self.scene.link_radii is None and self.scene.charm_radius is None:
+            return self.parameters.circle_radius
+        radius = self.link_values.radius
+        return float(np.median(np.maximum(radius, np.roll(radius, -1))))
+
+    @property
+    def joint_radius(self) -> float:
+        """Distance from the sprocket's centre at which the joints ride [m]."""
+        if self.scene.sprocket_radius_is == "pitch":
+            return self.parameters.sprocket_radius
+        return self.parameters.sprocket_radius + self.riding_radius
+
+    @property
+    def contact_radius(self) -> float:
+        """Radius of the sprocket that the circles of the links touch [m]."""
+        if self.scene.sprocket_radius_is == "contact":
+            return self.parameters.sprocket_radius
+        return self.parameters.sprocket_radius - self.riding_radius
+
+    @property
+    def loop_speed(self) -> float:
+        """Speed [m/s] along the loop of a chain that does not slip on its sprocket.
+
+        Links on it are chords, each seen from the centre under 2 asin(ℓ / 2ρ), with ρ of `joint_radius`.
+        """
+        half = math.asin(min(1.0, self.parameters.link_length / (2 * self.joint_radius)))
+        return math.pi * self.scene.frequency * self.parameters.link_length / half
+
+    @property
+    def fewest_links(self) -> int:
+        """Least even number of links whose loop can hang round the sprocket.
+
+        A link whose joints are both at least ρ, the `joint_radius`, from the centre is seen from there under an angle
+        of at most 2 asin(ℓ / 2ρ), and a loop round the sprocket needs 2π in all: n ≥ π / asin(ℓ / 2ρ).
+        """
+        sine = self.parameters.link_length / (2 * self.joint_radius)
+        around = math.ceil(math.pi / math.asin(sine)) if sine < 1 else 2
+        return max(4, around + around % 2)
 
     @property
     def described(self) -> str:
@@ -80,8 +146,88 @@ class Setup:
             sections[SECTION_OF[name]][name] = value
         parameters = validated(Parameters, {**vars(self.parameters), **sections["parameters"]}, "parameters")
         scene = validated(Scene, {**vars(self.scene), **sections["scene"]}, "scene")
-        check_scene(scene, parameters)
-        return replace(self, parameters=parameters, scene=scene)
+        return replace(self, parameters=parameters, scene=scene).checked()
+
+    def placed(self, distributions: Mapping[str, Distribution]) -> dict[str, Distribution]:
+        """The distributions with means and bounds for this chain.
+
+        A Gaussian without a mean gets the chain's value. A link length must leave room for two circles of the widest
+        link.
+        """
+        complete: dict[str, Distribution] = {}
+        for name, distribution in distributions.items():
+            if isinstance(distribution, Gaussian) and distribution.mean is None:
+                value = getattr(getattr(self, SECTION_OF[name]), name)
+                distribution = Gaussian(float(value), distribution.sigma, distribution.bounds)
+            complete[name] = distribution
+        if "link_length" in distributions and "circle_radius" not in distributions:
+            widest = float(self.link_values.radius.max())
+            room = math.nextafter(2 * widest, math.inf), math.inf
+            complete["link_length"] = replace(complete["link_length"], bounds=room)
+        return complete
+
+    def checked(self, path: str = "scene.links") -> Self:
+        """This setup, if its values do not contradict one another; else an `InputError`.
+
+        Resolution and sweeps ask for it, of a state only its own checks. `path` is where the number of links was given.
+        """
+        scene, options = self.scene, self.options
+        if scene.plane == "tilting" and find_method(options.method).has_rigid_flight:
+            raise InputError(
+                f"options.method: {shown(options.method)} keeps planes fixed; give explicit, or plane: fixed"
+            )
+        if self.start is None and not options.unusual_values:
+            check_units(vars(self.parameters), "parameters")
+            check_units(vars(scene), "scene")
+        self._check_links(path)
+        if self.has_drive:
+            self._check_drive()
+        check_links_on_gpu(scene.links, options.device, path)
+        return self
+
+    def _check_links(self, path: str) -> None:
+        """Check that links are longer than their circles are wide, and that links of two kinds are even in number."""
+        scene, parameters = self.scene, self.parameters
+        if scene.link_radii is not None or scene.charm_radius is not None:
+            radii = self.link_values.radius
+            if not radii.max() < (half := parameters.link_length / 2):
+                field = "charm_radius" if scene.charm_radius == radii.max() else f"link_radii[{radii.argmax()}]"
+                raise InputError(f"scene.{field}: {radii.max()} is not below half a link, {half}; give less")
+        inner, outer = parameters.inner_mass, parameters.outer_mass
+        is_one_kind = (inner, parameters.inner_inertia) == (outer, parameters.outer_inertia)
+        if scene.links % 2 and not is_one_kind and (scene.link_masses is None or scene.link_inertias is None):
+            raise InputError(f"{path}: {scene.links} is odd; give an even number, or link_masses and link_inertias")
+
+    def _check_drive(self) -> None:
+        """Check that the chain can hang on its sprocket, leave it, and bear the loads there."""
+        scene, parameters = self.scene, self.parameters
+        radius = parameters.sprocket_radius
+        if self.contact_radius <= 0:
+            raise InputError(
+                f"parameters.sprocket_radius: {radius} is too small for sprocket_radius_is: pitch; give more"
+            )
+        highest = scene.clearance + scene.links * parameters.link_length / 2  # of the sprocket's lowest point
+        if scene.release and scene.is_level and (lowest := min(row[2] for row in scene.release)) < -highest:
+            raise InputError(f"scene.release: y = {lowest:g} m is through the floor; give {-highest:g} m or more")
+        if self.joint_radius < LEAST_SPROCKET * parameters.link_length:
+            raise InputError(
+                f"parameters.sprocket_radius: {radius} is nothing beside a link; give more, or start: ellipse"
+            )
+        if scene.load_factor is not None:
+            greatest = self.link_values.greatest_load(parameters.link_length)
+            if scene.load_factor > greatest:
+                problem = f"{scene.load_factor:g} is too much for links of so little rotary inertia"
+                raise InputError(f"scene.load_factor: {problem}; give at most {greatest:.6g}, or null")
+        if scene.links < (fewest := self.fewest_links):
+            raise InputError(
+                f"scene.links: {scene.links} links do not reach round the sprocket; give at least {fewest}"
+            )
+        interval = self.options.record_interval
+        if interval > LONGEST_DRIVE_INTERVAL and scene.load_factor != 1:
+            raise InputError(
+                f"options.record_interval: loads on the sprocket change at each, and {interval} s is too long for "
+                f"that; give at most {LONGEST_DRIVE_INTERVAL} s, or scene.load_factor: 1"
+            )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -189,14 +335,14 @@ class State:
         rates = np.zeros_like(places) if velocity is None else checked_array(velocity, "velocity", *places.shape)
         setup = _setup(len(places), parameters, "joints")
         length = setup.parameters.link_length
-        fitted, rates = _fitted(places, rates, length)
-        moved = np.linalg.norm(fitted - places, axis=1) / length
+        near, rates = fitted(places, rates, length)
+        moved = np.linalg.norm(near - places, axis=1) / length
         text = f"joints: to fit links of {length:g} m joint {moved.argmax()} moves by {moved.max():.2%} of a link"
         if moved.max() > FARTHEST_MOVED:
             raise InputError(f"{text}, more than {FARTHEST_MOVED:.0%}; measure joints or link_length more exactly")
         if moved.max() > FARTHEST_UNSAID:
             warnings.warn(f"{text} (mean {moved.mean():.2%}); the walk begins from there", InputWarning, stacklevel=2)
-        position, rate = links_between(fitted, rates)
+        position, rate = links_between(near, rates)
         return cls(position=position, velocity=rate, setup=setup)
 
     @property
@@ -229,35 +375,4 @@ def _setup(links: int, parameters: Parameters | str, field_name: str) -> Setup:
     name = DEFAULT_PRESET if isinstance(parameters, Parameters) else parameters
     chain = parameters if isinstance(parameters, Parameters) else preset(parameters)
     scene = validated(Scene, {"links": links, "frequency": 0.0, "start": "ellipse"}, field_name)
-    check_parity(scene, chain, field_name)
-    return Setup(name, chain, scene, Options())
-
-
-def _fitted(joints: Array, rates: Array, length: float) -> tuple[Array, Array]:
-    """Joints that are a link length apart, and their rates that keep it so, near given ones; both (n, 2)."""
-    n = len(joints)
-    apart = np.linalg.norm(joints - np.roll(joints, 1, axis=0), axis=1)
-    worst = int(np.abs(apart - length).argmax())
-    if abs(apart[worst] - length) > WIDEST_MISFIT * length:
-        raise InputError(
-            f"joints: the loop is not closed, or lengths are not in m: joints {(worst - 1) % n} and {worst} are "
-            f"{apart[worst]:.3g} m apart, and links are {length:g} m long; give every joint, in order"
-        )
-    places = joints.copy()
-    for _ in range(50):
-        span = places - np.roll(places, 1, axis=0)
-        misfit = (np.sum(span**2, axis=1) - length**2) / 2
-        if np.abs(misfit).max() <= 1e-13 * length**2:
-            return places, rates - _pull(span, np.sum(span * (rates - np.roll(rates, 1, axis=0)), axis=1))
-        places -= _pull(span, misfit)
-    raise InputError(f"joints: no closed chain of {n} links of {length:g} m lies near them; measure them anew")
-
-
-def _pull(span: Array, change: Array) -> Array:
-    """The least motion of the joints, (n, 2), that changes half the squares of the spans by so much, (n,)."""
-    n = len(span)
-    rates = np.zeros((n, n, 2))  # of each half square by each joint
-    rates[np.arange(n), np.arange(n)] = span
-    rates[np.arange(n), np.arange(n) - 1] -= span
-    least = np.linalg.lstsq(rates.reshape(n, 2 * n), change)[0]
-    return np.asarray(least, dtype=np.float64).reshape(n, 2)
+    return Setup(name, chain, scene, Options()).checked(field_name)
