@@ -21,6 +21,7 @@ class Features:
     tilts: bool = False
     load: str = "weight"  # a key of :data:`physics.load.LOADS`
     moving_sprocket: bool = False  # whether the sprocket is there as well, above a floor, and moves
+    is_mixed: bool = False  # whether stages on springs are in single precision, see :mod:`physics.increments`
 
     @property
     def is_driven(self) -> bool:
