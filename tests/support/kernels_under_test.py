@@ -25,8 +25,8 @@ from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.cpu.contacts.neighbour_list import list_slack, neighbour_list
 from warpchain.kernels.cpu.contacts.proximity import fixed_contacts, greatest_opening
 from warpchain.kernels.cpu.contacts.self_contacts import self_contacts
-from warpchain.kernels.cpu.placing import place_ends
 from warpchain.kernels.cpu.loop import load_state
+from warpchain.kernels.cpu.placing import place_ends
 from warpchain.kernels.features import COMPILER_FLAGS
 from warpchain.kernels.types import Model, State, read_ground
 
