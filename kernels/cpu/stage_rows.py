@@ -35,9 +35,9 @@ ERROR = 31
 # waits for the store of an earlier column, and vectorises by half as many.
 FORCE, TORQUE = 35, 37
 # Per stage: accelerations of x, y, θ; and if it has a weight in the new state, of each joint the power lost to friction
-# and damping and, shifted by one, the force.
+# and damping and, shifted by one, the force; then what a plane that tilts adds to the accelerations of x and y.
 STAGES = 41
-POWER_ROWS = 4
+POWER_ROWS = 6
 
 
 def needs_power(tableau: Tableau) -> tuple[bool, ...]:
