@@ -38,26 +38,6 @@ class Steps:
     first_stage_is_finite: Any  # ``(S, n)``
 
 
-def sums_over(real: Any, velocity: tuple[float, ...], position: tuple[float, ...], rows: tuple[int, ...]):
-    """Warp function ``sums(S, i)``: Σ w_j (ẍ, ÿ, θ̈)_j of link i over the stages, for both rows of weights w."""
-    # Vectors of two to four singles are passed in vector registers, which keeps clang from vectorising the loop around.
-    six = wp.types.vector(length=6, dtype=real)
-
-    @wp.func
-    def sums(S: wp.array2d(dtype=real), i: int):
-        total = six()
-        for j in range(wp.static(len(velocity))):
-            if wp.static(velocity[j] != 0.0):
-                for k in range(3):
-                    total[k] += wp.static(real(velocity[j])) * S[wp.static(rows[j]) + k, i]
-            if wp.static(position[j] != 0.0):
-                for k in range(3):
-                    total[3 + k] += wp.static(real(position[j])) * S[wp.static(rows[j]) + k, i]
-        return total
-
-    return sums
-
-
 @functools.cache
 def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
     """Steps of one tableau in single or double precision; load: ``WEIGHT``, ``PLANE``, or a script's Warp function."""
@@ -75,9 +55,9 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
     needs_power = at.needs_power(tableau)
     reuses_last = tableau.first_same_as_last
     weights = tableau.velocity_weights
-    stage_sums = [sums_over(real, *both, rows) for both in zip(tableau.velocity, tableau.position, strict=True)]
-    new_state = sums_over(real, weights, tableau.position_weights, rows)
-    errors = sums_over(real, tableau.velocity_errors, (0.0,) * stages, rows)
+    stage_sums = [at.sums_over(real, *both, rows) for both in zip(tableau.velocity, tableau.position, strict=True)]
+    new_state = at.sums_over(real, weights, tableau.position_weights, rows)
+    errors = at.sums_over(real, tableau.velocity_errors, (0.0,) * stages, rows)
 
     def later(s: int) -> int:
         """The next stage, if there is one: in a branch that is left out names must have a meaning."""
@@ -347,12 +327,7 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
                         wp.static(needs_power[s]),
                     )
                     displace(
-                        S,
-                        stage,
-                        plane,
-                        i,
-                        wp.static(stage_sums[later(s)])(S, i),
-                        wp.static(needs_power[later(s)]),
+                        S, stage, plane, i, wp.static(stage_sums[later(s)])(S, i), wp.static(needs_power[later(s)])
                     )
                     i += 1
         inverse = real(wp.float64(1.0) / tolerance)

@@ -72,6 +72,26 @@ def stage_rows(tableau: Tableau) -> tuple[tuple[int, ...], tuple[int, ...], int]
     return tuple(STAGES + 3 * slot for slot in slots), powers, first_power + POWER_ROWS * sum(needed)
 
 
+def sums_over(real: Any, velocity: tuple[float, ...], position: tuple[float, ...], rows: tuple[int, ...]):
+    """Warp function ``sums(S, i)``: Σ w_j (ẍ, ÿ, θ̈)_j of link i over the stages, for both rows of weights w."""
+    # Vectors of two to four singles are passed in vector registers, which keeps clang from vectorising the loop around.
+    six = wp.types.vector(length=6, dtype=real)
+
+    @wp.func
+    def sums(S: wp.array2d(dtype=real), i: int):
+        total = six()
+        for j in range(wp.static(len(velocity))):
+            if wp.static(velocity[j] != 0.0):
+                for k in range(3):
+                    total[k] += wp.static(real(velocity[j])) * S[wp.static(rows[j]) + k, i]
+            if wp.static(position[j] != 0.0):
+                for k in range(3):
+                    total[3 + k] += wp.static(real(position[j])) * S[wp.static(rows[j]) + k, i]
+        return total
+
+    return sums
+
+
 def row_width(columns: int, size: int) -> int:
     """Numbers of this size [bytes] in a row, for a chain whose scratch has this many columns."""
     lanes = CACHE_LINE // size
