@@ -117,7 +117,7 @@ class Batch:
         self.control.frame_interval = keep.frame_interval
 
         width = self.columns
-        rows = board_rows(self.threads, width) if self._gpu else scratch_rows(options.method, width)
+        rows = board_rows(self.threads, width) if self._gpu else scratch_rows(options.method, width, options.is_mixed)
         self.scratch = wp.zeros((worlds, rows, width), dtype=wp.float64, device=self.device.warp)
         self.lists = wp.zeros((worlds, list_layout(width).size), dtype=wp.int32, device=self.device.warp)
         self.bytes: int = self._numbers.bytes + self._recorded.bytes + self.scratch.capacity + self.lists.capacity
@@ -131,7 +131,8 @@ class Batch:
     def features(self, **wanted: Any) -> Features:
         """What the kernel of these worlds is compiled for; ``wanted``: what the options do not say."""
         options = self.options
-        return Features(options.method, self.columns, self_contact=options.self_contact, **wanted)
+        own = {"self_contact": options.self_contact, "is_mixed": options.is_mixed}
+        return Features(options.method, self.columns, **own | wanted)
 
     @property
     def attempts_of_launch(self) -> int:
