@@ -79,8 +79,11 @@ def fly(
     tolerance: float = 1e-9,
     longest_step: float | None = None,
 ) -> Batch:
-    """A flight [s] that must reach its end without contacts; the batch afterwards. Steps as in `tilting_batch`."""
-    options = Options(method=method, tolerance=tolerance)
+    """A flight [s], in double precision, that must reach its end without contacts; the batch afterwards.
+
+    Steps are as in `tilting_batch`.
+    """
+    options = Options(method=method, tolerance=tolerance, precision="double")
     batch = tilting_batch([start], [parameters], options, duration, longest_step=longest_step)
     batch.run([0], batch.features(fixed_body="floor", tilts=True))
     assert batch.worlds[0].status == Status.FINISHED
