@@ -3,8 +3,10 @@
 from warpchain.kernels import layout
 from warpchain.kernels.types import CHAIN_DOUBLES
 
-LARGEST_SHARED_BLOCK = 512
+LARGEST_SHARED_BLOCK = 448
 """Most threads of a block whose board fits into its shared memory."""
+STARTS = 14
+"""Numbers of a thread that describe the start of a step, see :mod:`gpu.increments`."""
 
 
 def shares_board(block_dim: int) -> bool:
@@ -17,8 +19,13 @@ def board_size(threads: int) -> int:
     return layout.BOARD_VALUES * (threads + 1) + max(threads + 1, layout.VALUES + CHAIN_DOUBLES)
 
 
+def starts_offset(threads: int) -> int:
+    """Doubles of a chain's scratch before the starts, behind board and plane; an even number."""
+    return (board_size(threads) + layout.PLANE_ROWS + 1) // 2 * 2
+
+
 def board_rows(block_dim: int, columns: int) -> int:
     """Rows of a chain's scratch of this width: for what is kept between launches, or all of the board and a plane."""
     if shares_board(block_dim):
         return layout.BOARD_VALUES
-    return -(-(board_size(block_dim) + layout.PLANE_ROWS) // columns)
+    return -(-(starts_offset(block_dim) + STARTS * block_dim) // columns)

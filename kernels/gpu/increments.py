@@ -1,0 +1,457 @@
+"""Steps in increments on a GPU: one thread per link, stages in registers, see :mod:`physics.increments`.
+
+What stages need of the start of a step, the joints and the accelerations there, lies in memory of the block. An accepted
+step carries it on by its own increments; every ``RENEWED`` steps, and after impulses, joints are formed anew from the
+state in double precision. A thread evaluates the joints at both ends of its link, so that a stage takes one barrier.
+"""
+
+import functools
+from dataclasses import dataclass
+from typing import Any
+
+import warp as wp
+
+from warpchain.kernels import layout
+from warpchain.kernels.features import Features
+from warpchain.kernels.gpu.functions import shares_board
+from warpchain.kernels.gpu.stage import Run, address_on_board, constants, felt_plane
+from warpchain.kernels.gpu.threads import barrier, number_memory
+from warpchain.kernels.layout import COSINE, COULOMB, OMEGA, SINE, THETA, VISCOUS, U, V, X, Y
+from warpchain.kernels.methods.method import find_method
+from warpchain.kernels.physics.elementary import HALF, cos_sin, order_bits_single
+from warpchain.kernels.physics.geometry import Link, put, three, turned
+from warpchain.kernels.physics.increments import increments, turn_double, turn_single
+
+# Pairs of numbers that a link keeps of the start of a step: opening of its right joint, the rate of that; accelerations
+# and spin of the joint; powers [W] lost in the joint by friction, and by damping, divided by b. Then its constants.
+OPENING, RATE, SPIN_TURN, PUSH, POWERS = range(5)
+KEPT = 5
+"""The pairs above, which are kept between launches."""
+FRICTION, INERTIAL = 5, 6
+EXCHANGED = 16
+"""Numbers of a thread in the memory in which stages exchange."""
+RENEWED = 256
+"""Accepted steps after which directions and joints are formed anew."""
+
+vec3d = wp.types.vector(length=3, dtype=wp.float64)
+
+
+def real_of(features: Features) -> Any:
+    """Type of the numbers of stages."""
+    return wp.float32 if features.mixed else wp.float64
+
+
+@dataclass(frozen=True)
+class BlockSteps:
+    """Warp functions of the steps of a block, for all its threads."""
+
+    write_constants: Any  # ``(run)`` rounds a link's constants, when those on the board have changed
+    stage_of: Any  # ``(run)`` → what all stages have in common until the chain's constants change
+    begin: Any  # ``(run, stage, keeps rates)`` forms the joints from the state on the board; a barrier has passed
+    attempt: Any  # ``(run, stage, h, 1/tolerance)`` → Attempt
+    accept: Any  # ``(run, Attempt, h)`` writes a link's new state, the losses of its joint, and the next start
+    renew_direction: Any  # ``(run)`` forms a link's direction anew from its angle
+    start_is_finite: Any  # ``(run)``: false if a link's state or start are not finite
+    opening: Any  # ``(run)`` → square of the opening of a link's right joint at the start [m²]
+    load_start: Any  # ``(run)`` loads what :attr:`store_start` has kept from the launch before
+    store_start: Any
+
+
+@functools.cache
+def block_steps(features: Features, block_dim: int) -> BlockSteps:
+    """Steps with one tableau, in mixed or in double precision."""
+    real = real_of(features)
+    vec2, vec3 = (wp.types.vector(length=length, dtype=real) for length in (2, 3))
+    algebra = increments(real)
+    Stage, Joint, PlaneMotion = algebra.Stage, algebra.Joint, algebra.PlaneMotion
+    displace, force, torque_of, start_force = algebra.displace, algebra.force, algebra.torque, algebra.start_force
+    small_turn = turn_single if features.mixed else turn_double
+    write_pair, read_pair, write_one, read_one = number_memory(real)
+    is_shared = shares_board(block_dim)
+    acceleration = features.acceleration
+    has_load = features.tilts or features.load != "weight"
+
+    tableau = find_method(features.method).tableau
+    nodes, weights, velocity_errors = tableau.nodes, tableau.velocity_weights, tableau.velocity_errors
+    velocity, position = tableau.velocity, tableau.position
+    if not tableau.first_same_as_last:  # the new state is one more stage, the first one of the next step
+        nodes, weights, velocity_errors = (*nodes, 1.0), (*weights, 0.0), (*velocity_errors, 0.0)
+        velocity, position = (*velocity, tableau.velocity_weights), (*position, tableau.position_weights)
+    stages, last = len(nodes), len(nodes) - 1
+    Stages = wp.types.matrix(shape=(stages, 3), dtype=real)
+
+    # Stages write in turn to two buffers of 7 and 9 numbers a thread, the last one to the larger.
+    LEFT, RIGHT, LEFT_RATE, RIGHT_RATE = range(4)
+
+    def buffer(s: int) -> int:
+        """First number of the buffer of a stage."""
+        return 0 if (last - s) % 2 else 7 * block_dim
+
+    def pairs(s: int, part: int) -> int:
+        """Index of a part's first pair; buffers begin at even numbers."""
+        return buffer(s) // 2 + part * block_dim
+
+    def turns(s: int) -> int:
+        """Index of the first change of spin, behind the pairs."""
+        return buffer(s) + (8 if s == last else 6) * block_dim
+
+    @wp.struct
+    class Attempt:
+        """A finished attempt: the link's new state, and what it keeps there."""
+
+        place: vec3d  # x, y [m], θ [rad]
+        cosine: wp.float64
+        sine: wp.float64
+        gain: vec3  # change of the velocities
+        friction: real  # mean powers lost
+        damping: real
+        joint: Joint
+        push: vec3  # accelerations by the joints
+        last_friction: real
+        last_damping: real
+        error: wp.int32  # error ratio as ordered bits
+        opening: wp.float32  # square of the joint's [m²]
+        speed: wp.float32  # square of the greatest of any point of the link, at most [m²/s²]
+
+    @wp.func
+    def write_constants(run: Run):
+        K = run.K
+        S = run.S
+        lane = run.lane
+        if lane < run.links:
+            write_pair(S, wp.static(FRICTION * block_dim) + lane, real(K[VISCOUS, lane]), real(K[COULOMB, lane]))
+            inverse_mass = real(K[layout.INVERSE_MASS, lane])
+            write_pair(S, wp.static(INERTIAL * block_dim) + lane, inverse_mass, real(K[layout.INVERSE_INERTIA, lane]))
+        else:
+            write_pair(S, wp.static(FRICTION * block_dim) + lane, real(0.0), real(0.0))
+            write_pair(S, wp.static(INERTIAL * block_dim) + lane, real(1.0), real(1.0))
+
+    @wp.func
+    def stage_of(run: Run) -> Stage:
+        return wp.static(algebra.stage_at)(constants(run.K), real(0.0), real(0.0))
+
+    @wp.func
+    def keep_joint(run: Run, joint: Joint, turn: real):
+        """Keeps a link's right joint, and the link's angular acceleration."""
+        write_pair(run.S, wp.static(OPENING * block_dim) + run.lane, joint.x, joint.y)
+        write_pair(run.S, wp.static(RATE * block_dim) + run.lane, joint.u, joint.v)
+        write_pair(run.S, wp.static(SPIN_TURN * block_dim) + run.lane, joint.spin, turn)
+
+    @wp.func
+    def keep_rates(run: Run, push: vec3, friction: real, damping: real):
+        """Keeps the link's other accelerations, and the powers lost in its right joint."""
+        write_pair(run.S, wp.static(PUSH * block_dim) + run.lane, push[0], push[1])
+        write_pair(run.S, wp.static(POWERS * block_dim) + run.lane, friction, damping)
+
+    @wp.func
+    def kept_joint(run: Run, column: int) -> Joint:
+        opening = read_pair(run.S, wp.static(OPENING * block_dim) + column)
+        rate = read_pair(run.S, wp.static(RATE * block_dim) + column)
+        spin = read_pair(run.S, wp.static(SPIN_TURN * block_dim) + column)
+        joint = Joint()
+        joint.x = opening[0]
+        joint.y = opening[1]
+        joint.u = rate[0]
+        joint.v = rate[1]
+        joint.spin = spin[0]
+        return joint
+
+    @wp.func
+    def pushed(
+        run: Run, arm_x: real, arm_y: real, left_x: real, left_y: real, left: real, right_x: real, right_y: real, right: real
+    ):
+        """Accelerations of a link by forces and torques of its joints."""
+        inertial = read_pair(run.S, wp.static(INERTIAL * block_dim) + run.lane)
+        ax, ay, turn = wp.static(algebra.acceleration)(
+            inertial[0], inertial[1], arm_x, arm_y, left_x, left_y, left, right_x, right_y, right
+        )
+        return vec3(ax, ay, turn)
+
+    @wp.func
+    def pushed_by(run: Run, stage: Stage, arm_x: real, arm_y: real, before: Joint, own: Joint):
+        """Likewise by joints in a known state, and the torque of the right one."""
+        friction_before = read_pair(run.S, wp.static(FRICTION * block_dim) + run.before)
+        friction = read_pair(run.S, wp.static(FRICTION * block_dim) + run.lane)
+        torque = torque_of(stage, friction[0], friction[1], own.spin)
+        push = pushed(
+            run,
+            arm_x,
+            arm_y,
+            start_force(stage, before.x, before.u),
+            start_force(stage, before.y, before.v),
+            torque_of(stage, friction_before[0], friction_before[1], before.spin),
+            start_force(stage, own.x, own.u),
+            start_force(stage, own.y, own.v),
+            torque,
+        )
+        return push, torque
+
+    @wp.func
+    def begin(run: Run, stage: Stage, keeps_rates: bool):
+        K = run.K
+        half_length = constants(K).half_length
+        own = wp.static(algebra.begin_joint)(K, half_length, run.lane, run.after)
+        if keeps_rates:
+            spin_turn = read_pair(run.S, wp.static(SPIN_TURN * block_dim) + run.lane)
+            keep_joint(run, own, spin_turn[1])
+        else:
+            before = wp.static(algebra.begin_joint)(K, half_length, run.before, run.lane)
+            arm_x = real(half_length * K[COSINE, run.lane])
+            arm_y = real(half_length * K[SINE, run.lane])
+            push, torque = pushed_by(run, stage, arm_x, arm_y, before, own)
+            keep_joint(run, own, push[2])
+            keep_rates(run, push, torque * own.spin, own.u * own.u + own.v * own.v)
+
+    @wp.func
+    def plane_felt(run: Run) -> PlaneMotion:
+        plane = PlaneMotion()
+        if wp.static(features.tilts):
+            plane = wp.static(algebra.plane_motion)(felt_plane(run))
+        return plane
+
+    @wp.func
+    def load(run: Run, plane: PlaneMotion, even: real, gain: vec3, way: vec3, arm_x: real, arm_y: real):
+        """Accelerations of a link by what acts on it besides joints and weight, at the time ``even`` in the step.
+
+        Its velocities have changed by ``gain``, its place by ``way`` beyond even motion. A load of a script gets all
+        in double precision.
+        """
+        K = run.K
+        lane = run.lane
+        if wp.static(features.tilts):
+            x = real(K[X, lane]) + (even * real(K[U, lane]) + way[0])
+            y = real(K[Y, lane]) + (even * real(K[V, lane]) + way[1])
+            ax, ay, turn = wp.static(algebra.plane_load)(plane, x, y, arm_x, arm_y)
+            return vec3(ax, ay, turn)
+        time = wp.float64(even)
+        moved = time * three(K, U, lane) + wp.vec3d(wp.float64(way[0]), wp.float64(way[1]), wp.float64(way[2]))
+        half_length = constants(K).half_length
+        there = Link()
+        there.x = K[X, lane] + moved[0]
+        there.y = K[Y, lane] + moved[1]
+        there.u = K[U, lane] + wp.float64(gain[0])
+        there.v = K[V, lane] + wp.float64(gain[1])
+        there.omega = K[OMEGA, lane] + wp.float64(gain[2])
+        there_x, there_y = turned(half_length * K[COSINE, lane], half_length * K[SINE, lane], moved[2])
+        there.arm_x = there_x
+        there.arm_y = there_y
+        inverse_mass = K[layout.INVERSE_MASS, run.column]
+        inverse_inertia = K[layout.INVERSE_INERTIA, run.column]
+        ax, ay, turn = acceleration(constants(K), lane, there, inverse_mass, inverse_inertia)
+        return vec3(real(ax), real(ay), real(turn))
+
+    @wp.func
+    def attempt(run: Run, common: Stage, step: wp.float64, inverse_tolerance: real):
+        K = run.K
+        S = run.S
+        lane = run.lane
+        exchange = run.exchange
+        h = real(step)
+        stage = common
+        stage.h = h
+        cosine = K[COSINE, lane]
+        sine = K[SINE, lane]
+        half_length = real(constants(K).half_length)
+        start_x = half_length * real(cosine)
+        start_y = half_length * real(sine)
+        u = real(K[U, lane])
+        v = real(K[V, lane])
+        omega = real(K[OMEGA, lane])
+        own = kept_joint(run, lane)
+        before = Joint()
+        spin_turn = read_pair(S, wp.static(SPIN_TURN * block_dim) + lane)
+        push = read_pair(S, wp.static(PUSH * block_dim) + lane)
+        friction = read_pair(S, wp.static(FRICTION * block_dim) + lane)
+        friction_before = read_pair(S, wp.static(FRICTION * block_dim) + run.before)
+        plane = plane_felt(run)
+        rates = Stages()
+        rates[0] = vec3(push[0], push[1], spin_turn[1])
+        if wp.static(has_load):
+            rates[0] += load(run, plane, real(0.0), vec3(), vec3(), start_x, start_y)
+        own_force_x = start_force(stage, own.x, own.u)
+        own_force_y = start_force(stage, own.y, own.v)
+        force_before_x = real(0.0)
+        force_before_y = real(0.0)
+        result = Attempt()
+        if wp.static(weights[0] != 0.0):
+            powers = read_pair(S, wp.static(POWERS * block_dim) + lane)
+            result.friction = wp.static(real(weights[0])) * powers[0]
+            result.damping = wp.static(real(weights[0])) * powers[1]
+        for s in range(1, wp.static(stages)):
+            sums = vec3()
+            ways = vec3()
+            for j in range(wp.static(s)):
+                if wp.static(velocity[s][j] != 0.0):
+                    sums += wp.static(real(velocity[s][j])) * rates[j]
+                if wp.static(position[s][j] != 0.0):
+                    ways += wp.static(real(position[s][j])) * rates[j]
+            stage.even = wp.static(real(nodes[s])) * h
+            if wp.static(s == last):  # of the new state the openings are needed as well: plain ways of the ends
+                stage.stiffness = real(1.0)
+                stage.damping = real(0.0)
+            moved = displace(
+                stage, start_x, start_y, omega, sums[0], sums[1], sums[2], ways[0], ways[1], ways[2]
+            )
+            write_pair(exchange, wp.static(pairs(s, LEFT)) + lane, moved.left_x, moved.left_y)
+            write_pair(exchange, wp.static(pairs(s, RIGHT)) + lane, moved.right_x, moved.right_y)
+            write_one(exchange, wp.static(turns(s)) + lane, moved.spin)
+            if wp.static(s == last or weights[s] != 0.0):
+                write_pair(exchange, wp.static(pairs(s, LEFT_RATE)) + lane, moved.left_u, moved.left_v)
+            if wp.static(s == last):
+                write_pair(exchange, wp.static(pairs(s, RIGHT_RATE)) + lane, moved.right_u, moved.right_v)
+                ways = (h * h) * ways
+                gain = h * sums
+                if wp.static(not has_load):
+                    fall = h * real(constants(K).gravity)
+                    gain[1] = gain[1] - fall
+                    ways[1] = ways[1] - real(0.5) * h * fall
+                result.gain = gain
+                turn = step * K[OMEGA, lane] + wp.float64(ways[2])
+                x = K[X, lane] + (step * K[U, lane] + wp.float64(ways[0]))
+                y = K[Y, lane] + (step * K[V, lane] + wp.float64(ways[1]))
+                result.place = vec3d(x, y, K[THETA, lane] + turn)
+                # direction: to the second power of the turn in double precision, higher ones in that of stages
+                delta = real(turn)
+                z = delta * delta
+                _versine, lag = small_turn(delta)
+                quartic = z * z * (wp.static(real(1 / 24)) - z * (wp.static(real(1 / 720)) - z * wp.static(real(1 / 40320))))
+                half = HALF * turn
+                more_cosine = real(cosine) * quartic + real(sine) * lag
+                more_sine = real(sine) * quartic - real(cosine) * lag
+                result.cosine = (cosine - turn * (sine + half * cosine)) + wp.float64(more_cosine)
+                result.sine = (sine + turn * (cosine - half * sine)) + wp.float64(more_sine)
+            barrier()
+            if wp.static(s == 1):
+                before = kept_joint(run, run.before)
+                force_before_x = start_force(stage, before.x, before.u)
+                force_before_y = start_force(stage, before.y, before.v)
+            next_end = read_pair(exchange, wp.static(pairs(s, LEFT)) + run.after)
+            end_before = read_pair(exchange, wp.static(pairs(s, RIGHT)) + run.before)
+            spin = own.spin + (moved.spin - read_one(exchange, wp.static(turns(s)) + run.after))
+            spin_before = before.spin + (read_one(exchange, wp.static(turns(s)) + run.before) - moved.spin)
+            if wp.static(s < last):
+                torque = torque_of(stage, friction[0], friction[1], spin)
+                rates[s] = pushed(
+                    run,
+                    moved.arm_x,
+                    moved.arm_y,
+                    force(stage, force_before_x, before.u, moved.left_x, end_before[0]),
+                    force(stage, force_before_y, before.v, moved.left_y, end_before[1]),
+                    torque_of(stage, friction_before[0], friction_before[1], spin_before),
+                    force(stage, own_force_x, own.u, next_end[0], moved.right_x),
+                    force(stage, own_force_y, own.v, next_end[1], moved.right_y),
+                    torque,
+                )
+                if wp.static(has_load):
+                    rates[s] += load(run, plane, stage.even, h * sums, (h * h) * ways, moved.arm_x, moved.arm_y)
+                if wp.static(weights[s] != 0.0):
+                    next_rate = read_pair(exchange, wp.static(pairs(s, LEFT_RATE)) + run.after)
+                    rate_x = own.u + (next_rate[0] - moved.right_u)
+                    rate_y = own.v + (next_rate[1] - moved.right_v)
+                    result.friction += wp.static(real(weights[s])) * (torque * spin)
+                    result.damping += wp.static(real(weights[s])) * (rate_x * rate_x + rate_y * rate_y)
+            else:
+                next_rate = read_pair(exchange, wp.static(pairs(s, LEFT_RATE)) + run.after)
+                rate_before = read_pair(exchange, wp.static(pairs(s, RIGHT_RATE)) + run.before)
+                joint = Joint()
+                joint.x = own.x + (h * own.u + (next_end[0] - moved.right_x))
+                joint.y = own.y + (h * own.v + (next_end[1] - moved.right_y))
+                joint.u = own.u + (next_rate[0] - moved.right_u)
+                joint.v = own.v + (next_rate[1] - moved.right_v)
+                joint.spin = spin
+                left = Joint()
+                left.x = before.x + (h * before.u + (moved.left_x - end_before[0]))
+                left.y = before.y + (h * before.v + (moved.left_y - end_before[1]))
+                left.u = before.u + (moved.left_u - rate_before[0])
+                left.v = before.v + (moved.left_v - rate_before[1])
+                left.spin = spin_before
+                last_push, torque = pushed_by(run, common, moved.arm_x, moved.arm_y, left, joint)
+                result.push = last_push
+                result.joint = joint
+                result.last_friction = torque * spin
+                result.last_damping = joint.u * joint.u + joint.v * joint.v
+                if wp.static(weights[s] != 0.0):
+                    result.friction += wp.static(real(weights[s])) * result.last_friction
+                    result.damping += wp.static(real(weights[s])) * result.last_damping
+                rates[s] = last_push
+                if wp.static(has_load):
+                    rates[s] += load(run, plane, h, gain, ways, moved.arm_x, moved.arm_y)
+                result.opening = wp.float32(joint.x * joint.x + joint.y * joint.y)
+                errors = vec3()
+                for j in range(wp.static(stages)):
+                    if wp.static(velocity_errors[j] != 0.0):
+                        errors += wp.static(real(velocity_errors[j])) * rates[j]
+                error = wp.static(algebra.error_ratio)(
+                    stage, errors[0], errors[1], errors[2], u, v, omega,
+                    rates[0][0], rates[0][1], rates[0][2], delta, inverse_tolerance
+                )
+                result.error = order_bits_single(wp.float32(error))
+        u += result.gain[0]
+        v += result.gain[1]
+        w = half_length * (omega + result.gain[2])
+        result.speed = wp.float32(real(2.0) * (u * u + v * v + w * w))
+        return result
+
+    @wp.func
+    def accept(run: Run, result: Attempt, step: wp.float64):
+        K = run.K
+        lane = run.lane
+        # all is read before anything is written, so that threads wait for memory once
+        u = K[U, lane] + wp.float64(result.gain[0])
+        v = K[V, lane] + wp.float64(result.gain[1])
+        omega = K[OMEGA, lane] + wp.float64(result.gain[2])
+        friction = K[layout.BOARD_LOST_FRICTION, lane] + step * wp.float64(result.friction)
+        dissipation = constants(K).joint_damping * wp.float64(result.damping)
+        damping = K[layout.BOARD_LOST_DAMPING, lane] + step * dissipation
+        put(K, X, lane, result.place)
+        put(K, U, lane, vec3d(u, v, omega))
+        put(K, COSINE, lane, wp.vec2d(result.cosine, result.sine))
+        K[layout.BOARD_LOST_FRICTION, lane] = friction
+        K[layout.BOARD_LOST_DAMPING, lane] = damping
+        keep_joint(run, result.joint, result.push[2])
+        keep_rates(run, result.push, result.last_friction, result.last_damping)
+
+    @wp.func
+    def renew_direction(run: Run):
+        cosine, sine = cos_sin(run.K[THETA, run.lane])
+        put(run.K, COSINE, run.lane, wp.vec2d(cosine, sine))
+
+    @wp.func
+    def start_is_finite(run: Run):
+        finite = bool(True)
+        for row in range(6):
+            finite = finite and wp.isfinite(run.K[row, run.lane])
+        for part in range(wp.static(PUSH + 1)):
+            pair = read_pair(run.S, part * wp.static(block_dim) + run.lane)
+            finite = finite and wp.isfinite(pair[0]) and wp.isfinite(pair[1])
+        return finite
+
+    @wp.func
+    def opening(run: Run):
+        pair = read_pair(run.S, wp.static(OPENING * block_dim) + run.lane)
+        return wp.float32(pair[0] * pair[0] + pair[1] * pair[1])
+
+    @wp.func
+    def kept_start(run: Run):
+        """Where the start lies between launches: in the scratch, in rows of the board that need not be kept."""
+        return address_on_board(run.kept, wp.static(layout.MASS) * run.kept.shape[1])
+
+    @wp.func
+    def load_start(run: Run):
+        if wp.static(is_shared):
+            for part in range(wp.static(KEPT)):
+                pair = vec2()
+                if run.lane < run.links:
+                    pair = read_pair(kept_start(run), part * run.kept.shape[1] + run.lane)
+                write_pair(run.S, part * wp.static(block_dim) + run.lane, pair[0], pair[1])
+
+    @wp.func
+    def store_start(run: Run):
+        if wp.static(is_shared):
+            for part in range(wp.static(KEPT)):
+                pair = read_pair(run.S, part * wp.static(block_dim) + run.lane)
+                if run.lane < run.links:
+                    write_pair(kept_start(run), part * run.kept.shape[1] + run.lane, pair[0], pair[1])
+
+    functions = (write_constants, stage_of, begin, attempt, accept, renew_direction, start_is_finite, opening)
+    return BlockSteps(*functions, load_start, store_start)
