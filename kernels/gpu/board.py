@@ -2,7 +2,6 @@
 
 import warp as wp
 
-from warpchain.kernels import layout
 from warpchain.kernels.gpu.stage import Run, read_link
 from warpchain.kernels.layout import BOARD_VALUES, COSINE, LEFT_X, THETA, X
 from warpchain.kernels.physics.elementary import ZERO, cos_sin

@@ -158,7 +158,15 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
 
     @wp.func
     def pushed(
-        run: Run, arm_x: real, arm_y: real, left_x: real, left_y: real, left: real, right_x: real, right_y: real, right: real
+        run: Run,
+        arm_x: real,
+        arm_y: real,
+        left_x: real,
+        left_y: real,
+        left: real,
+        right_x: real,
+        right_y: real,
+        right: real,
     ):
         """Accelerations of a link by forces and torques of its joints."""
         inertial = read_pair(run.S, wp.static(INERTIAL * block_dim) + run.lane)
@@ -289,9 +297,7 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
             if wp.static(s == last):  # of the new state the openings are needed as well: plain ways of the ends
                 stage.stiffness = real(1.0)
                 stage.damping = real(0.0)
-            moved = displace(
-                stage, start_x, start_y, omega, sums[0], sums[1], sums[2], ways[0], ways[1], ways[2]
-            )
+            moved = displace(stage, start_x, start_y, omega, sums[0], sums[1], sums[2], ways[0], ways[1], ways[2])
             write_pair(exchange, wp.static(pairs(s, LEFT)) + lane, moved.left_x, moved.left_y)
             write_pair(exchange, wp.static(pairs(s, RIGHT)) + lane, moved.right_x, moved.right_y)
             write_one(exchange, wp.static(turns(s)) + lane, moved.spin)
@@ -314,7 +320,9 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
                 delta = real(turn)
                 z = delta * delta
                 _versine, lag = small_turn(delta)
-                quartic = z * z * (wp.static(real(1 / 24)) - z * (wp.static(real(1 / 720)) - z * wp.static(real(1 / 40320))))
+                quartic = (
+                    z * z * (wp.static(real(1 / 24)) - z * (wp.static(real(1 / 720)) - z * wp.static(real(1 / 40320))))
+                )
                 half = HALF * turn
                 more_cosine = real(cosine) * quartic + real(sine) * lag
                 more_sine = real(sine) * quartic - real(cosine) * lag
@@ -382,8 +390,18 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
                     if wp.static(velocity_errors[j] != 0.0):
                         errors += wp.static(real(velocity_errors[j])) * rates[j]
                 error = wp.static(algebra.error_ratio)(
-                    stage, errors[0], errors[1], errors[2], u, v, omega,
-                    rates[0][0], rates[0][1], rates[0][2], delta, inverse_tolerance
+                    stage,
+                    errors[0],
+                    errors[1],
+                    errors[2],
+                    u,
+                    v,
+                    omega,
+                    rates[0][0],
+                    rates[0][1],
+                    rates[0][2],
+                    delta,
+                    inverse_tolerance,
                 )
                 result.error = order_bits_single(wp.float32(error))
         u += result.gain[0]

@@ -85,7 +85,9 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         K = run.K
         lane = run.lane
         turning = constants(K).half_length * K[layout.OMEGA, lane]
-        speed = TWO * (K[layout.U, lane] * K[layout.U, lane] + K[layout.V, lane] * K[layout.V, lane] + turning * turning)
+        speed = TWO * (
+            K[layout.U, lane] * K[layout.U, lane] + K[layout.V, lane] * K[layout.V, lane] + turning * turning
+        )
         place = vec3d(K[layout.X, lane], K[layout.Y, lane], K[layout.THETA, lane])
         cosine = K[layout.COSINE, lane]
         write_proximity(run, place, cosine, K[layout.SINE, lane], opening_of(run), wp.float32(speed))
@@ -202,9 +204,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     later = stop_time
                 plane.begin_step(run, h)
                 result = attempt(run, common, h, inverse_tolerance)
-                own_gap = write_proximity(
-                    run, result.place, result.cosine, result.sine, result.opening, result.speed
-                )
+                own_gap = write_proximity(run, result.place, result.cosine, result.sine, result.opening, result.speed)
                 error = wp.cast(greatest(errors, lane, wp.where(lane < run.links, result.error, 0)), wp.float32)
                 attempts += 1
                 if error <= wp.float32(1.0):

@@ -18,7 +18,6 @@ from warpchain.kernels.gpu.threads import barrier_count
 from warpchain.kernels.gpu.upright import BlockPlane
 from warpchain.kernels.types import Control, Drive, State
 
-
 MARGIN = wp.constant(wp.float32(1.0 + 2e-6))
 """More than the roundings of lengths in single precision."""
 

@@ -14,10 +14,15 @@ from warpchain.kernels.gpu.board import ends_of
 from warpchain.kernels.gpu.stage import Proximity, Run, constants, felt_plane, read_link
 from warpchain.kernels.gpu.threads import block_maxima, vec4i
 from warpchain.kernels.layout import COSINE, INVERSE_INERTIA, INVERSE_MASS, RADIUS, SINE, U
-from warpchain.kernels.methods.controller import quick_quotient, quick_root
-from warpchain.kernels.physics.elementary import TWO, from_order_key_single, order_bits_single, order_key_single
+from warpchain.kernels.methods.controller import quick_root
+from warpchain.kernels.physics.elementary import (
+    from_order_key_single,
+    order_bits_single,
+    order_key_single,
+    quick_quotient,
+)
 from warpchain.kernels.physics.geometry import Link, put
-from warpchain.kernels.types import Chain, Control, Drive, with_circles
+from warpchain.kernels.types import Drive, with_circles
 
 OPENING_MARGIN = wp.constant(wp.float64(1.0 + 1e-6))
 vec3d = wp.types.vector(length=3, dtype=wp.float64)
@@ -75,7 +80,9 @@ def block_proximity(features: Features, block_dim: int):
     _maximum, write_maxima, read_maxima = block_maxima(block_dim)
 
     @wp.func
-    def write_proximity(run: Run, place: vec3d, cosine: wp.float64, sine: wp.float64, opening: wp.float32, speed: wp.float32):
+    def write_proximity(
+        run: Run, place: vec3d, cosine: wp.float64, sine: wp.float64, opening: wp.float32, speed: wp.float32
+    ):
         """Writes a link's share of the maxima, compared in single precision; returns its gap [m] to floor or sprocket.
 
         ``opening`` and ``speed``: squares of the opening of its right joint and of a bound on its speed.
