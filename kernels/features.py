@@ -20,8 +20,8 @@ class Features:
     # whether the plane of the chain may move, see :mod:`physics.plane`; with an explicit method only
     tilts: bool = False
     load: str = "weight"  # a key of :data:`physics.load.LOADS`
-    mixed: bool = False  # whether stages are in single precision, see :mod:`physics.increments`
     moving_sprocket: bool = False  # whether the sprocket is there as well, above a floor, and moves
+    is_mixed: bool = False  # whether stages on springs are in single precision, see :mod:`physics.increments`
 
     @property
     def is_driven(self) -> bool:

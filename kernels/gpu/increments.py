@@ -38,7 +38,7 @@ vec3d = wp.types.vector(length=3, dtype=wp.float64)
 
 def real_of(features: Features) -> Any:
     """Type of the numbers of stages."""
-    return wp.float32 if features.mixed else wp.float64
+    return wp.float32 if features.is_mixed else wp.float64
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class BlockSteps:
     stage_of: Any  # ``(run)`` → what all stages have in common until the chain's constants change
     begin: Any  # ``(run, stage, keeps rates)`` forms the joints from the state on the board; a barrier has passed
     attempt: Any  # ``(run, stage, h, 1/tolerance)`` → Attempt
-    accept: Any  # ``(run, Attempt, h)`` writes a link's new state, the losses of its joint, and the next start
+    accept: Any  # ``(run, Attempt)`` writes a link's new state, the losses of its joint, and the next start
     renew_direction: Any  # ``(run)`` forms a link's direction anew from its angle
     start_is_finite: Any  # ``(run)``: false if a link's state or start are not finite
     opening: Any  # ``(run)`` → square of the opening of a link's right joint at the start [m²]
@@ -65,7 +65,7 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
     algebra = increments(real)
     Stage, Joint, PlaneMotion = algebra.Stage, algebra.Joint, algebra.PlaneMotion
     displace, force, torque_of, start_force = algebra.displace, algebra.force, algebra.torque, algebra.start_force
-    small_turn = turn_single if features.mixed else turn_double
+    small_turn = turn_single if features.is_mixed else turn_double
     write_pair, read_pair, write_one, read_one = number_memory(real)
     is_shared = shares_board(block_dim)
     acceleration = features.acceleration
@@ -103,7 +103,7 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
         cosine: wp.float64
         sine: wp.float64
         gain: vec3  # change of the velocities
-        friction: real  # mean powers lost
+        friction: real  # lost in the joint [J]
         damping: real
         joint: Joint
         push: vec3  # accelerations by the joints
@@ -407,20 +407,21 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
         u += result.gain[0]
         v += result.gain[1]
         w = half_length * (omega + result.gain[2])
+        result.friction = h * result.friction
+        result.damping = h * (common.damping * result.damping)
         result.speed = wp.float32(real(2.0) * (u * u + v * v + w * w))
         return result
 
     @wp.func
-    def accept(run: Run, result: Attempt, step: wp.float64):
+    def accept(run: Run, result: Attempt):
         K = run.K
         lane = run.lane
         # all is read before anything is written, so that threads wait for memory once
         u = K[U, lane] + wp.float64(result.gain[0])
         v = K[V, lane] + wp.float64(result.gain[1])
         omega = K[OMEGA, lane] + wp.float64(result.gain[2])
-        friction = K[layout.BOARD_LOST_FRICTION, lane] + step * wp.float64(result.friction)
-        dissipation = constants(K).joint_damping * wp.float64(result.damping)
-        damping = K[layout.BOARD_LOST_DAMPING, lane] + step * dissipation
+        friction = K[layout.BOARD_LOST_FRICTION, lane] + wp.float64(result.friction)
+        damping = K[layout.BOARD_LOST_DAMPING, lane] + wp.float64(result.damping)
         put(K, X, lane, result.place)
         put(K, U, lane, vec3d(u, v, omega))
         put(K, COSINE, lane, wp.vec2d(result.cosine, result.sine))

@@ -162,7 +162,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         proximity = measure_proximity(run)
         pairs, reach, status, spare = begin_contacts(run, state, control, proximity)
         time = state.time[world]
-        step = state.step[world]
+        step = wp.float32(state.step[world])  # and its length is exact in single precision
         last_error = wp.float32(state.last_error[world])
         attempts_before = attempts_made(state, world)
         attempts_left = int(wp.min(wp.int64(control.attempts), control.step_limit - attempts_before))
@@ -172,6 +172,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         accepted = int(0)
         since = int(state.counts[world, layout.ACCEPTED] % wp.int64(wp.static(renewed)))
         opening = wp.float32(0.0)
+        smallest_step = wp.float32(control.smallest_step)
         barrier()
         while status == RUNNING and attempts < attempts_left:
             if time >= K[wp.static(layout.BOARD_VALUES), layout.VALUE_NEXT_SAMPLE]:
@@ -188,16 +189,17 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 break
             # steps until there is something else to do
             mark = wp.min(stop_time, K[wp.static(layout.BOARD_VALUES), layout.VALUE_NEXT_SAMPLE])
-            contact_step = K[wp.static(layout.BOARD_VALUES), layout.VALUE_CONTACT_STEP]
+            contact_step = wp.float32(K[wp.static(layout.BOARD_VALUES), layout.VALUE_CONTACT_STEP])
             inverse_tolerance = real(ONE / K[wp.static(layout.BOARD_VALUES), layout.VALUE_TOLERANCE])
             error = wp.float32(0.0)
             own_gap = wp.float32(0.0)
             is_near = bool(False)
             goes_on = bool(True)
             while goes_on:
-                h = step
+                length = step
                 if wp.static(has_contacts):
-                    h = wp.min(h, wp.max(contact_step, wp.float64(reach)))
+                    length = wp.min(length, wp.max(contact_step, reach))
+                h = wp.float64(length)
                 later = time + h
                 if later >= stop_time:
                     h = stop_time - time
@@ -209,9 +211,9 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 attempts += 1
                 if error <= wp.float32(1.0):
                     accepted += 1
-                    accept(run, result, h)
+                    accept(run, result)
                     time = later
-                    step = next_step(step, h, wp.float64(growth(error, last_error, control.proportional)))
+                    step = next_step(step, length, growth(error, last_error, control.proportional))
                     last_error = wp.max(error, wp.float32(1e-4))
                     proximity = read_proximity(run)
                     opening = wp.max(opening, proximity.opening)
@@ -220,8 +222,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     since += 1
                     goes_on = not (is_near or time >= mark or since == wp.static(renewed))
                 elif wp.isfinite(error):
-                    step = h * wp.float64(shrinkage(error))
-                    goes_on = step >= control.smallest_step
+                    step = length * shrinkage(error)
+                    goes_on = step >= smallest_step
                 else:
                     goes_on = bool(False)
                 goes_on = goes_on and attempts < attempts_left
@@ -242,10 +244,10 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 if not wp.isfinite(error):
                     broken = wp.where(lane >= run.links or start_is_finite(run), 0, 1)
                     barrier()  # all have read the errors
-                    step = step * LEAST_SHRINKAGE
+                    step = step * wp.static(wp.float32(float(LEAST_SHRINKAGE)))
                     if greatest(errors, lane, broken) > 0:
                         status = int(NOT_FINITE)
-                if status == RUNNING and step < control.smallest_step:
+                if status == RUNNING and step < smallest_step:
                     status = int(STEP_TOO_SMALL)
         if status == RUNNING and attempts_made(state, world) + wp.int64(attempts) >= control.step_limit:
             status = int(STEP_LIMIT)
@@ -255,7 +257,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         if lane == 0:
             state.time_to_contact[world] = wp.float64(reach)
             state.time[world] = time
-            state.step[world] = step
+            state.step[world] = wp.float64(step)
             state.last_error[world] = wp.float64(last_error)
             state.status[world] = status
 

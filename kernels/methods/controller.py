@@ -1,6 +1,7 @@
 """Step control: the error ratio of an attempt, and the controllers that derive the next step from it."""
 
 import functools
+from typing import Any
 
 import warp as wp
 
@@ -48,7 +49,7 @@ def quick_root(x: wp.float32) -> wp.float32:
 
 
 @wp.func
-def next_step(step: wp.float64, h: wp.float64, factor: wp.float64):
+def next_step(step: Any, h: Any, factor: Any):
     """Step [s] to propose after an accepted one of h. A shortened step must not lower the proposal it was cut from."""
     proposal = h * factor
     return wp.where(h < step, wp.max(step, proposal), proposal)

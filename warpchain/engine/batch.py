@@ -259,7 +259,8 @@ class Batch:
     def features(self, **wanted: Any) -> Features:
         """What the kernel of these worlds is compiled for; ``wanted``: what the options do not say."""
         options = self.options
-        return Features(options.method, self.columns, self_contact=options.self_contact, **wanted)
+        own = {"self_contact": options.self_contact, "is_mixed": options.is_mixed}
+        return Features(options.method, self.columns, **own | wanted)
 
     @property
     def attempts_of_launch(self) -> int:

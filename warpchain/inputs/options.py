@@ -101,8 +101,17 @@ class Options(Section):
     soften_drive: bool = False
     """whether joints are softened on the sprocket: softest until it has spun up, then at least soft; within 0.03 s
     after the release they return to their own values"""
+    precision: Literal["double", "mixed"] | None = None
+    """of the stages of steps on springs: double, or mixed: single precision for changes within a step, the state in
+    double precision; null: mixed if tolerance is at least 1e-5, else double"""
     device: Annotated[str, AfterValidator(_supported_device)] = "cpu"
     """where walks run: cpu, cuda (the first GPU) or cuda:N"""
+
+    @property
+    def is_mixed(self) -> bool:
+        """Whether stages of steps are in single precision."""
+        tolerances = (self.tolerance, self.soft_tolerance or self.tolerance)
+        return on_gpu(self.device) and (self.precision or ("mixed" if min(tolerances) >= 1e-5 else "double")) == "mixed"
 
     @model_validator(mode="before")
     @classmethod

@@ -64,7 +64,8 @@ def phase_features(setup: Setup) -> dict[str, Features]:
     """What kernels are compiled for in those phases that a walk has: `driven`, `moving` (beside a sprocket), `free`."""
     scene, options = setup.scene, setup.options
     columns = layout.padded_width(scene.links)
-    features = partial(Features, options.method, columns, self_contact=options.self_contact)
+    own = {"self_contact": options.self_contact, "is_mixed": options.is_mixed}
+    features = partial(Features, options.method, columns, **own)
     body, tilts = setup.floor.body, scene.plane == "tilting"
     found = {"free": features(body, tilts=tilts)}
     if setup.has_drive:
