@@ -229,8 +229,8 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
         if wp.static(features.tilts):
             x = real(K[X, lane]) + (even * real(K[U, lane]) + way[0])
             y = real(K[Y, lane]) + (even * real(K[V, lane]) + way[1])
-            ax, ay, turn = wp.static(algebra.plane_load)(plane, x, y, arm_x, arm_y)
-            return vec3(ax, ay, turn)
+            fall_x, fall_y, fall_turn = wp.static(algebra.plane_load)(plane, x, y, arm_x, arm_y)
+            return vec3(fall_x, fall_y, fall_turn)
         time = wp.float64(even)
         moved = time * three(K, U, lane) + wp.vec3d(wp.float64(way[0]), wp.float64(way[1]), wp.float64(way[2]))
         half_length = constants(K).half_length
