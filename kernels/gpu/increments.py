@@ -1,8 +1,8 @@
 """Steps in increments on a GPU: one thread per link, stages in registers, see :mod:`physics.increments`.
 
-What stages need of the start of a step, the joints and the accelerations there, lies in memory of the block. An accepted
-step carries it on by its own increments; every ``RENEWED`` steps, and after impulses, joints are formed anew from the
-state in double precision. A thread evaluates the joints at both ends of its link, so that a stage takes one barrier.
+What stages need of the start of a step, its joints and accelerations, lies in memory of the block. An accepted step
+carries it on by its own increments; every ``RENEWED`` steps, and after impulses, joints are formed anew from the state
+in double precision. A thread evaluates the joints at both ends of its link, so that a stage takes one barrier.
 """
 
 import functools

@@ -26,7 +26,10 @@ def error_scale(value: wp.float64, rate: wp.float64, h: wp.float64):
 
 @wp.func_native("""
 #if defined(__CUDA_ARCH__)
-    return __powf(x, y);
+    float power;
+    asm("lg2.approx.ftz.f32 %0, %1;" : "=f"(power) : "f"(x));
+    asm("ex2.approx.ftz.f32 %0, %1;" : "=f"(power) : "f"(y * power));
+    return power;
 #else
     return ::powf(x, y);
 #endif

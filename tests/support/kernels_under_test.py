@@ -25,8 +25,8 @@ from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.cpu.contacts.neighbour_list import list_slack, neighbour_list
 from warpchain.kernels.cpu.contacts.proximity import fixed_contacts, greatest_opening
 from warpchain.kernels.cpu.contacts.self_contacts import self_contacts
-from warpchain.kernels.cpu.explicit import place_ends
 from warpchain.kernels.cpu.loop import load_state
+from warpchain.kernels.cpu.placing import place_ends
 from warpchain.kernels.features import COMPILER_FLAGS
 from warpchain.kernels.types import Model, State, read_ground
 
@@ -170,7 +170,7 @@ class ContactPass:
         for name, rows in (("faces", floor.faces()), ("cells", floor.cells(*sizes))):
             same = np.repeat(rows[None], len(chains), axis=0)
             setattr(self.model, name, wp.array(same, dtype=wp.float64, device=DEVICE))
-        worlds, rows, size = len(chains), layout.scratch_rows(0), list_layout(self.columns).size
+        worlds, rows, size = len(chains), layout.SCRATCH_ROWS, list_layout(self.columns).size
         self.state = State()
         self.state.load_factor = wp.ones(worlds, dtype=wp.float64, device=DEVICE)
         self.state.links = poisoned(worlds, 6, max(self.links))

@@ -15,8 +15,8 @@ from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.terrain import Face
-from warpchain.kernels.cpu.explicit import place_ends
 from warpchain.kernels.cpu.loop import load_state
+from warpchain.kernels.cpu.placing import place_ends
 from warpchain.kernels.cpu.tilting import resolve_tilting_floor, tilting_gap, write_plane_sums
 from warpchain.kernels.physics.plane import on_plane
 from warpchain.kernels.types import Ground, Model, State
@@ -128,7 +128,7 @@ def floor_pass(
     links = len(position)
     columns = layout.padded_width(links)
     model, state = chain_on_cpu(position, velocity, parameters)
-    scratch = poisoned(1, layout.scratch_rows(0), columns)
+    scratch = poisoned(1, layout.SCRATCH_ROWS, columns)
     values = np.full((1, layout.PLANE_ROWS), np.nan)
     values[0, : layout.PLANE_VALUES] = row_of(plane)
     planes = wp.array(values, dtype=wp.float64, device=DEVICE)

@@ -158,7 +158,7 @@ class Batch:
         self.control.frame_interval = frame_interval
 
         width = self.columns
-        rows = board_rows(self.threads, width) if self._gpu else scratch_rows(options.method, width)
+        rows = board_rows(self.threads, width) if self._gpu else scratch_rows(options.method, width, options.is_mixed)
         self.scratch = wp.zeros((worlds, rows, width), dtype=wp.float64, device=self.device.warp)
         self.lists = wp.zeros((worlds, list_layout(width).size), dtype=wp.int32, device=self.device.warp)
         self.bytes: int = self._numbers.bytes + self._recorded.bytes + self.scratch.capacity + self.lists.capacity

@@ -16,6 +16,12 @@ LONGEST_DRIVE_INTERVAL: Final = 2e-3
 
 TOLERANCES: Final[Mapping[str, Any]] = {"ge": 1e-13, "le": 1e-1}
 
+LEAST_MIXED: Final = 1e-6
+"""Least tolerance that steps in mixed precision follow: below it their rounding takes part in the error."""
+
+LEAST_MIXED_BY_DEFAULT: Final = 1e-5
+"""Least tolerance at which they are the default."""
+
 FIBERS: Final = "fibers"
 """Device that runs a GPU's kernels on a CPU, slowly, so that tests pass through all that the host does for a GPU."""
 
@@ -30,9 +36,9 @@ def replaced_by(options: Mapping[str, object]) -> set[str]:
 
     A method brings its own settings, and a tolerance also holds where joints are soft, as in a new walk.
     """
-    replaced = {"soft_tolerance"} if "tolerance" in options else set()
+    replaced = {"soft_tolerance", "precision"} if "tolerance" in options else set()
     if "method" in options:
-        replaced |= {"tolerance", "soft_tolerance"}.union(*METHODS_BY_NEED.values())
+        replaced |= {"tolerance", "soft_tolerance", "precision"}.union(*METHODS_BY_NEED.values())
     return replaced
 
 
@@ -49,6 +55,12 @@ def _supported_device(device: str) -> str:
     if not re.fullmatch(rf"cpu|cuda(:\d{{1,3}})?|{FIBERS}", device):
         raise ValueError(f"{shown(device)} is no device; give cpu, cuda or cuda:N")
     return device
+
+
+def _tightest(values: Mapping[str, object]) -> float:
+    """The lesser of a walk's tolerances on springs; what is no number is refused elsewhere."""
+    given = [values.get("tolerance", 1e-6), values.get("soft_tolerance")]
+    return min((float(value) for value in given if isinstance(value, int | float)), default=0.0)
 
 
 class Options(Section):
@@ -101,17 +113,16 @@ class Options(Section):
     soften_drive: bool = False
     """whether joints are softened on the sprocket: softest until it has spun up, then at least soft; within 0.03 s
     after the release they return to their own values"""
-    precision: Literal["double", "mixed"] | None = None
-    """of the stages of steps on springs: double, or mixed: single precision for changes within a step, the state in
-    double precision; null: mixed if tolerance is at least 1e-5, else double"""
+    precision: Literal["double", "mixed"] = "double"
+    """of steps on springs; mixed: changes within a step are in single precision, the state in double; default: mixed
+    if tolerance and soft_tolerance are at least 1e-5"""
     device: Annotated[str, AfterValidator(_supported_device)] = "cpu"
     """where walks run: cpu, cuda (the first GPU) or cuda:N"""
 
     @property
     def is_mixed(self) -> bool:
         """Whether stages of steps are in single precision."""
-        tolerances = (self.tolerance, self.soft_tolerance or self.tolerance)
-        return on_gpu(self.device) and (self.precision or ("mixed" if min(tolerances) >= 1e-5 else "double")) == "mixed"
+        return self.precision == "mixed"
 
     @model_validator(mode="before")
     @classmethod
@@ -128,12 +139,17 @@ class Options(Section):
             defaults["tolerance"] = BURST_TOLERANCE
         if "tolerance" in values:
             defaults.pop("soft_tolerance", None)  # an explicit tolerance is meant everywhere
-        return {**defaults, **{name: value for name, value in values.items() if name != "method"}}
+        all_values = {**defaults, **{name: value for name, value in values.items() if name != "method"}}
+        return {"precision": "mixed" if _tightest(all_values) >= LEAST_MIXED_BY_DEFAULT else "double", **all_values}
 
     @model_validator(mode="after")
     def _goes_together(self) -> Self:
         if on_gpu(self.device) and find_method(self.method).has_rigid_flight:
             raise InputError(f"method: {shown(self.method)} runs on a CPU only; give explicit, or device: cpu")
+        tightest = _tightest({"tolerance": self.tolerance, "soft_tolerance": self.soft_tolerance})
+        if self.precision == "mixed" and tightest < LEAST_MIXED:
+            problem = f"mixed does not follow a tolerance of {tightest:g}"
+            raise InputError(f"precision: {problem}; give double, or a tolerance of at least {LEAST_MIXED:g}")
         if self.smallest_step >= self.contact_step:
             raise InputError(f"smallest_step: {self.smallest_step} s is not below contact_step; give less")
         if self.soften_drive and self.record_interval > LONGEST_DRIVE_INTERVAL:

@@ -49,7 +49,7 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
 
     @wp.func
     def spare_of(run: Run):
-        """How far joints may move [m] before the list may be stale, with no joint open, see :func:`contacts.pair_list.slack_of`."""
+        """How far joints may move [m] before the list may be stale, if none is open: :func:`pair_list.slack_of`."""
         nearest = wp.cast(run.L[wp.static(lists.nearest)], wp.float32)
         return wp.float32(0.5) * nearest - wp.float32(constants(run.K).circle_radius)
 

@@ -69,10 +69,8 @@ def touching_link(run: Run) -> Touching:
 @functools.cache
 def block_proximity(features: Features, block_dim: int):
     """Warp functions (write_proximity, read_proximity, time_to_contact) for these features."""
-    has_floor = features.fixed_body == "floor"
     has_fixed = features.fixed_body != "none"
     has_self = features.self_contact
-    has_contacts = has_fixed or has_self
     if has_fixed:
         gap_of, _meet = link_and_body(features.fixed_body)
         face_of = BODIES[features.fixed_body].face

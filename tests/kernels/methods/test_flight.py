@@ -105,7 +105,7 @@ def test_error_falls_with_the_order_of_the_method(method, order, steps):
     errors = []
     for step in steps:
         # a skin beyond the floor makes the whole flight "near a contact", and the loose tolerance leaves the bound
-        near = {"tolerance": 0.1, "contact_step": step, "skin": 5.0}
+        near = {"tolerance": 0.1, "precision": "double", "contact_step": step, "skin": 5.0}
         flight = warpchain.simulate(SMOOTH, *start, duration, times=[duration], method=method, **near)
         assert flight.steps_rejected == 0
         # the first steps grow from 0.1 µs to h, each at most fivefold
