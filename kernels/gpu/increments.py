@@ -46,9 +46,9 @@ class BlockSteps:
     """Warp functions of the steps of a block, for all its threads."""
 
     write_constants: Any  # ``(run)`` rounds a link's constants, when those on the board have changed
-    stage_of: Any  # ``(run)`` → what all stages have in common until the chain's constants change
-    begin: Any  # ``(run, stage, keeps rates)`` forms the joints from the state on the board; a barrier has passed
-    attempt: Any  # ``(run, stage, h, 1/tolerance)`` → Attempt
+    common_of: Any  # ``(run)`` → what links and stages have in common until the chain's constants change
+    begin: Any  # ``(run, common, keeps rates)`` forms the joints from the state on the board; a barrier has passed
+    attempt: Any  # ``(run, common, h, 1/tolerance)`` → Attempt
     accept: Any  # ``(run, Attempt)`` writes a link's new state, the losses of its joint, and the next start
     renew_direction: Any  # ``(run)`` forms a link's direction anew from its angle
     start_is_finite: Any  # ``(run)``: false if a link's state or start are not finite
@@ -96,6 +96,14 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
         return buffer(s) + (8 if s == last else 6) * block_dim
 
     @wp.struct
+    class Common:
+        """What all links and stages have in common until the chain's constants change."""
+
+        stage: Stage
+        half_length: real  # [m]
+        gravity: real  # [m/s²]
+
+    @wp.struct
     class Attempt:
         """A finished attempt: the link's new state, and what it keeps there."""
 
@@ -127,8 +135,10 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
             write_pair(S, wp.static(INERTIAL * block_dim) + lane, real(1.0), real(1.0))
 
     @wp.func
-    def stage_of(run: Run) -> Stage:
-        return wp.static(algebra.stage_at)(constants(run.K), real(0.0), real(0.0))
+    def common_of(run: Run) -> Common:
+        chain = constants(run.K)
+        stage = wp.static(algebra.stage_at)(chain, real(0.0), real(0.0))
+        return Common(stage, real(chain.half_length), real(chain.gravity))
 
     @wp.func
     def keep_joint(run: Run, joint: Joint, turn: real):
@@ -195,7 +205,7 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
         return push, torque
 
     @wp.func
-    def begin(run: Run, stage: Stage, keeps_rates: bool):
+    def begin(run: Run, common: Common, keeps_rates: bool):
         K = run.K
         half_length = constants(K).half_length
         own = wp.static(algebra.begin_joint)(K, half_length, run.lane, run.after)
@@ -206,7 +216,7 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
             before = wp.static(algebra.begin_joint)(K, half_length, run.before, run.lane)
             arm_x = real(half_length * K[COSINE, run.lane])
             arm_y = real(half_length * K[SINE, run.lane])
-            push, torque = pushed_by(run, stage, arm_x, arm_y, before, own)
+            push, torque = pushed_by(run, common.stage, arm_x, arm_y, before, own)
             keep_joint(run, own, push[2])
             keep_rates(run, push, torque * own.spin, own.u * own.u + own.v * own.v)
 
@@ -249,17 +259,17 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
         return vec3(real(ax), real(ay), real(turn))
 
     @wp.func
-    def attempt(run: Run, common: Stage, step: wp.float64, inverse_tolerance: real):
+    def attempt(run: Run, common: Common, step: wp.float64, inverse_tolerance: real):
         K = run.K
         S = run.S
         lane = run.lane
         exchange = run.exchange
         h = real(step)
-        stage = common
+        stage = common.stage
         stage.h = h
         cosine = K[COSINE, lane]
         sine = K[SINE, lane]
-        half_length = real(constants(K).half_length)
+        half_length = common.half_length
         start_x = half_length * real(cosine)
         start_y = half_length * real(sine)
         u = real(K[U, lane])
@@ -308,7 +318,7 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
                 ways = (h * h) * ways
                 gain = h * sums
                 if wp.static(not has_load):
-                    fall = h * real(constants(K).gravity)
+                    fall = h * common.gravity
                     gain[1] = gain[1] - fall
                     ways[1] = ways[1] - real(0.5) * h * fall
                 result.gain = gain
@@ -373,7 +383,7 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
                 left.u = before.u + (moved.left_u - rate_before[0])
                 left.v = before.v + (moved.left_v - rate_before[1])
                 left.spin = spin_before
-                last_push, torque = pushed_by(run, common, moved.arm_x, moved.arm_y, left, joint)
+                last_push, torque = pushed_by(run, common.stage, moved.arm_x, moved.arm_y, left, joint)
                 result.push = last_push
                 result.joint = joint
                 result.last_friction = torque * spin
@@ -408,7 +418,7 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
         v += result.gain[1]
         w = half_length * (omega + result.gain[2])
         result.friction = h * result.friction
-        result.damping = h * (common.damping * result.damping)
+        result.damping = h * (common.stage.damping * result.damping)
         result.speed = wp.float32(real(2.0) * (u * u + v * v + w * w))
         return result
 
@@ -472,5 +482,5 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
                 if run.lane < run.links:
                     write_pair(kept_start(run), part * run.kept.shape[1] + run.lane, pair[0], pair[1])
 
-    functions = (write_constants, stage_of, begin, attempt, accept, renew_direction, start_is_finite, opening)
+    functions = (write_constants, common_of, begin, attempt, accept, renew_direction, start_is_finite, opening)
     return BlockSteps(*functions, load_start, store_start)

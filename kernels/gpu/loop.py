@@ -57,7 +57,6 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     is_shared = shares_board(block_dim)
     width = block_dim + 1
     kept_width = columns if is_shared else width
-    plane_offset = wp.uint64(8 * board_size(block_dim))
     board_doubles = board_size(block_dim) + layout.PLANE_ROWS * tilts if is_shared else 1
     touch = touch_layout(columns, block_dim, in_lists=not is_shared)
     touch_size = touch.size if is_shared else 1
@@ -70,7 +69,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     maxima_address = tile_address(vec4i, block_dim)
     write_proximity, read_proximity, _ = block_proximity(features, block_dim)
     steps = block_steps(features, block_dim)
-    stage_of, begin, attempt, accept = steps.stage_of, steps.begin, steps.attempt, steps.accept
+    common_of, begin, attempt, accept = steps.common_of, steps.begin, steps.attempt, steps.accept
     renew_direction, start_is_finite, opening_of = steps.renew_direction, steps.start_is_finite, steps.opening
     renewed = increments.RENEWED
     plane = block_tilting(block_dim, touch.votes) if tilts else block_upright(features.fixed_body)
@@ -133,7 +132,11 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         stored_plane = state.plane[world]
         P = stored_plane
         if wp.static(tilts):
-            P = wp.array(ptr=board_start + wp.static(plane_offset), shape=(layout.PLANE_ROWS,), dtype=wp.float64)
+            P = wp.array(
+                ptr=address_at(board_start, wp.static(8 * board_size(block_dim))),
+                shape=(layout.PLANE_ROWS,),
+                dtype=wp.float64,
+            )
         run = Run()
         run.ground = read_ground(model, world)
         run.world = world
@@ -156,7 +159,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         run = find_link(run, model.chains[world], lane)
 
         load_run(run, model, drive, state, control)
-        common = stage_of(run)
+        common = common_of(run)
         if state.is_fresh[world] != 0 or state.has_first_stage[world] == 0:
             begin(run, common, False)
         proximity = measure_proximity(run)
@@ -179,7 +182,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 changed, pauses, status = take_sample(run, model, drive, state, record, control, time)
                 if changed:
                     barrier()  # drag has changed velocities
-                    common = stage_of(run)
+                    common = common_of(run)
                     begin(run, common, False)
                 if pauses or status != RUNNING:
                     break

@@ -1,8 +1,8 @@
-"""GPU kernels equal CPU kernels.
+"""GPU kernels make the steps of CPU kernels.
 
 They run on CPU fibers here. Both are compiled without fused products and sums, which compilers choose differently. Then
-both do the same operations on the same numbers, so that steps of the same size must agree to the bit, including
-contacts resolved in parallel rounds.
+both do the same algebra on the same numbers, so that steps of the same size agree but for rounding, see :data:`NEARLY`,
+including contacts resolved in parallel rounds: in every impulse, and in all that a run decides.
 """
 
 import json
@@ -15,7 +15,10 @@ import warp as wp
 from tests.support.blocks_under_test import (
     FIXED_STEP,
     HILLS,
+    MIXED,
+    NEARLY,
     SOFT,
+    assert_close,
     assert_same,
     batch_of,
     floor_with,
@@ -40,14 +43,22 @@ pytestmark = pytest.mark.usefixtures("without_fused_operations")
 
 
 @pytest.mark.parametrize(
-    ("method", "fixed_body", "self_contact", "block_dim"),
-    [("bs32", "floor", False, LINKS), ("os32", "sprocket", True, 5 * LINKS), ("os32", "terrain", False, LINKS)],
+    ("method", "fixed_body", "self_contact", "block_dim", "precision"),
+    [
+        ("bs32", "floor", False, LINKS, "double"),
+        ("rkf78", "floor", False, LINKS, "double"),
+        ("os32", "sprocket", True, 5 * LINKS, "double"),
+        ("os32", "terrain", False, LINKS, "mixed"),
+        ("os32", "sprocket", True, 5 * LINKS, "mixed"),
+    ],
 )
-def test_fixed_steps_equal_a_cpu_kernel(method: str, fixed_body: str, self_contact: bool, block_dim: int) -> None:
-    """Forty steps with dozens of impulses of every kind end in the same state, to the bit."""
+def test_fixed_steps_equal_a_cpu_kernel(
+    method: str, fixed_body: str, self_contact: bool, block_dim: int, precision: str
+) -> None:
+    """Forty steps with dozens of impulses of every kind end in the same state, after the same impulses."""
     raised = 0.9 * SOFT.sprocket_radius if fixed_body == "sprocket" else 0.0
     chains = [heap(LINKS, 3, raised=raised), heap(min(40, block_dim), 18, tilt=np.pi, raised=raised)]
-    ours, theirs = (batch_of(chains, method=method, self_contact=self_contact) for _ in range(2))
+    ours, theirs = (batch_of(chains, method=method, self_contact=self_contact, precision=precision) for _ in range(2))
     for batch in (ours, theirs):
         for world in range(2):
             batch.set_floor(world, floor_with(HILLS, SOFT))
@@ -59,7 +70,7 @@ def test_fixed_steps_equal_a_cpu_kernel(method: str, fixed_body: str, self_conta
         assert counts["sprocket" if fixed_body == "sprocket" else "floor"] > 10
         assert (counts["self"] > 10) == self_contact
     assert (theirs.counts(1)["strands"] > 0) == self_contact
-    assert_same(ours, theirs)
+    assert_same(ours, theirs, MIXED if precision == "mixed" else NEARLY)
 
 
 @pytest.mark.parametrize("links", [LINKS, LINKS + 1])
@@ -131,10 +142,11 @@ def test_samples_frames_and_rest_equal_a_cpu_kernel() -> None:
     assert_same(ours, theirs)
     for name in ("first_sample", "last_sample"):
         expected = getattr(theirs.state, name).numpy()
-        assert np.array_equal(getattr(ours.state, name).numpy(), expected)
+        assert_close(getattr(ours.state, name).numpy(), expected, NEARLY)
     recorded, expected = ours.drain(1), theirs.drain(1)
     assert len(recorded.times) > 1 and recorded.loads.shape == (len(recorded.times), LINKS, 3)
-    assert all(map(np.array_equal, recorded, expected))
+    for our, their in zip(recorded, expected, strict=True):
+        assert_close(our, their, NEARLY)
 
 
 def test_frames_between_samples_equal_a_cpu_kernel() -> None:
@@ -156,10 +168,11 @@ def test_frames_between_samples_equal_a_cpu_kernel() -> None:
         runs.append(batch)
     ours, theirs, coarse = runs
     assert_same(ours, theirs)
-    assert_same(theirs, coarse)
+    assert_same(theirs, coarse, 0.0)
     recorded, expected, few = (batch.drain(1) for batch in runs)
-    assert np.array_equal(recorded.loads, expected.loads)
-    assert np.array_equal(recorded.times, expected.times) and np.array_equal(recorded.frames, expected.frames)
+    assert np.array_equal(recorded.times, expected.times)
+    assert_close(recorded.loads, expected.loads, NEARLY)
+    assert_close(recorded.frames, expected.frames, NEARLY)
     marks = np.floor(recorded.times / (2.5 * FIXED_STEP) + 1e-9)
     assert len(few.times) < 6 and len(marks) > 12 and np.all(np.diff(marks) >= 1)
 
