@@ -36,7 +36,7 @@ BOARD_LISTED_X, BOARD_LISTED_Y = 23, 24
 # Values of the whole chain, in the first columns of one more row; behind them its constants, see gpu.stage.constants.
 BOARD_VALUES = 25
 VALUE_OPENING, VALUE_FIXED_DEPTH, VALUE_STOP_TIME, VALUE_NEXT_SAMPLE, VALUE_DEADLINE = range(5)
-VALUE_CONTACT_STEP, VALUE_TOLERANCE = 5, 6
+VALUE_CONTACT_STEP, VALUE_INVERSE_TOLERANCE = 5, 6
 # What a sample finds: totals over the links, see events.summary, and what drag leaves of their velocities across the
 # path of the loop.
 VALUE_TOTALS, VALUE_DRAG = 7, 22

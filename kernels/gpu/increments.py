@@ -16,10 +16,11 @@ from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.functions import shares_board
 from warpchain.kernels.gpu.stage import Run, address_on_board, constants, felt_plane
 from warpchain.kernels.gpu.threads import barrier, number_memory
-from warpchain.kernels.layout import COSINE, COULOMB, OMEGA, SINE, THETA, VISCOUS, U, V, X, Y
+from warpchain.kernels.layout import COSINE, OMEGA, SINE, THETA, U, V, X, Y
 from warpchain.kernels.methods.method import find_method
+from warpchain.kernels.physics import geometry
 from warpchain.kernels.physics.elementary import HALF, cos_sin, order_bits_single
-from warpchain.kernels.physics.geometry import Link, put, three, turned
+from warpchain.kernels.physics.geometry import Link, three, turned
 from warpchain.kernels.physics.increments import increments, turn_double, turn_single
 
 # Pairs of numbers that a link keeps of the start of a step: opening of its right joint, the rate of that; accelerations
@@ -122,17 +123,24 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
         speed: wp.float32  # square of the greatest of any point of the link, at most [m²/s²]
 
     @wp.func
+    def put(run: Run, part: int, x: real, y: real):
+        """Writes a pair of a link."""
+        write_pair(run.S, part * wp.static(block_dim) + run.lane, x, y)
+
+    @wp.func
+    def get(run: Run, part: int, column: int):
+        """A pair of any link."""
+        return read_pair(run.S, part * wp.static(block_dim) + column)
+
+    @wp.func
     def write_constants(run: Run):
         K = run.K
-        S = run.S
         lane = run.lane
+        put(run, FRICTION, real(0.0), real(0.0))
+        put(run, INERTIAL, real(1.0), real(1.0))
         if lane < run.links:
-            write_pair(S, wp.static(FRICTION * block_dim) + lane, real(K[VISCOUS, lane]), real(K[COULOMB, lane]))
-            inverse_mass = real(K[layout.INVERSE_MASS, lane])
-            write_pair(S, wp.static(INERTIAL * block_dim) + lane, inverse_mass, real(K[layout.INVERSE_INERTIA, lane]))
-        else:
-            write_pair(S, wp.static(FRICTION * block_dim) + lane, real(0.0), real(0.0))
-            write_pair(S, wp.static(INERTIAL * block_dim) + lane, real(1.0), real(1.0))
+            put(run, FRICTION, real(K[layout.VISCOUS, lane]), real(K[layout.COULOMB, lane]))
+            put(run, INERTIAL, real(K[layout.INVERSE_MASS, lane]), real(K[layout.INVERSE_INERTIA, lane]))
 
     @wp.func
     def common_of(run: Run) -> Common:
@@ -141,84 +149,64 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
         return Common(stage, real(chain.half_length), real(chain.gravity))
 
     @wp.func
-    def keep_joint(run: Run, joint: Joint, turn: real):
-        """Keeps a link's right joint, and the link's angular acceleration."""
-        write_pair(run.S, wp.static(OPENING * block_dim) + run.lane, joint.x, joint.y)
-        write_pair(run.S, wp.static(RATE * block_dim) + run.lane, joint.u, joint.v)
-        write_pair(run.S, wp.static(SPIN_TURN * block_dim) + run.lane, joint.spin, turn)
-
-    @wp.func
-    def keep_rates(run: Run, push: vec3, friction: real, damping: real):
-        """Keeps the link's other accelerations, and the powers lost in its right joint."""
-        write_pair(run.S, wp.static(PUSH * block_dim) + run.lane, push[0], push[1])
-        write_pair(run.S, wp.static(POWERS * block_dim) + run.lane, friction, damping)
+    def keep(run: Run, joint: Joint, push: vec3, friction: real, damping: real):
+        """Keeps what a link knows of the start of the next step, but for its constants."""
+        put(run, OPENING, joint.x, joint.y)
+        put(run, RATE, joint.u, joint.v)
+        put(run, SPIN_TURN, joint.spin, push[2])
+        put(run, PUSH, push[0], push[1])
+        put(run, POWERS, friction, damping)
 
     @wp.func
     def kept_joint(run: Run, column: int) -> Joint:
-        opening = read_pair(run.S, wp.static(OPENING * block_dim) + column)
-        rate = read_pair(run.S, wp.static(RATE * block_dim) + column)
-        spin = read_pair(run.S, wp.static(SPIN_TURN * block_dim) + column)
-        joint = Joint()
-        joint.x = opening[0]
-        joint.y = opening[1]
-        joint.u = rate[0]
-        joint.v = rate[1]
-        joint.spin = spin[0]
-        return joint
+        opening = get(run, OPENING, column)
+        rate = get(run, RATE, column)
+        spin_turn = get(run, SPIN_TURN, column)
+        return Joint(opening[0], opening[1], rate[0], rate[1], spin_turn[0])
 
     @wp.func
-    def pushed(
-        run: Run,
-        arm_x: real,
-        arm_y: real,
-        left_x: real,
-        left_y: real,
-        left: real,
-        right_x: real,
-        right_y: real,
-        right: real,
-    ):
+    def kept_push(run: Run):
+        """Accelerations of a link by its joints at the start."""
+        push = get(run, PUSH, run.lane)
+        spin_turn = get(run, SPIN_TURN, run.lane)
+        return vec3(push[0], push[1], spin_turn[1])
+
+    @wp.func
+    def pull(run: Run, stage: Stage, joint: Joint, column: int):
+        """Force and torque of a joint in a known state."""
+        friction = get(run, FRICTION, column)
+        torque = torque_of(stage, friction[0], friction[1], joint.spin)
+        return vec3(start_force(stage, joint.x, joint.u), start_force(stage, joint.y, joint.v), torque)
+
+    @wp.func
+    def pushed(run: Run, arm_x: real, arm_y: real, left: vec3, right: vec3):
         """Accelerations of a link by forces and torques of its joints."""
-        inertial = read_pair(run.S, wp.static(INERTIAL * block_dim) + run.lane)
+        inertial = get(run, INERTIAL, run.lane)
         ax, ay, turn = wp.static(algebra.acceleration)(
-            inertial[0], inertial[1], arm_x, arm_y, left_x, left_y, left, right_x, right_y, right
+            inertial[0], inertial[1], arm_x, arm_y, left[0], left[1], left[2], right[0], right[1], right[2]
         )
         return vec3(ax, ay, turn)
-
-    @wp.func
-    def pushed_by(run: Run, stage: Stage, arm_x: real, arm_y: real, before: Joint, own: Joint):
-        """Likewise by joints in a known state, and the torque of the right one."""
-        friction_before = read_pair(run.S, wp.static(FRICTION * block_dim) + run.before)
-        friction = read_pair(run.S, wp.static(FRICTION * block_dim) + run.lane)
-        torque = torque_of(stage, friction[0], friction[1], own.spin)
-        push = pushed(
-            run,
-            arm_x,
-            arm_y,
-            start_force(stage, before.x, before.u),
-            start_force(stage, before.y, before.v),
-            torque_of(stage, friction_before[0], friction_before[1], before.spin),
-            start_force(stage, own.x, own.u),
-            start_force(stage, own.y, own.v),
-            torque,
-        )
-        return push, torque
 
     @wp.func
     def begin(run: Run, common: Common, keeps_rates: bool):
         K = run.K
         half_length = constants(K).half_length
         own = wp.static(algebra.begin_joint)(K, half_length, run.lane, run.after)
-        if keeps_rates:
-            spin_turn = read_pair(run.S, wp.static(SPIN_TURN * block_dim) + run.lane)
-            keep_joint(run, own, spin_turn[1])
-        else:
+        push = kept_push(run)
+        powers = get(run, POWERS, run.lane)
+        if not keeps_rates:
             before = wp.static(algebra.begin_joint)(K, half_length, run.before, run.lane)
+            left = pull(run, common.stage, before, run.before)
+            right = pull(run, common.stage, own, run.lane)
             arm_x = real(half_length * K[COSINE, run.lane])
             arm_y = real(half_length * K[SINE, run.lane])
-            push, torque = pushed_by(run, common.stage, arm_x, arm_y, before, own)
-            keep_joint(run, own, push[2])
-            keep_rates(run, push, torque * own.spin, own.u * own.u + own.v * own.v)
+            push = pushed(run, arm_x, arm_y, left, right)
+            powers = vec2(right[2] * own.spin, own.u * own.u + own.v * own.v)
+        keep(run, own, push, powers[0], powers[1])
+
+    @wp.func
+    def doubles(x: vec3):
+        return vec3d(wp.float64(x[0]), wp.float64(x[1]), wp.float64(x[2]))
 
     @wp.func
     def plane_felt(run: Run) -> PlaneMotion:
@@ -241,18 +229,12 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
             y = real(K[Y, lane]) + (even * real(K[V, lane]) + way[1])
             fall_x, fall_y, fall_turn = wp.static(algebra.plane_load)(plane, x, y, arm_x, arm_y)
             return vec3(fall_x, fall_y, fall_turn)
-        time = wp.float64(even)
-        moved = time * three(K, U, lane) + wp.vec3d(wp.float64(way[0]), wp.float64(way[1]), wp.float64(way[2]))
+        moved = wp.float64(even) * three(K, U, lane) + doubles(way)
+        motion = three(K, U, lane) + doubles(gain)
         half_length = constants(K).half_length
-        there = Link()
-        there.x = K[X, lane] + moved[0]
-        there.y = K[Y, lane] + moved[1]
-        there.u = K[U, lane] + wp.float64(gain[0])
-        there.v = K[V, lane] + wp.float64(gain[1])
-        there.omega = K[OMEGA, lane] + wp.float64(gain[2])
-        there_x, there_y = turned(half_length * K[COSINE, lane], half_length * K[SINE, lane], moved[2])
-        there.arm_x = there_x
-        there.arm_y = there_y
+        turned_x, turned_y = turned(half_length * K[COSINE, lane], half_length * K[SINE, lane], moved[2])
+        x_there = K[X, lane] + moved[0]
+        there = Link(x_there, K[Y, lane] + moved[1], motion[0], motion[1], motion[2], turned_x, turned_y)
         inverse_mass = K[layout.INVERSE_MASS, run.column]
         inverse_inertia = K[layout.INVERSE_INERTIA, run.column]
         ax, ay, turn = acceleration(constants(K), lane, there, inverse_mass, inverse_inertia)
@@ -261,7 +243,6 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
     @wp.func
     def attempt(run: Run, common: Common, step: wp.float64, inverse_tolerance: real):
         K = run.K
-        S = run.S
         lane = run.lane
         exchange = run.exchange
         h = real(step)
@@ -277,13 +258,11 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
         omega = real(K[OMEGA, lane])
         own = kept_joint(run, lane)
         before = Joint()
-        spin_turn = read_pair(S, wp.static(SPIN_TURN * block_dim) + lane)
-        push = read_pair(S, wp.static(PUSH * block_dim) + lane)
-        friction = read_pair(S, wp.static(FRICTION * block_dim) + lane)
-        friction_before = read_pair(S, wp.static(FRICTION * block_dim) + run.before)
+        friction = get(run, FRICTION, lane)
+        friction_before = get(run, FRICTION, run.before)
         plane = plane_felt(run)
         rates = Stages()
-        rates[0] = vec3(push[0], push[1], spin_turn[1])
+        rates[0] = kept_push(run)
         if wp.static(has_load):
             rates[0] += load(run, plane, real(0.0), vec3(), vec3(), start_x, start_y)
         own_force_x = start_force(stage, own.x, own.u)
@@ -292,7 +271,7 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
         force_before_y = real(0.0)
         result = Attempt()
         if wp.static(weights[0] != 0.0):
-            powers = read_pair(S, wp.static(POWERS * block_dim) + lane)
+            powers = get(run, POWERS, lane)
             result.friction = wp.static(real(weights[0])) * powers[0]
             result.damping = wp.static(real(weights[0])) * powers[1]
         for s in range(1, wp.static(stages)):
@@ -348,50 +327,52 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
             spin = own.spin + (moved.spin - read_one(exchange, wp.static(turns(s)) + run.after))
             spin_before = before.spin + (read_one(exchange, wp.static(turns(s)) + run.before) - moved.spin)
             if wp.static(s < last):
-                torque = torque_of(stage, friction[0], friction[1], spin)
-                rates[s] = pushed(
-                    run,
-                    moved.arm_x,
-                    moved.arm_y,
+                left = vec3(
                     force(stage, force_before_x, before.u, moved.left_x, end_before[0]),
                     force(stage, force_before_y, before.v, moved.left_y, end_before[1]),
                     torque_of(stage, friction_before[0], friction_before[1], spin_before),
+                )
+                right = vec3(
                     force(stage, own_force_x, own.u, next_end[0], moved.right_x),
                     force(stage, own_force_y, own.v, next_end[1], moved.right_y),
-                    torque,
+                    torque_of(stage, friction[0], friction[1], spin),
                 )
+                rates[s] = pushed(run, moved.arm_x, moved.arm_y, left, right)
                 if wp.static(has_load):
                     rates[s] += load(run, plane, stage.even, h * sums, (h * h) * ways, moved.arm_x, moved.arm_y)
                 if wp.static(weights[s] != 0.0):
                     next_rate = read_pair(exchange, wp.static(pairs(s, LEFT_RATE)) + run.after)
                     rate_x = own.u + (next_rate[0] - moved.right_u)
                     rate_y = own.v + (next_rate[1] - moved.right_v)
-                    result.friction += wp.static(real(weights[s])) * (torque * spin)
+                    result.friction += wp.static(real(weights[s])) * (right[2] * spin)
                     result.damping += wp.static(real(weights[s])) * (rate_x * rate_x + rate_y * rate_y)
             else:
                 next_rate = read_pair(exchange, wp.static(pairs(s, LEFT_RATE)) + run.after)
                 rate_before = read_pair(exchange, wp.static(pairs(s, RIGHT_RATE)) + run.before)
-                joint = Joint()
-                joint.x = own.x + (h * own.u + (next_end[0] - moved.right_x))
-                joint.y = own.y + (h * own.v + (next_end[1] - moved.right_y))
-                joint.u = own.u + (next_rate[0] - moved.right_u)
-                joint.v = own.v + (next_rate[1] - moved.right_v)
-                joint.spin = spin
-                left = Joint()
-                left.x = before.x + (h * before.u + (moved.left_x - end_before[0]))
-                left.y = before.y + (h * before.v + (moved.left_y - end_before[1]))
-                left.u = before.u + (moved.left_u - rate_before[0])
-                left.v = before.v + (moved.left_v - rate_before[1])
-                left.spin = spin_before
-                last_push, torque = pushed_by(run, common.stage, moved.arm_x, moved.arm_y, left, joint)
-                result.push = last_push
+                joint = Joint(
+                    own.x + (h * own.u + (next_end[0] - moved.right_x)),
+                    own.y + (h * own.v + (next_end[1] - moved.right_y)),
+                    own.u + (next_rate[0] - moved.right_u),
+                    own.v + (next_rate[1] - moved.right_v),
+                    spin,
+                )
+                joint_before = Joint(
+                    before.x + (h * before.u + (moved.left_x - end_before[0])),
+                    before.y + (h * before.v + (moved.left_y - end_before[1])),
+                    before.u + (moved.left_u - rate_before[0]),
+                    before.v + (moved.left_v - rate_before[1]),
+                    spin_before,
+                )
+                last_left = pull(run, common.stage, joint_before, run.before)
+                last_right = pull(run, common.stage, joint, lane)
+                rates[s] = pushed(run, moved.arm_x, moved.arm_y, last_left, last_right)
+                result.push = rates[s]
                 result.joint = joint
-                result.last_friction = torque * spin
+                result.last_friction = last_right[2] * spin
                 result.last_damping = joint.u * joint.u + joint.v * joint.v
                 if wp.static(weights[s] != 0.0):
                     result.friction += wp.static(real(weights[s])) * result.last_friction
                     result.damping += wp.static(real(weights[s])) * result.last_damping
-                rates[s] = last_push
                 if wp.static(has_load):
                     rates[s] += load(run, plane, h, gain, ways, moved.arm_x, moved.arm_y)
                 result.opening = wp.float32(joint.x * joint.x + joint.y * joint.y)
@@ -399,19 +380,10 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
                 for j in range(wp.static(stages)):
                     if wp.static(velocity_errors[j] != 0.0):
                         errors += wp.static(real(velocity_errors[j])) * rates[j]
+                e = errors
+                k = rates[0]
                 error = wp.static(algebra.error_ratio)(
-                    stage,
-                    errors[0],
-                    errors[1],
-                    errors[2],
-                    u,
-                    v,
-                    omega,
-                    rates[0][0],
-                    rates[0][1],
-                    rates[0][2],
-                    delta,
-                    inverse_tolerance,
+                    stage, e[0], e[1], e[2], u, v, omega, k[0], k[1], k[2], delta, inverse_tolerance
                 )
                 result.error = order_bits_single(wp.float32(error))
         u += result.gain[0]
@@ -427,23 +399,20 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
         K = run.K
         lane = run.lane
         # all is read before anything is written, so that threads wait for memory once
-        u = K[U, lane] + wp.float64(result.gain[0])
-        v = K[V, lane] + wp.float64(result.gain[1])
-        omega = K[OMEGA, lane] + wp.float64(result.gain[2])
+        motion = three(K, U, lane) + doubles(result.gain)
         friction = K[layout.BOARD_LOST_FRICTION, lane] + wp.float64(result.friction)
         damping = K[layout.BOARD_LOST_DAMPING, lane] + wp.float64(result.damping)
-        put(K, X, lane, result.place)
-        put(K, U, lane, vec3d(u, v, omega))
-        put(K, COSINE, lane, wp.vec2d(result.cosine, result.sine))
+        geometry.put(K, X, lane, result.place)
+        geometry.put(K, U, lane, motion)
+        geometry.put(K, COSINE, lane, wp.vec2d(result.cosine, result.sine))
         K[layout.BOARD_LOST_FRICTION, lane] = friction
         K[layout.BOARD_LOST_DAMPING, lane] = damping
-        keep_joint(run, result.joint, result.push[2])
-        keep_rates(run, result.push, result.last_friction, result.last_damping)
+        keep(run, result.joint, result.push, result.last_friction, result.last_damping)
 
     @wp.func
     def renew_direction(run: Run):
         cosine, sine = cos_sin(run.K[THETA, run.lane])
-        put(run.K, COSINE, run.lane, wp.vec2d(cosine, sine))
+        geometry.put(run.K, COSINE, run.lane, wp.vec2d(cosine, sine))
 
     @wp.func
     def start_is_finite(run: Run):
@@ -451,13 +420,13 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
         for row in range(6):
             finite = finite and wp.isfinite(run.K[row, run.lane])
         for part in range(wp.static(PUSH + 1)):
-            pair = read_pair(run.S, part * wp.static(block_dim) + run.lane)
+            pair = get(run, part, run.lane)
             finite = finite and wp.isfinite(pair[0]) and wp.isfinite(pair[1])
         return finite
 
     @wp.func
     def opening(run: Run):
-        pair = read_pair(run.S, wp.static(OPENING * block_dim) + run.lane)
+        pair = get(run, OPENING, run.lane)
         return wp.float32(pair[0] * pair[0] + pair[1] * pair[1])
 
     @wp.func
@@ -472,13 +441,13 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
                 pair = vec2()
                 if run.lane < run.links:
                     pair = read_pair(kept_start(run), part * run.kept.shape[1] + run.lane)
-                write_pair(run.S, part * wp.static(block_dim) + run.lane, pair[0], pair[1])
+                put(run, part, pair[0], pair[1])
 
     @wp.func
     def store_start(run: Run):
         if wp.static(is_shared):
             for part in range(wp.static(KEPT)):
-                pair = read_pair(run.S, part * wp.static(block_dim) + run.lane)
+                pair = get(run, part, run.lane)
                 if run.lane < run.links:
                     write_pair(kept_start(run), part * run.kept.shape[1] + run.lane, pair[0], pair[1])
 

@@ -32,7 +32,7 @@ from warpchain.kernels.gpu.tilting import block_tilting
 from warpchain.kernels.gpu.upright import block_upright
 from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step, step_controller
 from warpchain.kernels.methods.method import find_method
-from warpchain.kernels.physics.elementary import ONE, TWO
+from warpchain.kernels.physics.elementary import TWO
 from warpchain.kernels.types import Control, Drive, Integers, Model, Record, State, read_ground
 
 REGISTERS_OF_MULTIPROCESSOR = 65536
@@ -193,7 +193,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             # steps until there is something else to do
             mark = wp.min(stop_time, K[wp.static(layout.BOARD_VALUES), layout.VALUE_NEXT_SAMPLE])
             contact_step = wp.float32(K[wp.static(layout.BOARD_VALUES), layout.VALUE_CONTACT_STEP])
-            inverse_tolerance = real(ONE / K[wp.static(layout.BOARD_VALUES), layout.VALUE_TOLERANCE])
+            inverse_tolerance = real(K[wp.static(layout.BOARD_VALUES), layout.VALUE_INVERSE_TOLERANCE])
             error = wp.float32(0.0)
             own_gap = wp.float32(0.0)
             is_near = bool(False)
@@ -241,7 +241,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                         run, drive, state, control, time, proximity, own_gap, pairs, spare
                     )
                 if is_hit or renews:
-                    barrier()
+                    if not is_hit:
+                        barrier()
                     begin(run, common, not is_hit)
             else:
                 if not wp.isfinite(error):

@@ -32,7 +32,8 @@ def write_bounds(run: Run, drive: Drive, state: State, control: Control, is_driv
     """For one thread: writes on the board what bounds steps, when the next sample or frame is due, and when to stop."""
     K = run.K
     K[BOARD_VALUES, layout.VALUE_CONTACT_STEP] = contact_step(state, control, run.world, is_driven)
-    K[BOARD_VALUES, layout.VALUE_TOLERANCE] = spring_tolerance(drive, state, control, run.world, is_driven)
+    tolerance = spring_tolerance(drive, state, control, run.world, is_driven)
+    K[BOARD_VALUES, layout.VALUE_INVERSE_TOLERANCE] = ONE / tolerance
     K[BOARD_VALUES, layout.VALUE_STOP_TIME] = state.stop_time[run.world]
     K[BOARD_VALUES, layout.VALUE_NEXT_SAMPLE] = next_mark(state, control, run.world)
 

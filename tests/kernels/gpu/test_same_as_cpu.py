@@ -6,6 +6,7 @@ including contacts resolved in parallel rounds: in every impulse, and in all tha
 """
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -34,6 +35,7 @@ from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu import functions
 from warpchain.kernels.gpu.loop import make_advance_block
+from warpchain.kernels.methods.method import find_method
 from warpchain.status import Status
 
 LINKS = 24
@@ -226,5 +228,38 @@ def compiles_for_gpus(folder: Path, features: Features, block_dim: int, *generat
 )
 def test_a_kernel_compiles_for_gpus(tmp_path: Path, fixed_body: str, moves: bool, generations: tuple[int, ...]) -> None:
     """That of the drive compiles for sm_80 and sm_90; those of a profile and of a moving sprocket for one of these."""
-    features = Features("os32", layout.padded_width(60), fixed_body, True, moving_sprocket=moves)
+    features = Features("os32", layout.padded_width(60), fixed_body, True, moving_sprocket=moves, is_mixed=moves)
     compiles_for_gpus(tmp_path, features, 64, *generations)
+
+
+def attempt_loop(ptx: str) -> list[str]:
+    """Instructions of the innermost loop with barriers: that over attempts.
+
+    A loop ends in a branch to an earlier label.
+    """
+    lines = [line.strip() for line in ptx[ptx.index(".entry") :].splitlines()]
+    labels = {line[:-1]: place for place, line in enumerate(lines) if line.endswith(":")}
+    branches = [(place, re.match(r"(?:@!?%p\d+\s+)?bra(?:\.uni)?\s+(\S+);", line)) for place, line in enumerate(lines)]
+    loops = [lines[labels[match[1]] : place + 1] for place, match in branches if match and labels[match[1]] < place]
+    loop = min((loop for loop in loops if any(line.startswith("bar.sync") for line in loop)), key=len)
+    instructions = [re.sub(r"^@!?%p\d+\s+", "", line) for line in loop]
+    return [line for line in instructions if line.endswith(";") and not line.startswith("mov")]
+
+
+def test_attempts_in_mixed_precision_hardly_use_double_precision(tmp_path: Path) -> None:
+    """An attempt has a barrier a stage and one for the error; at most a twentieth of its work is in double precision.
+
+    That is what the new state takes. Conversions between the state and its increments are counted apart.
+    """
+    features = Features("os32", layout.padded_width(60), "floor", True, is_mixed=True)
+    module = make_advance_block(features, 64, most_registers(64)).module
+    module.options["block_dim"] = 64
+    wp.compile_aot_module(module, arch=90, module_dir=str(tmp_path), use_ptx=True)
+    (path,) = tmp_path.glob("*.ptx")
+    loop = attempt_loop(path.read_text(encoding="utf-8", errors="replace"))
+    assert sum(line.startswith("bar.sync") for line in loop) == len(find_method("os32").tableau.matrix)
+    operations = [line.split()[0] for line in loop]
+    double = [name for name in operations if ".f64" in name and not name.startswith(("ld.", "st.", "selp"))]
+    conversions = [name for name in double if name.startswith("cvt")]
+    assert len(double) - len(conversions) <= 0.05 * len(operations)
+    assert len(conversions) <= 25
