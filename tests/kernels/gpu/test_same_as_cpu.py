@@ -33,7 +33,7 @@ from warpchain.engine.kernel_choice import most_registers
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
-from warpchain.kernels.gpu import functions
+from warpchain.kernels.gpu import functions, increments
 from warpchain.kernels.gpu.loop import make_advance_block
 from warpchain.kernels.methods.method import find_method
 from warpchain.status import Status
@@ -119,6 +119,31 @@ def test_free_flight_equals_a_cpu_kernel() -> None:
     assert theirs.counts(0)["rejected"] > 0
     assert ours.time(0) == pytest.approx(theirs.time(0), rel=1e-5)
     assert np.allclose(ours.position(0), theirs.position(0), rtol=0, atol=1e-4)
+
+
+def test_joints_carried_on_are_those_of_the_state() -> None:
+    """After 255 steps in mixed precision, opening and rate of each joint are those of the state, but for rounding.
+
+    Each step rounds both to 6e-8 of their greatest values, and openings also to 6e-8 of what their rates add.
+    """
+    position, velocity = lay_chain(ellipse(1.5), LINKS, SOFT.link_length, 2.0, 0.1)
+    batch = batch_of([(position, velocity)], method="os32", self_contact=False, fixed_step=False, precision="mixed")
+    features = batch.features(fixed_body="none")
+    greatest = np.zeros(2)
+    while batch.counts(0)["accepted"] < increments.RENEWED - 1:
+        launch_blocks(batch, features, 1, block_dim=LINKS)
+        kept = batch.scratch.numpy()[0, layout.MASS :].view(np.float32).reshape(-1)[: 4 * batch.columns]
+        carried = kept.reshape(2, batch.columns, 2)[:, :LINKS].astype(float)
+        greatest = np.maximum(greatest, np.abs(carried).max(axis=(1, 2)))
+    (x, y, theta), (u, v, omega) = batch.position(0).T, batch.velocity(0).T
+    arm = SOFT.link_length / 2 * np.array([np.cos(theta), np.sin(theta)])
+    swing = omega * np.array([-arm[1], arm[0]])
+    formed = [np.roll(place - turn, -1, axis=1) - (place + turn) for place, turn in (([x, y], arm), ([u, v], swing))]
+    longest_step = batch.state.step.numpy()[0]
+    bounds = 256 * 6e-8 * (greatest + [longest_step * greatest[1], 0.0]) + [1e-16, 1e-14]
+    for ours, theirs, bound in zip(carried, formed, bounds, strict=True):
+        assert 0 < np.abs(ours - theirs.T).max() < bound
+    assert greatest[0] > 1e-8
 
 
 def bounded_heaps(count: int) -> Batch:
