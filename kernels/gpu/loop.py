@@ -36,8 +36,6 @@ from warpchain.kernels.physics.elementary import TWO
 from warpchain.kernels.types import Control, Drive, Integers, Model, Record, State, read_ground
 
 REGISTERS_OF_MULTIPROCESSOR = 65536
-APPROACH = wp.constant(wp.float32(4.0))
-"""By how much two joints approach one another in a step, as a part of step times speed: twice what they do at most."""
 
 
 @functools.cache
@@ -177,7 +175,6 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         accepted = int(0)
         since = int(state.counts[world, layout.ACCEPTED] % wp.int64(wp.static(renewed)))
         opening = wp.float32(0.0)
-        free = wp.float32(0.0)  # listed joints are looked at, whose result does not depend on that
         smallest_step = wp.float32(control.smallest_step)
         barrier()
         while status == RUNNING and attempts < attempts_left:
@@ -221,12 +218,10 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     time = later
                     step = next_step(step, length, growth(error, last_error, control.proportional))
                     last_error = wp.max(error, wp.float32(1e-4))
-                    speed_before = proximity.speed
                     proximity = read_proximity(run)
-                    free -= APPROACH * length * wp.max(proximity.speed, speed_before)
                     opening = wp.max(opening, proximity.opening)
                     plane.end_step(run, h)
-                    is_near, reach = look(run, proximity, pairs, spare, free)
+                    is_near, reach = look(run, proximity, pairs, spare)
                     since += 1
                     goes_on = not (is_near or time >= mark or since == wp.static(renewed))
                 elif wp.isfinite(error):
@@ -242,8 +237,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     since = int(0)
                     renew_direction(run)
                 if is_near:
-                    is_hit, pairs, reach, status, spare, free = meet(
-                        run, drive, state, control, time, proximity, own_gap, pairs, spare, free
+                    is_hit, pairs, reach, status, spare = meet(
+                        run, drive, state, control, time, proximity, own_gap, pairs, spare
                     )
                 if is_hit or renews:
                     if not is_hit:

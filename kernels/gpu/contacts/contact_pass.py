@@ -28,10 +28,9 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
 
     ``begin(run, state, control, proximity)`` → number of listed pairs, longest step [s] that cannot miss a contact (see
     ``time_to_contact`` of :mod:`gpu.contacts.proximity`), status, how far joints may move before the list may be stale
-    if none is open [m]. The board is written, and a barrier passed. ``look(run, proximity, pairs, spare, free)`` →
-    whether there is anything to do for ``meet``, and that longest step. ``meet(run, drive, state, control, time,
-    proximity, own gap, pairs, spare, free)`` → whether anything was hit, the four of ``begin`` anew, and how far
-    circles of listed joints may approach one another before they touch, but for openings [m]: ``free``.
+    if none is open [m]. The board is written, and a barrier passed. ``look(run, proximity, pairs, spare)`` → whether
+    there is anything to do for ``meet``, and that longest step. ``meet(run, drive, state, control, time, proximity, own
+    gap, pairs, spare)`` → whether anything was hit, then the four of ``begin`` anew.
     """
     lists = list_layout(features.columns)
     has_fixed = features.fixed_body != "none"
@@ -82,18 +81,13 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
         return pairs, reach, status, spare
 
     @wp.func
-    def are_apart(free: wp.float32, opening: wp.float32):
-        """Whether no circles of listed joints can touch, which may approach by ``free`` [m] but for openings."""
-        return free > wp.float32(2.0) * MARGIN * opening
-
-    @wp.func
-    def look(run: Run, proximity: Proximity, pairs: int, spare: wp.float32, free: wp.float32):
+    def look(run: Run, proximity: Proximity, pairs: int, spare: wp.float32):
         still = slack(spare, proximity.opening, proximity.displacement)
         is_near = wp.static(features.moving_sprocket)
         if wp.static(has_fixed):
             is_near = is_near or proximity.gap < wp.float32(0.0)
         if wp.static(has_self):
-            is_near = is_near or (pairs > 0 and not are_apart(free, proximity.opening)) or not still > wp.float32(0.0)
+            is_near = is_near or pairs > 0 or not still > wp.float32(0.0)
         return is_near, time_to_contact(run, pairs, proximity.gap, still, proximity.speed)
 
     @wp.func
@@ -107,7 +101,6 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
         own_gap: wp.float32,
         listed: int,
         listed_spare: wp.float32,
-        listed_free: wp.float32,
     ):
         T = run.T
         lane = run.lane
@@ -115,13 +108,11 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
         opening = proximity.opening
         pairs = listed
         spare = listed_spare
-        free = listed_free
         still = slack(spare, opening, proximity.displacement)
         status = int(RUNNING)
         is_hit = bool(False)
         is_near = bool(False)
         is_stale = bool(False)
-        looks = bool(True)
         hits = int(0)
         if wp.static(has_fixed):
             if gap < wp.float32(0.0):
@@ -138,9 +129,7 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
                     wp.atomic_add(state.counts, run.world, wp.static(layout.SPROCKET_IMPULSES), wp.int64(struck))
         if wp.static(has_self):
             is_stale = not still > wp.float32(0.0)
-            if pairs > 0 and are_apart(free, opening):
-                looks = bool(False)
-            if is_stale or (pairs > 0 and looks):
+            if is_stale or pairs > 0:
                 is_near = bool(True)
                 publish(run)
                 clear_contacts(run)
@@ -159,15 +148,15 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
                 pairs, status = list_pairs(run, control, opening, pairs == 0)
                 spare = spare_of(run)
                 still = slack(spare, opening, wp.float32(0.0))
-            if pairs > 0 and (is_stale or looks):
+            if pairs > 0:
                 touched = constants(run.K)
-                touching, free = find_contacts(run, touched, pairs, upper_bound(opening))
+                touching = find_contacts(run, touched, pairs, upper_bound(opening))
                 if touching > 0:
                     hits = resolve_contacts(run, touched, touching)
                     if hits > 0:
                         wp.atomic_add(T, wp.static(touch.self_hits), hits)
                     if not is_hit:
                         is_hit = barrier_count(T, wp.static(touch.votes), hits > 0) > 0
-        return is_hit, pairs, time_to_contact(run, pairs, gap, still, proximity.speed), status, spare, free
+        return is_hit, pairs, time_to_contact(run, pairs, gap, still, proximity.speed), status, spare
 
     return begin, look, meet

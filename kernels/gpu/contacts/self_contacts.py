@@ -21,7 +21,7 @@ from warpchain.kernels.contacts.link_pair import B_T, DEPTH, Contact, natural
 from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.contacts.pair_list import square_distance
 from warpchain.kernels.gpu.stage import Run
-from warpchain.kernels.gpu.threads import barrier, barrier_count, warp_greatest, warp_width
+from warpchain.kernels.gpu.threads import barrier, barrier_count
 from warpchain.kernels.layout import BOARD_LOST_SELF, consecutive_offsets
 from warpchain.kernels.physics.elementary import TWO, ZERO
 from warpchain.kernels.physics.geometry import put
@@ -31,7 +31,6 @@ JOINT_BITS = 11
 """Bits of a joint's number in a key: chains have fewer than 2048 links."""
 
 FREE = wp.constant(2**31 - 1)
-ALMOST_ALL = wp.constant(wp.float32(1.0 - 1e-6))
 DONE = wp.constant(-1)
 
 
@@ -48,7 +47,6 @@ class TouchLayout:
     fixed_hits: int  # impulses with floor or sprocket that are not booked yet
     self_hits: int  # likewise between links
     strand_hits: int  # those between strands of the loop
-    apart: int  # least distance of two listed joints [m], bits of a single-precision number
     deepest: int  # greatest depth of a contact in this launch [m], bits of a single-precision number
     is_late: int  # 1 when the launch has lasted long enough
     size: int  # integers from the row's start to the end of the last
@@ -58,7 +56,7 @@ class TouchLayout:
 def touch_layout(columns: int, block_dim: int, in_lists: bool) -> TouchLayout:
     """Layout for shared memory of its own, a pair per thread, or inside the scratch parts of the list's row."""
     width, shared_pairs = (columns, 0) if in_lists else (block_dim, block_dim)
-    single = ("touching", "votes", "fixed_hits", "self_hits", "strand_hits", "apart", "deepest", "is_late")
+    single = ("touching", "votes", "fixed_hits", "self_hits", "strand_hits", "deepest", "is_late")
     integers = consecutive_offsets(
         list_layout(columns).owners if in_lists else 0,
         **{"owners": 3 * width, "pairs": shared_pairs} | dict.fromkeys(single, 1),
@@ -127,7 +125,6 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
                 T[wp.static(touch.owners + k * touch.width) + lane] = FREE
         if lane == 0:
             T[wp.static(touch.touching)] = 0
-            T[wp.static(touch.apart)] = wp.static(0x7F000000)
 
     @wp.func
     def pair_at(L: Integers, T: Integers, k: int):
@@ -159,36 +156,26 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
 
     @wp.func
     def find(run: Run, chain: Chain, pairs: int, opening: wp.float64):
-        """Number of pairs of joints that may touch now, and the least distance of circles at listed joints [m].
-
-        The board is written. ``opening``: greatest |C| [m].
-        """
+        """Number of pairs of joints that may touch now; the board is written. ``opening``: greatest |C| [m]."""
         L = run.L
         T = run.T
         lane = run.lane
         reach = TWO * chain.circle_radius + TWO * opening
         square = reach * reach
-        least = wp.float32(1e30)
         for k in range(lane, pairs, wp.static(block_dim)):
             p = L[wp.static(lists.first) + k]
             q = L[wp.static(lists.second) + k]
-            distance = square_distance(run.K, p, q)
-            least = wp.min(least, wp.float32(distance))
-            if distance < square:
+            if square_distance(run.K, p, q) < square:
                 slot = wp.atomic_add(T, wp.static(touch.touching), 1)
                 if slot < wp.static(touch.shared_pairs):
                     T[wp.static(touch.pairs) + slot] = pair_key(p, q)
                 else:
                     L[wp.static(lists.touching) + slot] = pair_key(p, q)
-        least_of_warp = -warp_greatest(-wp.cast(least, wp.int32))
-        if lane % warp_width() == 0:
-            wp.atomic_min(T, wp.static(touch.apart), least_of_warp)
         barrier()
         touching = T[wp.static(touch.touching)]
-        apart = ALMOST_ALL * wp.sqrt(wp.cast(T[wp.static(touch.apart)], wp.float32))
         if 2 * touching > wp.static(block_dim):
             order(L, T, lane, touching)
-        return touching, apart - wp.float32(TWO * chain.circle_radius)
+        return touching
 
     @wp.func
     def raise_depth(T: Integers, depth: wp.float64):
