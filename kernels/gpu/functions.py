@@ -1,4 +1,4 @@
-"""Where the board lies: in the shared memory of a block or in the chain's scratch."""
+"""What a block of threads has: its registers, and where its board lies, in shared memory or in the chain's scratch."""
 
 from warpchain.kernels import layout
 from warpchain.kernels.types import CHAIN_DOUBLES
@@ -12,6 +12,11 @@ STARTS = 14
 def shares_board(block_dim: int) -> bool:
     """Whether the board of a block of this many threads lies in its shared memory, or else in the scratch."""
     return block_dim <= LARGEST_SHARED_BLOCK
+
+
+def available_registers(threads: int) -> int:
+    """Registers that a thread of a block can have: each of four schedulers has 16384 for its warps of 32 threads."""
+    return 16384 // (-(-threads // 128) * 32) // 8 * 8
 
 
 def board_size(threads: int) -> int:

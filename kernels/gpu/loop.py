@@ -23,7 +23,7 @@ from warpchain.kernels.gpu.board import find_link, raise_value
 from warpchain.kernels.gpu.contacts.contact_pass import block_contact_pass
 from warpchain.kernels.gpu.contacts.proximity import block_proximity
 from warpchain.kernels.gpu.contacts.self_contacts import touch_layout
-from warpchain.kernels.gpu.functions import STARTS, board_size, shares_board, starts_offset
+from warpchain.kernels.gpu.functions import STARTS, available_registers, board_size, shares_board, starts_offset
 from warpchain.kernels.gpu.increments import EXCHANGED, block_steps, real_of, vec3d
 from warpchain.kernels.gpu.run import block_run, block_sample
 from warpchain.kernels.gpu.stage import Run, constants
@@ -35,8 +35,6 @@ from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.physics.elementary import TWO
 from warpchain.kernels.types import Control, Drive, Integers, Model, Record, State, read_ground
 
-REGISTERS_OF_MULTIPROCESSOR = 65536
-
 
 @functools.cache
 def make_advance_block(features: Features, block_dim: int, registers: int | None = None):
@@ -46,7 +44,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     of a thread on a GPU; None: as many as a block of this size can have. A world's scratch has at least
     :func:`gpu.functions.board_rows` rows; lists are as on a CPU.
     """
-    available = REGISTERS_OF_MULTIPROCESSOR // block_dim // 8 * 8
+    available = available_registers(block_dim)
     if available < 255:
         registers = min(registers or available, available)
     tableau = find_method(features.method).tableau
