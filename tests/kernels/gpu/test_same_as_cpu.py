@@ -121,29 +121,37 @@ def test_free_flight_equals_a_cpu_kernel() -> None:
     assert np.allclose(ours.position(0), theirs.position(0), rtol=0, atol=1e-4)
 
 
-def test_joints_carried_on_are_those_of_the_state() -> None:
-    """After 255 steps in mixed precision, opening and rate of each joint are those of the state, but for rounding.
+def ends_of(batch: Batch) -> tuple[np.ndarray, np.ndarray]:
+    """Places and velocities of the left and right ends of the first chain's links, (place or velocity, x or y, n)."""
+    (x, y, theta), (u, v, omega) = batch.position(0).T, batch.velocity(0).T
+    arm = SOFT.link_length / 2 * np.array([np.cos(theta), np.sin(theta)])
+    centre, swing = np.array([[x, y], [u, v]]), np.array([arm, omega * np.array([-arm[1], arm[0]])])
+    return centre - swing, centre + swing
 
-    Each step rounds both to 6e-8 of their greatest values, and openings also to 6e-8 of what their rates add.
+
+def test_joints_carried_on_are_those_of_the_state() -> None:
+    """Until joints are formed anew, in mixed precision, openings and their rates are those of the state to rounding.
+
+    A step that changes the velocities of ends by Δv rounds rates of openings some four times, to 6e-8 Δv each.
     """
     position, velocity = lay_chain(ellipse(1.5), LINKS, SOFT.link_length, 2.0, 0.1)
     batch = batch_of([(position, velocity)], method="os32", self_contact=False, fixed_step=False, precision="mixed")
     features = batch.features(fixed_body="none")
-    greatest, longest_step = np.zeros(2), 0.0
-    while batch.counts(0)["accepted"] < increments.RENEWED - 1:
+    rounding = flown = 0.0
+    while (steps := batch.counts(0)["accepted"]) < increments.RENEWED - 1:
+        before = ends_of(batch)
         launch_blocks(batch, features, 1, block_dim=LINKS)
-        kept = batch.scratch.numpy()[0, layout.MASS :].view(np.float32).reshape(-1)[: 4 * batch.columns]
-        carried = kept.reshape(2, batch.columns, 2)[:, :LINKS].astype(float)
-        greatest = np.maximum(greatest, np.abs(carried).max(axis=(1, 2)))
-        longest_step = max(longest_step, batch.state.step.numpy()[0])
-    (x, y, theta), (u, v, omega) = batch.position(0).T, batch.velocity(0).T
-    arm = SOFT.link_length / 2 * np.array([np.cos(theta), np.sin(theta)])
-    swing = omega * np.array([-arm[1], arm[0]])
-    formed = [np.roll(place - turn, -1, axis=1) - (place + turn) for place, turn in (([x, y], arm), ([u, v], swing))]
-    bounds = 256 * 6e-8 * np.array([greatest[0] + longest_step * greatest[1], greatest[1]])
-    for ours, theirs, bound in zip(carried, formed, bounds, strict=True):
-        assert 0 < np.abs(ours - theirs.T).max() < bound
-    assert greatest[0] > 1e-8
+        left, right = ends_of(batch)
+        if steps:
+            rounding += 4 * 6e-8 * np.abs([left - before[0], right - before[1]])[:, 1].max()
+            flown = batch.time(0)
+    kept = batch.scratch.numpy()[0, layout.MASS :].view(np.float32).reshape(-1)[: 4 * batch.columns]
+    carried = kept.reshape(2, batch.columns, 2)[:, :LINKS].transpose(0, 2, 1)
+    wrong = np.abs(carried - (np.roll(left, -1, axis=-1) - right)).max(axis=(1, 2))
+    assert np.all(wrong > 0)
+    assert wrong[1] < rounding
+    assert wrong[0] < rounding * flown
+    assert np.abs(carried[0]).max() > 1e4 * wrong[0]
 
 
 def bounded_heaps(count: int) -> Batch:
