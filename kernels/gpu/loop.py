@@ -4,8 +4,8 @@ It makes the same run as :mod:`cpu.loop`, on the same structs and with the same 
 registers, the state on a board in the shared memory of the block. All threads know the values that decide (error, gap,
 status …), and take the same branches. The results depend neither on how a run is cut into launches nor on other chains.
 
-An attempt costs two barriers a stage and one for the error; an accepted one costs three more, except with methods that
-reuse the last stage. Contacts cost none while nothing is near the floor or sprocket and no pair is listed.
+An attempt costs one barrier a stage and one for the error. While nothing is near the floor or sprocket and no pair is
+listed, attempts follow one another in an inner loop.
 """
 
 import functools

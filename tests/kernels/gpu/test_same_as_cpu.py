@@ -241,6 +241,14 @@ def test_failures_stop_one_chain_and_leave_the_others() -> None:
     assert stiff.status(0) == Status.STEP_TOO_SMALL
 
 
+def test_registers_of_every_block_fit_into_a_multiprocessor() -> None:
+    """Warps of 32 threads go to four schedulers in turn, each of which has 16384 registers."""
+    for warps in range(1, 33):
+        busiest = len(range(0, warps, 4))
+        registers = functions.available_registers(32 * warps)
+        assert busiest * 32 * registers <= 16384 < busiest * 32 * (registers + 8)
+
+
 SHARED_MEMORY = 163 * 1024
 """Bytes that a block can have on a GPU of the older generation."""
 
