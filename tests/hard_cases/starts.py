@@ -20,6 +20,10 @@ State = tuple[Array, Array]
 
 METHODS = method_names()
 every_method = pytest.mark.parametrize("method", METHODS)
+MIXED = ("os32", "dp5", "hybrid")
+every_precision = pytest.mark.parametrize(
+    ("method", "precision"), [*((name, "double") for name in METHODS), *((name, "mixed") for name in MIXED)]
+)
 
 UNDISSIPATIVE: Final[Mapping[str, float]] = {
     "joint_stiffness": 1e5,
