@@ -19,7 +19,7 @@ from warpchain.kernels.gpu.threads import barrier, number_memory
 from warpchain.kernels.layout import COSINE, OMEGA, SINE, THETA, U, V, X, Y
 from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.physics import geometry
-from warpchain.kernels.physics.elementary import HALF, cos_sin, order_bits_single
+from warpchain.kernels.physics.elementary import HALF, ONE, cos_sin, order_bits_single
 from warpchain.kernels.physics.geometry import Link, three, turned
 from warpchain.kernels.physics.increments import increments, turn_double, turn_single
 
@@ -105,6 +105,7 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
 
         stage: Stage
         half_length: real  # [m]
+        per_length: real  # its inverse [1/m]
         gravity: real  # [m/s²]
 
     @wp.struct
@@ -149,7 +150,7 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
     def common_of(run: Run) -> Common:
         chain = constants(run.K)
         stage = wp.static(algebra.stage_at)(chain, real(0.0), real(0.0))
-        return Common(stage, real(chain.half_length), real(chain.gravity))
+        return Common(stage, real(chain.half_length), real(ONE / chain.half_length), real(chain.gravity))
 
     @wp.func
     def keep(run: Run, joint: Joint, push: vec3, friction: real, damping: real):
@@ -251,13 +252,9 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
         h = real(step)
         stage = common.stage
         stage.h = h
-        cosine = K[COSINE, lane]
-        sine = K[SINE, lane]
-        half_length = common.half_length
-        start_x = half_length * real(cosine)
-        start_y = half_length * real(sine)
-        u = real(K[U, lane])
-        v = real(K[V, lane])
+        # what the last stage needs it reads again: registers are scarce
+        start_x = common.half_length * real(K[COSINE, lane])
+        start_y = common.half_length * real(K[SINE, lane])
         omega = real(K[OMEGA, lane])
         own = kept_joint(run, lane)
         before = Joint()
@@ -316,8 +313,10 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
                     z * z * (wp.static(real(1 / 24)) - z * (wp.static(real(1 / 720)) - z * wp.static(real(1 / 40320))))
                 )
                 half = HALF * turn
-                more_cosine = real(cosine) * quartic + real(sine) * lag
-                more_sine = real(sine) * quartic - real(cosine) * lag
+                cosine = K[COSINE, lane]
+                sine = K[SINE, lane]
+                more_cosine = common.per_length * (start_x * quartic + start_y * lag)
+                more_sine = common.per_length * (start_y * quartic - start_x * lag)
                 result.cosine = (cosine - turn * (sine + half * cosine)) + wp.float64(more_cosine)
                 result.sine = (sine + turn * (cosine - half * sine)) + wp.float64(more_sine)
             barrier()
@@ -352,16 +351,18 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
             else:
                 next_rate = read_pair(exchange, wp.static(pairs(s, LEFT_RATE)) + run.after)
                 rate_before = read_pair(exchange, wp.static(pairs(s, RIGHT_RATE)) + run.before)
+                opening = get(run, OPENING, lane)
+                opening_before = get(run, OPENING, run.before)
                 joint = Joint(
-                    own.x + (h * own.u + (next_end[0] - moved.right_x)),
-                    own.y + (h * own.v + (next_end[1] - moved.right_y)),
+                    opening[0] + (h * own.u + (next_end[0] - moved.right_x)),
+                    opening[1] + (h * own.v + (next_end[1] - moved.right_y)),
                     own.u + (next_rate[0] - moved.right_u),
                     own.v + (next_rate[1] - moved.right_v),
                     spin,
                 )
                 joint_before = Joint(
-                    before.x + (h * before.u + (moved.left_x - end_before[0])),
-                    before.y + (h * before.v + (moved.left_y - end_before[1])),
+                    opening_before[0] + (h * before.u + (moved.left_x - end_before[0])),
+                    opening_before[1] + (h * before.v + (moved.left_y - end_before[1])),
                     before.u + (moved.left_u - rate_before[0]),
                     before.v + (moved.left_v - rate_before[1]),
                     spin_before,
@@ -383,6 +384,8 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
                 for j in range(wp.static(stages)):
                     if wp.static(velocity_errors[j] != 0.0):
                         errors += wp.static(real(velocity_errors[j])) * rates[j]
+                u = real(K[U, lane])
+                v = real(K[V, lane])
                 e = errors
                 k = rates[0]
                 error = wp.static(algebra.error_ratio)(
@@ -391,7 +394,7 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
                 result.error = order_bits_single(wp.float32(error))
         u += result.gain[0]
         v += result.gain[1]
-        w = half_length * (omega + result.gain[2])
+        w = common.half_length * (omega + result.gain[2])
         result.friction = h * result.friction
         result.damping = h * (common.stage.damping * result.damping)
         result.speed = wp.float32(real(2.0) * (u * u + v * v + w * w))
