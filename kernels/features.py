@@ -8,7 +8,7 @@ from typing import Any
 def _vector_flag() -> str:
     """Asks for vectors of 512 bits on x86 processors that have them.
 
-    For Intel's clang prefers 256 bits, because such vectors once lowered the clock. No bit of a walk depends on it.
+    For Intel's processors clang prefers 256 bits, because such vectors once lowered the clock.
     """
     processor = Path("/proc/cpuinfo")
     has_them = processor.exists() and " avx512vl" in processor.read_text(encoding="utf-8", errors="replace")

@@ -38,26 +38,6 @@ class Steps:
     first_stage_is_finite: Any  # ``(S, n)``
 
 
-def sums_over(real: Any, velocity: tuple[float, ...], position: tuple[float, ...], rows: tuple[int, ...]):
-    """Warp function ``sums(S, i)``: Σ w_j (ẍ, ÿ, θ̈)_j of link i over the stages, for both rows of weights w."""
-    # Vectors of two to four singles are passed in vector registers, which keeps clang from vectorising the loop around.
-    six = wp.types.vector(length=6, dtype=real)
-
-    @wp.func
-    def sums(S: wp.array2d(dtype=real), i: int):
-        total = six()
-        for j in range(wp.static(len(velocity))):
-            if wp.static(velocity[j] != 0.0):
-                for k in range(3):
-                    total[k] += wp.static(real(velocity[j])) * S[wp.static(rows[j]) + k, i]
-            if wp.static(position[j] != 0.0):
-                for k in range(3):
-                    total[3 + k] += wp.static(real(position[j])) * S[wp.static(rows[j]) + k, i]
-        return total
-
-    return sums
-
-
 @functools.cache
 def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
     """Steps of one tableau in single or double precision; load: ``WEIGHT``, ``PLANE``, or a script's Warp function."""
@@ -75,9 +55,9 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
     needs_power = at.needs_power(tableau)
     reuses_last = tableau.first_same_as_last
     weights = tableau.velocity_weights
-    stage_sums = [sums_over(real, *both, rows) for both in zip(tableau.velocity, tableau.position, strict=True)]
-    new_state = sums_over(real, weights, tableau.position_weights, rows)
-    errors = sums_over(real, tableau.velocity_errors, (0.0,) * stages, rows)
+    stage_sums = [at.sums_over(real, *both, rows) for both in zip(tableau.velocity, tableau.position, strict=True)]
+    new_state = at.sums_over(real, weights, tableau.position_weights, rows)
+    errors = at.sums_over(real, tableau.velocity_errors, (0.0,) * stages, rows)
 
     def later(s: int) -> int:
         """The next stage, if there is one: in a branch that is left out names must have a meaning."""
@@ -177,10 +157,27 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
         return link
 
     @wp.func
+    def without_fall(plane: algebra.PlaneMotion) -> algebra.PlaneMotion:
+        """A plane without gravity: what falls as a whole opens no joint."""
+        turning = plane
+        turning.fall_x = real(0.0)
+        turning.fall_y = real(0.0)
+        return turning
+
+    @wp.func
     def accelerate(
-        K: Rows, S: Numbers, chain: Chain, plane: algebra.PlaneMotion, row: int, i: int, arm_row: int, is_first: bool
+        K: Rows,
+        S: Numbers,
+        chain: Chain,
+        plane: algebra.PlaneMotion,
+        row: int,
+        power_row: int,
+        i: int,
+        arm_row: int,
+        is_first: bool,
+        has_power: bool,
     ):
-        """Accelerations of a link in a stage, under weight alone seen from one that falls freely."""
+        """Accelerations of a link in a stage, but for loads of scripts seen from one that falls freely."""
         arm_x = S[arm_row, i]
         arm_y = S[arm_row + 1, i]
         ax, ay, turn = algebra.acceleration(
@@ -201,10 +198,13 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
             if not is_first:
                 x += S[at.WAY, i]
                 y += S[at.WAY + 1, i]
-            load_x, load_y, load_turn = algebra.plane_load(plane, x, y, arm_x, arm_y)
+            load_x, load_y, load_turn = algebra.plane_load(without_fall(plane), x, y, arm_x, arm_y)
             ax += load_x
             ay += load_y
             turn += load_turn
+            if has_power:
+                S[power_row + 4, i] = load_x
+                S[power_row + 5, i] = load_y
         if wp.static(of_script is not None):
             link = link_in_stage(K, S, chain, i, arm_row, is_first)
             load_x, load_y, load_turn = wp.static(of_script)(
@@ -218,7 +218,7 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
         S[row + 2, i] = turn
 
     @wp.func
-    def displace(S: Numbers, stage: algebra.Stage, i: int, sums: six, has_power: bool):
+    def displace(S: Numbers, stage: algebra.Stage, plane: algebra.PlaneMotion, i: int, sums: six, has_power: bool):
         """Writes a link in a stage, from sums over the accelerations of the stages before."""
         omega = S[at.OMEGA, i]
         moved = algebra.displace(
@@ -240,6 +240,10 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
             square = stage.h * stage.h
             S[at.WAY, i] = stage.even * S[at.U, i] + square * sums[3]
             S[at.WAY + 1, i] = stage.even * S[at.V, i] + square * sums[4]
+            if wp.static(on_plane):
+                fallen = real(0.5) * stage.even * stage.even
+                S[at.WAY, i] = S[at.WAY, i] + fallen * plane.fall_x
+                S[at.WAY + 1, i] = S[at.WAY + 1, i] + fallen * plane.fall_y
             S[at.CHANGE, i] = stage.h * sums[0]
             S[at.CHANGE + 1, i] = stage.h * sums[1]
 
@@ -260,13 +264,24 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
         vectors = whole_vectors(chain.link_count)
         i = int(0)
         while i < vectors:
-            accelerate(K, S, chain, plane, wp.static(rows[0]), i, at.ARM_X, True)
+            accelerate(
+                K,
+                S,
+                chain,
+                plane,
+                wp.static(rows[0]),
+                wp.static(power_rows[0]),
+                i,
+                at.ARM_X,
+                True,
+                wp.static(needs_power[0]),
+            )
             i += 1
 
     @wp.func
     def shift_first_stage(S: Numbers, before: Chain, now: Chain):
-        old = algebra.plane_motion(before)
-        new = algebra.plane_motion(now)
+        old = without_fall(algebra.plane_motion(before))
+        new = without_fall(algebra.plane_motion(now))
         vectors = whole_vectors(now.link_count)
         i = int(0)
         while i < vectors:
@@ -275,6 +290,9 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
             S[wp.static(rows[0]), i] = S[wp.static(rows[0]), i] + (ax - bx)
             S[wp.static(rows[0]) + 1, i] = S[wp.static(rows[0]) + 1, i] + (ay - by)
             S[wp.static(rows[0]) + 2, i] = S[wp.static(rows[0]) + 2, i] + (turn - back)
+            if wp.static(needs_power[0]):
+                S[wp.static(power_rows[0]) + 4, i] = S[wp.static(power_rows[0]) + 4, i] + (ax - bx)
+                S[wp.static(power_rows[0]) + 5, i] = S[wp.static(power_rows[0]) + 5, i] + (ay - by)
             i += 1
 
     @wp.func
@@ -286,7 +304,7 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
         stage = algebra.stage_at(chain, h, wp.static(real(nodes[1])) * h)
         i = int(0)
         while i < vectors:
-            displace(S, stage, i, wp.static(stage_sums[1])(S, i), wp.static(needs_power[1]))
+            displace(S, stage, plane, i, wp.static(stage_sums[1])(S, i), wp.static(needs_power[1]))
             i += 1
         for s in range(1, wp.static(stages)):
             close_loop(S, n, wp.static(needs_power[s]))
@@ -296,13 +314,37 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
                 stage.even = wp.static(real(nodes[later(s)])) * h
                 i = int(0)
                 while i < vectors:
-                    accelerate(K, S, chain, plane, wp.static(rows[s]), i, at.STAGE_ARM_X, False)
-                    displace(S, stage, i, wp.static(stage_sums[later(s)])(S, i), wp.static(needs_power[later(s)]))
+                    accelerate(
+                        K,
+                        S,
+                        chain,
+                        plane,
+                        wp.static(rows[s]),
+                        wp.static(power_rows[s]),
+                        i,
+                        at.STAGE_ARM_X,
+                        False,
+                        wp.static(needs_power[s]),
+                    )
+                    displace(
+                        S, stage, plane, i, wp.static(stage_sums[later(s)])(S, i), wp.static(needs_power[later(s)])
+                    )
                     i += 1
         inverse = real(wp.float64(1.0) / tolerance)
         i = int(0)
         while i < vectors:
-            accelerate(K, S, chain, plane, wp.static(rows[-1]), i, at.STAGE_ARM_X, False)
+            accelerate(
+                K,
+                S,
+                chain,
+                plane,
+                wp.static(rows[-1]),
+                wp.static(power_rows[-1]),
+                i,
+                at.STAGE_ARM_X,
+                False,
+                wp.static(needs_power[-1]),
+            )
             made = new_state(S, i)
             error = errors(S, i)
             ratio = algebra.error_ratio(
@@ -341,8 +383,11 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
     def commit(K: Rows, S: Numbers, chain: Chain, step: wp.float64):
         n = chain.link_count
         lanes = whole_lanes(n)
-        fall = wp.where(wp.static(is_weight), chain.gravity * step, wp.float64(0.0))
-        half_fall = HALF * fall * step
+        fall = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+        if wp.static(is_weight):
+            fall = wp.vec2d(wp.float64(0.0), chain.gravity * step)
+        if wp.static(on_plane):
+            fall = wp.vec2d(chain.gravity * chain.up_x * step, chain.gravity * chain.up_y * step)
         h = real(step)
         square = h * h
         i = int(0)
@@ -354,13 +399,13 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
                 rate = K[layout.U + c, i]
                 way = wp.float64(square * made[3 + c])
                 change = wp.float64(h * made[c])
-                if wp.static(is_weight and c < 2):
+                if wp.static((is_weight or on_plane) and c < 2):
                     # the impulse of a joint is the same number on both of its links: momentum stays to the last bits
                     push = wp.float64(impulse(S, 2 + c, i + 1)) - wp.float64(impulse(S, 2 + c, i))
-                    change = step * push * K[layout.INVERSE_MASS, i]
-                if wp.static(c == 1):
-                    way -= half_fall
-                    change -= fall
+                    change = step * push * K[layout.INVERSE_MASS, i] - fall[c]
+                    way -= HALF * fall[c] * step
+                    if wp.static(on_plane):
+                        change += wp.float64(h * impulse(S, 4 + c, i))
                 K[layout.X + c, i] = K[layout.X + c, i] + (step * rate + way)
                 K[layout.U + c, i] = rate + change
             place_link(K, chain.half_length, i)

@@ -171,7 +171,7 @@ def make_advance(features: Features):
             error = wp.cast(joints.attempt(K, felt, state, control, world, h, tolerance), wp.float64)
             attempts += 1
             if error <= ONE:
-                factor, joints_may_stay = joints.accept(K, chain, state, control, world, h, error)
+                factor, joints_may_stay = joints.accept(K, felt, state, control, world, h, error)
                 add_count(state, world, layout.ACCEPTED, wp.int64(1))
                 state.time[world] = wp.where(reaches_stop, stop_time, time + h)
                 state.step[world] = next_step(state.step[world], h, factor)

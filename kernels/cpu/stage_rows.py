@@ -35,9 +35,9 @@ ERROR = 31
 # waits for the store of an earlier column, and vectorises by half as many.
 FORCE, TORQUE = 35, 37
 # Per stage: accelerations of x, y, θ; and if it has a weight in the new state, of each joint the power lost to friction
-# and damping and, shifted by one, the force.
+# and damping and, shifted by one, the force; then what a plane that tilts adds to the accelerations of x and y.
 STAGES = 41
-POWER_ROWS = 4
+POWER_ROWS = 6
 
 
 def needs_power(tableau: Tableau) -> tuple[bool, ...]:
@@ -70,6 +70,26 @@ def stage_rows(tableau: Tableau) -> tuple[tuple[int, ...], tuple[int, ...], int]
     needed = needs_power(tableau)
     powers = tuple(first_power + POWER_ROWS * sum(needed[:stage]) for stage in range(stages))
     return tuple(STAGES + 3 * slot for slot in slots), powers, first_power + POWER_ROWS * sum(needed)
+
+
+def sums_over(real: Any, velocity: tuple[float, ...], position: tuple[float, ...], rows: tuple[int, ...]):
+    """Warp function ``sums(S, i)``: Σ w_j (ẍ, ÿ, θ̈)_j of link i over the stages, for both rows of weights w."""
+    # Vectors of two to four singles are passed in vector registers, which keeps clang from vectorising the loop around.
+    six = wp.types.vector(length=6, dtype=real)
+
+    @wp.func
+    def sums(S: wp.array2d(dtype=real), i: int):
+        total = six()
+        for j in range(wp.static(len(velocity))):
+            if wp.static(velocity[j] != 0.0):
+                for k in range(3):
+                    total[k] += wp.static(real(velocity[j])) * S[wp.static(rows[j]) + k, i]
+            if wp.static(position[j] != 0.0):
+                for k in range(3):
+                    total[3 + k] += wp.static(real(position[j])) * S[wp.static(rows[j]) + k, i]
+        return total
+
+    return sums
 
 
 def row_width(columns: int, size: int) -> int:

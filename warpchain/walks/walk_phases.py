@@ -64,8 +64,7 @@ def phase_features(setup: Setup) -> dict[str, Features]:
     """What kernels are compiled for in those phases that a walk has: `driven`, `moving` (beside a sprocket), `free`."""
     scene, options = setup.scene, setup.options
     columns = layout.padded_width(scene.links)
-    own = partial(Features, options.method, columns, self_contact=options.self_contact)
-    features = partial(own, is_mixed=options.is_mixed)
+    features = partial(Features, options.method, columns, self_contact=options.self_contact, is_mixed=options.is_mixed)
     body, tilts = setup.floor.body, scene.plane == "tilting"
     found = {"free": features(body, tilts=tilts)}
     if setup.has_drive:
