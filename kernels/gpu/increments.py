@@ -6,6 +6,7 @@ in double precision. A thread evaluates the joints at both ends of its link, so 
 """
 
 import functools
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,7 +35,7 @@ EXCHANGED = 16
 RENEWED = 32
 """Accepted steps after which directions and joints are formed anew.
 
-That costs 0.4 % of the time; openings are wrong by what the rounding of their rates adds up to, as the power 1.5 of it.
+That costs hardly any time; openings are wrong by what the rounding of their rates adds up to, as the power 1.5 of it.
 """
 
 vec3d = wp.types.vector(length=3, dtype=wp.float64)
@@ -70,6 +71,7 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
     Stage, Joint, PlaneMotion = algebra.Stage, algebra.Joint, algebra.PlaneMotion
     displace, force, torque_of, start_force = algebra.displace, algebra.force, algebra.torque, algebra.start_force
     small_turn = turn_single if features.is_mixed else turn_double
+    T4, T6, T8 = (real(1 / math.factorial(power)) for power in (4, 6, 8))
     write_pair, read_pair, write_one, read_one = number_memory(real)
     is_shared = shares_board(block_dim)
     acceleration = features.acceleration
@@ -87,17 +89,13 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
     # Stages write in turn to two buffers of 7 and 9 numbers a thread, the last one to the larger.
     LEFT, RIGHT, LEFT_RATE, RIGHT_RATE = range(4)
 
-    def buffer(s: int) -> int:
-        """First number of the buffer of a stage."""
-        return 0 if (last - s) % 2 else 7 * block_dim
-
     def pairs(s: int, part: int) -> int:
         """Index of a part's first pair; buffers begin at even numbers."""
-        return buffer(s) // 2 + part * block_dim
+        return (0 if (last - s) % 2 else 7 * block_dim // 2) + part * block_dim
 
     def turns(s: int) -> int:
         """Index of the first change of spin, behind the pairs."""
-        return buffer(s) + (8 if s == last else 6) * block_dim
+        return 2 * pairs(s, 4 if s == last else 3)
 
     @wp.struct
     class Common:
@@ -213,13 +211,6 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
         return vec3d(wp.float64(x[0]), wp.float64(x[1]), wp.float64(x[2]))
 
     @wp.func
-    def plane_felt(run: Run) -> PlaneMotion:
-        plane = PlaneMotion()
-        if wp.static(features.tilts):
-            plane = wp.static(algebra.plane_motion)(felt_plane(run))
-        return plane
-
-    @wp.func
     def load(run: Run, plane: PlaneMotion, even: real, gain: vec3, way: vec3, arm_x: real, arm_y: real):
         """Accelerations of a link by what acts on it besides joints and weight, at the time ``even`` in the step.
 
@@ -240,8 +231,7 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
         x_there = K[X, lane] + moved[0]
         there = Link(x_there, K[Y, lane] + moved[1], motion[0], motion[1], motion[2], turned_x, turned_y)
         inverse_mass = K[layout.INVERSE_MASS, run.column]
-        inverse_inertia = K[layout.INVERSE_INERTIA, run.column]
-        ax, ay, turn = acceleration(constants(K), lane, there, inverse_mass, inverse_inertia)
+        ax, ay, turn = acceleration(constants(K), lane, there, inverse_mass, K[layout.INVERSE_INERTIA, run.column])
         return vec3(real(ax), real(ay), real(turn))
 
     @wp.func
@@ -260,7 +250,9 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
         before = Joint()
         friction = get(run, FRICTION, lane)
         friction_before = get(run, FRICTION, run.before)
-        plane = plane_felt(run)
+        plane = PlaneMotion()
+        if wp.static(features.tilts):
+            plane = wp.static(algebra.plane_motion)(felt_plane(run))
         rates = Stages()
         rates[0] = kept_push(run)
         if wp.static(has_load):
@@ -309,9 +301,7 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
                 delta = real(turn)
                 z = delta * delta
                 _versine, lag = small_turn(delta)
-                quartic = (
-                    z * z * (wp.static(real(1 / 24)) - z * (wp.static(real(1 / 720)) - z * wp.static(real(1 / 40320))))
-                )
+                quartic = z * z * (wp.static(T4) - z * (wp.static(T6) - z * wp.static(T8)))
                 half = HALF * turn
                 cosine = K[COSINE, lane]
                 sine = K[SINE, lane]
@@ -380,13 +370,12 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
                 if wp.static(has_load):
                     rates[s] += load(run, plane, h, gain, ways, moved.arm_x, moved.arm_y)
                 result.opening = wp.float32(joint.x * joint.x + joint.y * joint.y)
-                errors = vec3()
+                e = vec3()
                 for j in range(wp.static(stages)):
                     if wp.static(velocity_errors[j] != 0.0):
-                        errors += wp.static(real(velocity_errors[j])) * rates[j]
+                        e += wp.static(real(velocity_errors[j])) * rates[j]
                 u = real(K[U, lane])
                 v = real(K[V, lane])
-                e = errors
                 k = rates[0]
                 error = wp.static(algebra.error_ratio)(
                     stage, e[0], e[1], e[2], u, v, omega, k[0], k[1], k[2], delta, inverse_tolerance
