@@ -23,31 +23,25 @@ GAP, SUMS = 24, 25
 SCRATCH_ROWS = 30
 """Rows of a chain's scratch on a CPU, without those of stages, see :mod:`cpu.stage_rows`, and of flights."""
 
-# Of a stage on a GPU: accelerations of x, y, θ, and the power [W] lost in each joint to friction and damping.
-STAGE_ROWS = 5
-
 # Model.links: what links and joints have of their own, one after the other as in a chain's parameters.
 OWN_MASS, OWN_INERTIA, OWN_VISCOUS, OWN_COULOMB, OWN_RADIUS = range(5)
 LINK_ROWS = 5
 
 # On a GPU the first 19 rows above and the following ones lie on a board that all threads of a block share. Between
-# launches the scratch keeps the rows from BOARD_LOST_SELF up to BOARD_VALUES. Every row less leaves a multiprocessor
+# launches the scratch keeps the rows from BOARD_LOST_SELF up to BOARD_VALUES, the directions, and from the row MASS on
+# the start of the next step, see gpu.increments. Every row less leaves a multiprocessor
 # more cache for register spills.
 BOARD_LOST_SELF, BOARD_LOST_FRICTION, BOARD_LOST_DAMPING, BOARD_LOST_FIXED = range(19, 23)
 BOARD_LISTED_X, BOARD_LISTED_Y = 23, 24
-# First stage of the next step, see STAGE_ROWS.
-BOARD_FIRST = 25
 # Values of the whole chain, in the first columns of one more row; behind them its constants, see gpu.stage.constants.
-BOARD_VALUES = 30
+BOARD_VALUES = 25
 VALUE_OPENING, VALUE_FIXED_DEPTH, VALUE_STOP_TIME, VALUE_NEXT_SAMPLE, VALUE_DEADLINE = range(5)
-VALUE_CONTACT_STEP, VALUE_TOLERANCE = 5, 6
-# A plane that tilts in the middle of the attempt before: the first PLANE_VALUES of State.plane.
-VALUE_PLANE_BEFORE = 7
+VALUE_CONTACT_STEP, VALUE_INVERSE_TOLERANCE = 5, 6
 # What a sample finds: totals over the links, see events.summary, and what drag leaves of their velocities across the
 # path of the loop.
-VALUE_TOTALS, VALUE_DRAG = 19, 34
-VALUES = 35
-BOARD_ROWS = 31
+VALUE_TOTALS, VALUE_DRAG = 7, 22
+VALUES = 23
+BOARD_ROWS = 26
 
 # State.watch. Of each watched quantity of a loop on its sprocket, in the order of WATCHED_COLUMNS: the sum over the
 # samples of a window, and the least and the greatest mean of a window.

@@ -2,11 +2,10 @@
 
 import warp as wp
 
-from warpchain.kernels import layout
-from warpchain.kernels.gpu.stage import Attempt, Run, constants, read_link
-from warpchain.kernels.layout import BOARD_VALUES, COSINE, LEFT_X, SINE, THETA, U, X
+from warpchain.kernels.gpu.stage import Run, read_link
+from warpchain.kernels.layout import BOARD_VALUES, COSINE, LEFT_X, THETA, X
 from warpchain.kernels.physics.elementary import ZERO, cos_sin
-from warpchain.kernels.physics.geometry import Link, end_positions, put
+from warpchain.kernels.physics.geometry import Link, end_positions, put, two
 from warpchain.kernels.types import Chain, Rows, State
 
 
@@ -28,28 +27,20 @@ def find_link(empty: Run, chain: Chain, lane: int) -> Run:
 
 @wp.func
 def load_link(run: Run, state: State):
-    """Writes a thread's link on the board; threads without a link get one at the origin that nothing acts on."""
-    for row in range(SINE):
+    """Writes a thread's link on the board; threads without a link get one at the origin that no joint acts on.
+
+    Its direction is that of the launch before, or of its angle if that is void.
+    """
+    direction = two(run.kept, COSINE, run.column)
+    for row in range(COSINE):
         run.K[row, run.lane] = ZERO
     if run.lane < run.links:
         for k in range(6):
             run.K[X + k, run.lane] = state.links[run.world, X + k, run.lane]
-    cosine, sine = cos_sin(run.K[THETA, run.lane])
-    put(run.K, COSINE, run.lane, wp.vec2d(cosine, sine))
-
-
-@wp.func
-def write_attempt(run: Run, result: Attempt, h: wp.float64):
-    """Writes a link's new state and the losses of its joint on the board."""
-    K = run.K
-    lane = run.lane
-    if lane < run.links:
-        K[layout.BOARD_LOST_FRICTION, lane] = K[layout.BOARD_LOST_FRICTION, lane] + h * result.friction
-        dissipation = constants(K).joint_damping * result.damping
-        K[layout.BOARD_LOST_DAMPING, lane] = K[layout.BOARD_LOST_DAMPING, lane] + h * dissipation
-        put(K, X, lane, result.place)
-        put(K, U, lane, result.velocity)
-        put(K, COSINE, lane, wp.vec2d(result.cosine, result.sine))
+    if run.lane >= run.links or state.is_fresh[run.world] != 0 or state.has_first_stage[run.world] == 0:
+        cosine, sine = cos_sin(run.K[THETA, run.lane])
+        direction = wp.vec2d(cosine, sine)
+    put(run.K, COSINE, run.lane, direction)
 
 
 @wp.func

@@ -14,6 +14,7 @@ from warpchain.kernels.events.tallies import add_count, of_fixed_body, raise_ext
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.board import load_link, publish
 from warpchain.kernels.gpu.contacts.self_contacts import TouchLayout
+from warpchain.kernels.gpu.increments import BlockSteps
 from warpchain.kernels.gpu.stage import Run, constants, write_constants
 from warpchain.kernels.gpu.threads import barrier, clock
 from warpchain.kernels.gpu.upright import BlockPlane
@@ -31,7 +32,8 @@ def write_bounds(run: Run, drive: Drive, state: State, control: Control, is_driv
     """For one thread: writes on the board what bounds steps, when the next sample or frame is due, and when to stop."""
     K = run.K
     K[BOARD_VALUES, layout.VALUE_CONTACT_STEP] = contact_step(state, control, run.world, is_driven)
-    K[BOARD_VALUES, layout.VALUE_TOLERANCE] = spring_tolerance(drive, state, control, run.world, is_driven)
+    tolerance = spring_tolerance(drive, state, control, run.world, is_driven)
+    K[BOARD_VALUES, layout.VALUE_INVERSE_TOLERANCE] = ONE / tolerance
     K[BOARD_VALUES, layout.VALUE_STOP_TIME] = state.stop_time[run.world]
     K[BOARD_VALUES, layout.VALUE_NEXT_SAMPLE] = next_mark(state, control, run.world)
 
@@ -101,7 +103,7 @@ def note_drag(K: Rows, _chain: Chain, left: wp.float64):
 
 
 @functools.cache
-def block_run(features: Features, touch: TouchLayout, plane: BlockPlane):
+def block_run(features: Features, touch: TouchLayout, plane: BlockPlane, steps: BlockSteps):
     """Warp functions for all threads of a block that load a chain's run and store it.
 
     ``load(run, model, drive, state, control)``, which ends with a barrier, and
@@ -123,6 +125,8 @@ def block_run(features: Features, touch: TouchLayout, plane: BlockPlane):
             is_fresh = state.is_fresh[world] != 0
             for row in range(BOARD_LOST_SELF, wp.static(BOARD_VALUES)):
                 K[row, lane] = wp.where(is_fresh, ZERO, run.kept[row, lane])
+        wp.static(steps.load_start)(run)
+        wp.static(steps.write_constants)(run)
         if lane == 0:
             write_constants(K, present_chain(model, state, control, world))
             plane.load(run)
@@ -149,8 +153,11 @@ def block_run(features: Features, touch: TouchLayout, plane: BlockPlane):
         if lane < run.links:
             for k in range(6):
                 state.links[world, layout.X + k, lane] = K[layout.X + k, lane]
+            for row in range(layout.COSINE, wp.static(layout.SINE + 1)):
+                run.kept[row, lane] = K[row, lane]
             for row in range(BOARD_LOST_SELF, wp.static(BOARD_VALUES)):
                 run.kept[row, lane] = K[row, lane]
+        wp.static(steps.store_start)(run)
         if lane == 0:
             plane.store(run)
             if is_last:
@@ -171,7 +178,7 @@ def block_run(features: Features, touch: TouchLayout, plane: BlockPlane):
 
 
 @functools.cache
-def block_sample(features: Features, touch: TouchLayout, plane: BlockPlane):
+def block_sample(features: Features, touch: TouchLayout, plane: BlockPlane, steps: BlockSteps):
     """Warp function of a sample, for all threads of a block.
 
     ``take_sample(run, model, drive, state, record, control, time)`` → whether the chain has changed, so that its first
@@ -217,6 +224,7 @@ def block_sample(features: Features, touch: TouchLayout, plane: BlockPlane):
                     drag_link(K, run.lane, run.before, run.after, K[BOARD_VALUES, layout.VALUE_DRAG])
                 if changed:
                     write_link(K, model, world, run.lane, state.load_factor[world])
+                    wp.static(steps.write_constants)(run)
         return changed, pauses, status
 
     return take_sample

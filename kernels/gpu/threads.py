@@ -8,6 +8,7 @@ The native snippets below are what pure Warp lacks. Their CPU branches run in bl
 """
 
 import functools
+from typing import Any
 
 import warp as wp
 
@@ -83,6 +84,55 @@ def tile_address(dtype: type, size: int):
     def address(tile: wp.tile[dtype, size]) -> wp.uint64: ...
 
     return address
+
+
+WRITE_PAIR = """
+#if defined(__CUDA_ARCH__)
+    reinterpret_cast<REAL2*>(memory)[index] = make_REAL2(x, y);
+#else
+    reinterpret_cast<REAL*>(memory)[2 * index] = x;
+    reinterpret_cast<REAL*>(memory)[2 * index + 1] = y;
+#endif
+"""
+READ_PAIR = """
+#if defined(__CUDA_ARCH__)
+    const REAL2 pair = reinterpret_cast<const REAL2*>(memory)[index];
+    return {pair.x, pair.y};
+#else
+    return {reinterpret_cast<const REAL*>(memory)[2 * index], reinterpret_cast<const REAL*>(memory)[2 * index + 1]};
+#endif
+"""
+
+
+@functools.cache
+def number_memory(real: Any):
+    """Warp functions (write a pair, read a pair, write a number, read a number) of numbers of one type.
+
+    ``write_pair(memory, index, x, y)``, ``read_pair(memory, index)`` → (x, y), and so on: memory is an address, a
+    multiple of the size of a pair, and the index counts pairs or numbers.
+    """
+    name = "float" if real is wp.float32 else "double"
+    vec2 = wp.types.vector(length=2, dtype=real)
+    write_two, read_two = (snippet.replace("REAL", name) for snippet in (WRITE_PAIR, READ_PAIR))
+
+    @wp.func_native(write_two)
+    def write_pair(memory: wp.uint64, index: int, x: real, y: real): ...
+
+    @wp.func_native(read_two)
+    def read_pair(memory: wp.uint64, index: int) -> vec2: ...
+
+    @wp.func_native(f"reinterpret_cast<{name}*>(memory)[index] = x;")
+    def write_one(memory: wp.uint64, index: int, x: real): ...
+
+    @wp.func_native(f"return reinterpret_cast<const {name}*>(memory)[index];")
+    def read_one(memory: wp.uint64, index: int) -> real: ...
+
+    return write_pair, read_pair, write_one, read_one
+
+
+@wp.func_native("return reinterpret_cast<::wp::uint64>(reinterpret_cast<char*>(memory) + offset);")
+def address_at(memory: wp.uint64, offset: int) -> wp.uint64:
+    """An address so many bytes further; by a sum of integers the compiler would lose that it is shared memory."""
 
 
 vec4i = wp.types.vector(length=4, dtype=wp.int32)

@@ -11,10 +11,10 @@ import warp as wp
 from warpchain.kernels import layout
 from warpchain.kernels.contacts import tilting_floor
 from warpchain.kernels.gpu.contacts.proximity import touching_link
-from warpchain.kernels.gpu.stage import Run, constants, felt_plane
+from warpchain.kernels.gpu.stage import Run, constants
 from warpchain.kernels.gpu.threads import barrier, barrier_count, warp_width
 from warpchain.kernels.gpu.upright import BlockPlane
-from warpchain.kernels.layout import BOARD_VALUES, PLANE_MID, U
+from warpchain.kernels.layout import U
 from warpchain.kernels.physics import plane
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.physics.geometry import put
@@ -97,19 +97,10 @@ def block_tilting(block_dim: int, votes: int) -> BlockPlane:
         copy_plane(run.stored_plane, run.P)
 
     @wp.func
-    def after_first_stage(_run: Run):
-        barrier()  # all have read the plane that they feel
-
-    @wp.func
     def begin_step(run: Run, h: wp.float64):
         if run.lane == 0:
-            for k in range(wp.static(layout.PLANE_VALUES)):
-                run.K[BOARD_VALUES, layout.VALUE_PLANE_BEFORE + k] = run.P[PLANE_MID + k]
             plane.begin_step(run.P, constants(run.K).gravity, h)
         barrier()
-        if run.lane < run.links:
-            before = plane.on_plane(constants(run.K), run.K[BOARD_VALUES], layout.VALUE_PLANE_BEFORE)
-            plane.shift_stage(run.K, layout.BOARD_FIRST, run.lane, before, felt_plane(run))
 
     @wp.func
     def sum_up(run: Run):
@@ -142,14 +133,14 @@ def block_tilting(block_dim: int, votes: int) -> BlockPlane:
             plane.end_step(run.P, constants(run.K).gravity, h)
 
     @wp.func
-    def meet(run: Run, _drive: Drive, _time: wp.float64):
+    def meet(run: Run, _drive: Drive, _time: wp.float64, _gap: wp.float32):
         K = run.K
         P = run.P
         lane = run.lane
         barrier()  # the plane and its mass are those of the new state
         chain = with_circles(plane.on_plane(constants(K), P, 0), K[layout.RADIUS, run.column])
         slope = tilting_floor.steepness(chain)
-        link = touching_link(run, chain)
+        link = touching_link(run)
         touches = wp.int64(0)
         if lane < run.links:
             touches = tilting_floor.link_touches(chain, slope, link)
@@ -181,4 +172,4 @@ def block_tilting(block_dim: int, votes: int) -> BlockPlane:
                 K[layout.BOARD_LOST_FIXED, 0] = K[layout.BOARD_LOST_FIXED, 0] + lost
         return hits
 
-    return BlockPlane(meet, load, store, begin_run, after_first_stage, begin_step, end_step)
+    return BlockPlane(meet, load, store, begin_run, begin_step, end_step)

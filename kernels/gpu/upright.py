@@ -30,12 +30,13 @@ class BlockPlane:
     Between a function that uses ``run.M`` and any other use of that memory there must be a barrier.
     """
 
-    meet: Any  # ``(run, drive, time)`` applies the impulses of the floor or sprocket → number of those of this thread
+    # ``(run, drive, time, gap)`` applies the impulses of the floor or sprocket, from which this thread's link has that
+    # gap [m] → number of those of this thread
+    meet: Any
     load: Any = nothing  # ``(run)`` loads the plane; for one thread
     store: Any = nothing  # ``(run)`` stores it; for one thread
     begin_run: Any = nothing  # ``(run)`` when the host has set the links; uses M
-    after_first_stage: Any = nothing  # ``(run)`` after a first stage has been evaluated
-    begin_step: Any = no_motion  # ``(run, h)`` moves the plane to the middle of a step, and the first stage with it
+    begin_step: Any = no_motion  # ``(run, h)`` moves the plane to the middle of a step
     end_step: Any = no_motion  # ``(run, h)`` carries the plane to the end of an accepted step; uses M
 
 
@@ -45,9 +46,9 @@ def block_upright(fixed_body: str) -> BlockPlane:
     meet_body = block_contact(fixed_body)
 
     @wp.func
-    def meet(run: Run, drive: Drive, time: wp.float64):
+    def meet(run: Run, drive: Drive, time: wp.float64, gap: wp.float32):
         hits = int(0)
-        if run.lane < run.links:
+        if run.lane < run.links and gap < wp.float32(0.0):
             hits = meet_body(run, drive, time)
         return hits
 

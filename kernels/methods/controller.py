@@ -1,6 +1,7 @@
 """Step control: the error ratio of an attempt, and the controllers that derive the next step from it."""
 
 import functools
+from typing import Any
 
 import warp as wp
 
@@ -25,7 +26,10 @@ def error_scale(value: wp.float64, rate: wp.float64, h: wp.float64):
 
 @wp.func_native("""
 #if defined(__CUDA_ARCH__)
-    return __powf(x, y);
+    float power;
+    asm("lg2.approx.ftz.f32 %0, %1;" : "=f"(power) : "f"(x));
+    asm("ex2.approx.ftz.f32 %0, %1;" : "=f"(power) : "f"(y * power));
+    return power;
 #else
     return ::powf(x, y);
 #endif
@@ -48,7 +52,7 @@ def quick_root(x: wp.float32) -> wp.float32:
 
 
 @wp.func
-def next_step(step: wp.float64, h: wp.float64, factor: wp.float64):
+def next_step(step: Any, h: Any, factor: Any):
     """Step [s] to propose after an accepted one of h. A shortened step must not lower the proposal it was cut from."""
     proposal = h * factor
     return wp.where(h < step, wp.max(step, proposal), proposal)

@@ -85,7 +85,9 @@ def quotient(a: wp.float64, b: wp.float64) -> wp.float64:
 
 @wp.func_native("""
 #if defined(__CUDA_ARCH__)
-    return __fdividef(a, b);
+    float y;
+    asm("div.approx.ftz.f32 %0, %1, %2;" : "=f"(y) : "f"(a), "f"(b));
+    return y;
 #else
     return a / b;
 #endif

@@ -42,8 +42,8 @@ import warp as wp
 
 from warpchain.kernels import layout
 from warpchain.kernels.layout import AHEAD, MOMENTUM, ORIGIN, RATE_XX, SUM_MU, SUM_MV, SUM_MX, SUM_MY, SUM_XX, UP
-from warpchain.kernels.physics.elementary import HALF, ONE, ZERO, quotient
-from warpchain.kernels.physics.geometry import Link, put, read_link, three
+from warpchain.kernels.physics.elementary import HALF, ONE, quotient
+from warpchain.kernels.physics.geometry import Link
 from warpchain.kernels.types import Chain, Row, Rows
 
 THIRD = wp.constant(wp.float64(1.0 / 3.0))
@@ -74,15 +74,6 @@ def on_plane(own: Chain, P: Row, first: int) -> Chain:
     chain.up_z = P[first + UP + 2]
     chain.origin_height = P[first + ORIGIN + 1]
     return chain
-
-
-@wp.func
-def shift_stage(K: Rows, row: int, i: int, before: Chain, now: Chain):
-    """Changes a stage of link i, whose accelerations begin at this row, from one plane to another."""
-    link = read_link(K, now, i)
-    ax, ay, turn = plane_load(now, i, link, ZERO, ZERO)
-    old_ax, old_ay, old_turn = plane_load(before, i, link, ZERO, ZERO)
-    put(K, row, i, three(K, row, i) + wp.vec3d(ax - old_ax, ay - old_ay, turn - old_turn))
 
 
 @wp.func

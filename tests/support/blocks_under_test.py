@@ -23,7 +23,17 @@ from warpchain.kernels.features import Features
 from warpchain.kernels.gpu import loop as gpu_loop
 from warpchain.status import Status
 
-FIXED_STEP = 2e-6  # s
+FIXED_STEP = 2.0**-19  # s, about 2 µs, exact in single precision
+NEARLY = 1e-9
+"""Share of the greatest value by which fibers may differ from a CPU after dozens of steps with impulses.
+
+Both round the same algebra otherwise. A GPU carries openings C on from step to step, a CPU forms them anew as
+differences of places x. In double precision that is 1e-16 x = 3e-18 m in these heaps, so a force k C of joints with
+k = 1e7 N/m is known to 3e-11 N, and the velocity of a link of 10 g to h k δC / m = 6e-15 m/s in a step h of 2 µs.
+Hundreds of impulses, which turn differences of places into others of velocities, multiply that.
+"""
+MIXED = 3e-6
+"""Likewise in mixed precision, in which a force, of 1e3 N here, is known to 6e-8 of itself."""
 HILLS = np.array([[-1.0, -0.002], [-0.02, 0.003], [0.0, -0.001], [0.015, 0.002], [0.03, -0.01], [1.0, -0.01]])
 """Points of a floor with corners of both kinds, which heaps cut."""
 
@@ -72,6 +82,7 @@ def batch_of(
     stop_time: float = 1.0,
     tolerance: float = 1e-4,
     keeps: bool = False,
+    precision: str = "double",
 ) -> Batch:
     """A batch with these chains (position, velocity), one a world, at soft parameters.
 
@@ -79,7 +90,8 @@ def batch_of(
     `keeps` samples, and a frame with loads at every second one.
     """
     longest = max(len(position) for position, _ in chains)
-    options = Options(method=method, tolerance=0.1 if fixed_step else tolerance, self_contact=self_contact)
+    tolerance = 0.1 if fixed_step else tolerance
+    options = Options(method=method, tolerance=tolerance, self_contact=self_contact, precision=precision)
     keep = Keep(series_every=1, frame_every=2, loads=True) if keeps else NOTHING
     batch = Batch(len(chains), longest, options, keep, faces=len(HILLS) - 1)
     batch.control.launch_time = 1e9  # attempts alone end a launch, however busy the machine is
@@ -128,10 +140,18 @@ def listed_pairs(batch: Batch, world: int = 0) -> set[tuple[int, int]]:
     return set(zip(first.tolist(), second.tolist(), strict=True))
 
 
-def assert_same(ours: Batch, theirs: Batch) -> None:
-    """State, clock, counters and watches agree to the bit, sums of losses to rounding, extremes to single precision."""
-    exact = ("links", "time", "counts", "status", "softness", "load_factor", "first_area", "watch", "stop_time")
-    for name in exact:
+def assert_close(ours: Array, theirs: Array, share: float) -> None:
+    """Numbers differ by at most a share of the greatest."""
+    assert_allclose(ours, theirs, rtol=0, atol=share * np.abs(theirs).max(initial=0.0))
+
+
+def assert_same(ours: Batch, theirs: Batch, share: float = NEARLY) -> None:
+    """Clock, counters and all that a run decides agree exactly, states and energies to a share, extremes to 1e-6."""
+    for name in ("time", "counts", "status", "softness", "load_factor", "stop_time"):
         assert_array_equal(getattr(ours.state, name).numpy(), getattr(theirs.state, name).numpy(), err_msg=name)
-    assert_allclose(ours.state.losses.numpy(), theirs.state.losses.numpy(), rtol=1e-12)
-    assert_allclose(ours.state.extremes.numpy(), theirs.state.extremes.numpy(), rtol=1e-6)
+    for row in range(6):
+        assert_close(ours.state.links.numpy()[:, row], theirs.state.links.numpy()[:, row], share)
+    for name in ("watch", "first_area"):
+        assert_close(getattr(ours.state, name).numpy(), getattr(theirs.state, name).numpy(), share)
+    assert_allclose(ours.state.losses.numpy(), theirs.state.losses.numpy(), rtol=share, atol=1e-15)
+    assert_allclose(ours.state.extremes.numpy(), theirs.state.extremes.numpy(), rtol=max(1e-6, share))

@@ -134,7 +134,7 @@ class Options(Section):
     @property
     def is_mixed(self) -> bool:
         """Whether stages of steps are in single precision."""
-        return self.precision == "mixed" and not on_gpu(self.device)
+        return self.precision == "mixed"
 
     @model_validator(mode="before")
     @classmethod

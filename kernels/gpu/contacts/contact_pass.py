@@ -7,7 +7,6 @@ import warp as wp
 from warpchain.kernels import layout
 from warpchain.kernels.codes import LIST_OVERFLOW, RUNNING
 from warpchain.kernels.contacts.list_layout import list_layout
-from warpchain.kernels.contacts.pair_list import slack_of
 from warpchain.kernels.events.tallies import add_count, note_floor_impulse
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.board import publish, raise_value
@@ -19,14 +18,19 @@ from warpchain.kernels.gpu.threads import barrier_count
 from warpchain.kernels.gpu.upright import BlockPlane
 from warpchain.kernels.types import Control, Drive, State
 
+MARGIN = wp.constant(wp.float32(1.0 + 2e-6))
+"""More than the roundings of lengths in single precision."""
+
 
 @functools.cache
 def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, plane: BlockPlane):
-    """Warp functions (begin, meet) of the contacts, for all threads of a block.
+    """Warp functions (begin, look, meet) of the contacts, for all threads of a block.
 
     ``begin(run, state, control, proximity)`` → number of listed pairs, longest step [s] that cannot miss a contact (see
-    ``time_to_contact`` of :mod:`gpu.contacts.proximity`), status. The board is written, and a barrier passed.
-    ``meet(run, drive, state, control, time, proximity, pairs)`` → whether anything was hit, then these three anew.
+    ``time_to_contact`` of :mod:`gpu.contacts.proximity`), status, how far joints may move before the list may be stale
+    if none is open [m]. The board is written, and a barrier passed. ``look(run, proximity, pairs, spare)`` → whether
+    there is anything to do for ``meet``, and that longest step. ``meet(run, drive, state, control, time, proximity, own
+    gap, pairs, spare)`` → whether anything was hit, then the four of ``begin`` anew.
     """
     lists = list_layout(features.columns)
     has_fixed = features.fixed_body != "none"
@@ -44,12 +48,15 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
         return wp.min(pairs, wp.static(lists.capacity)), status
 
     @wp.func
-    def list_slack(run: Run, opening: wp.float32, displacement: wp.float32):
-        """How far joints may still move [m]; nothing stales a list that is not used."""
-        if wp.static(not has_self):
-            return wp.float32(0.0)
-        nearest = run.L[wp.static(lists.nearest)]
-        return wp.float32(slack_of(constants(run.K), nearest, upper_bound(opening), upper_bound(displacement)))
+    def spare_of(run: Run):
+        """How far joints may move [m] before the list may be stale, if none is open: :func:`pair_list.slack_of`."""
+        nearest = wp.cast(run.L[wp.static(lists.nearest)], wp.float32)
+        return wp.float32(0.5) * nearest - wp.float32(constants(run.K).circle_radius)
+
+    @wp.func
+    def slack(spare: wp.float32, opening: wp.float32, displacement: wp.float32):
+        """How far joints may still move [m]; rounding never makes it longer."""
+        return spare - MARGIN * (wp.abs(spare) * wp.static(wp.float32(1e-6)) + opening + displacement)
 
     @wp.func
     def begin(run: Run, state: State, control: Control, proximity: Proximity):
@@ -57,6 +64,7 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
         pairs = int(0)
         # kept from the last launch, since recomputing could round differently
         reach = wp.float32(state.time_to_contact[run.world])
+        spare = wp.float32(0.0)
         if state.is_fresh[run.world] == 0:
             if wp.static(has_self):
                 pairs = run.L[wp.static(lists.count)]
@@ -64,20 +72,43 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
             if wp.static(has_self):
                 pairs, status = list_pairs(run, control, proximity.opening, True)
             plane.begin_run(run)
-            slack = list_slack(run, proximity.opening, wp.float32(0.0))
-            reach = time_to_contact(control, pairs, proximity.gap, slack, proximity.speed)
-        return pairs, reach, status
+            if wp.static(has_self):
+                spare = spare_of(run)
+            still = slack(spare, proximity.opening, wp.float32(0.0))
+            reach = time_to_contact(run, pairs, proximity.gap, still, proximity.speed)
+        if wp.static(has_self):
+            spare = spare_of(run)
+        return pairs, reach, status, spare
+
+    @wp.func
+    def look(run: Run, proximity: Proximity, pairs: int, spare: wp.float32):
+        still = slack(spare, proximity.opening, proximity.displacement)
+        is_near = wp.static(features.moving_sprocket)
+        if wp.static(has_fixed):
+            is_near = is_near or proximity.gap < wp.float32(0.0)
+        if wp.static(has_self):
+            is_near = is_near or pairs > 0 or not still > wp.float32(0.0)
+        return is_near, time_to_contact(run, pairs, proximity.gap, still, proximity.speed)
 
     @wp.func
     def meet(
-        run: Run, drive: Drive, state: State, control: Control, time: wp.float64, proximity: Proximity, listed: int
+        run: Run,
+        drive: Drive,
+        state: State,
+        control: Control,
+        time: wp.float64,
+        proximity: Proximity,
+        own_gap: wp.float32,
+        listed: int,
+        listed_spare: wp.float32,
     ):
         T = run.T
         lane = run.lane
         gap = proximity.gap
         opening = proximity.opening
         pairs = listed
-        slack = list_slack(run, opening, proximity.displacement)
+        spare = listed_spare
+        still = slack(spare, opening, proximity.displacement)
         status = int(RUNNING)
         is_hit = bool(False)
         is_near = bool(False)
@@ -86,7 +117,7 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
         if wp.static(has_fixed):
             if gap < wp.float32(0.0):
                 is_near = bool(True)
-                hits = plane.meet(run, drive, time)
+                hits = plane.meet(run, drive, time, own_gap)
                 if hits > 0:
                     wp.atomic_add(T, wp.static(touch.fixed_hits), hits)
         if wp.static(features.moving_sprocket):
@@ -97,7 +128,7 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
                 if struck > 0:
                     wp.atomic_add(state.counts, run.world, wp.static(layout.SPROCKET_IMPULSES), wp.int64(struck))
         if wp.static(has_self):
-            is_stale = not slack > wp.float32(0.0)
+            is_stale = not still > wp.float32(0.0)
             if is_stale or pairs > 0:
                 is_near = bool(True)
                 publish(run)
@@ -115,7 +146,8 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
                 if lane == 0:
                     add_count(state, run.world, layout.LIST_BUILDS, wp.int64(1))
                 pairs, status = list_pairs(run, control, opening, pairs == 0)
-                slack = list_slack(run, opening, wp.float32(0.0))
+                spare = spare_of(run)
+                still = slack(spare, opening, wp.float32(0.0))
             if pairs > 0:
                 touched = constants(run.K)
                 touching = find_contacts(run, touched, pairs, upper_bound(opening))
@@ -125,6 +157,6 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
                         wp.atomic_add(T, wp.static(touch.self_hits), hits)
                     if not is_hit:
                         is_hit = barrier_count(T, wp.static(touch.votes), hits > 0) > 0
-        return is_hit, pairs, time_to_contact(control, pairs, gap, slack, proximity.speed), status
+        return is_hit, pairs, time_to_contact(run, pairs, gap, still, proximity.speed), status, spare
 
-    return begin, meet
+    return begin, look, meet

@@ -31,7 +31,8 @@ LINKS, STEPS = 60, 300
 
 def fixed_steps(device: str, method: str, fixed_body: str) -> dict[str, np.ndarray]:
     """State and counters of two heaps in which everything touches everything, after steps of equal length."""
-    batch = Batch(2, LINKS, Options(method=method, tolerance=0.1, device=device), faces=len(HILLS) - 1)
+    options = Options(method=method, tolerance=0.1, device=device, precision="double")
+    batch = Batch(2, LINKS, options, faces=len(HILLS) - 1)
     batch.control.skin = 1e-9  # so that no step may be longer than …
     batch.control.contact_step = FIXED_STEP
     for world in range(2):
@@ -215,6 +216,16 @@ def test_flights_agree_with_scipy(name: str, method: str, within: float) -> None
     assert greatest(flight.position[-1], position) < 1e-8
     assert greatest(flight.velocity[-1], velocity) < within
     assert flight.losses["joint_friction"] > 1e-4
+
+
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_flights_in_mixed_precision_follow_the_tolerance(name: str, device: str) -> None:
+    """At tolerance 1e-6, the least for steps in mixed precision, places agree with DOP853 to 1e-6."""
+    start, (position, _) = exact_flight(name)
+    settings = {"method": "os32", "tolerance": 1e-6, "precision": "mixed", "device": device}
+    flight = simulate(name, *start, FLIGHTS[name], times=[FLIGHTS[name]], **settings)
+    assert flight.status == Status.FINISHED
+    assert greatest(flight.position[-1], position) < 1e-6
 
 
 @pytest.mark.usefixtures("gpu")

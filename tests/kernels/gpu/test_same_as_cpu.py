@@ -1,11 +1,12 @@
-"""GPU kernels equal CPU kernels.
+"""GPU kernels make the steps of CPU kernels.
 
 They run on CPU fibers here. Both are compiled without fused products and sums, which compilers choose differently. Then
-both do the same operations on the same numbers, so that steps of the same size must agree to the bit, including
-contacts resolved in parallel rounds.
+both do the same algebra on the same numbers, so that steps of the same size agree but for rounding, see :data:`NEARLY`,
+including contacts resolved in parallel rounds: in every impulse, and in all that a run decides.
 """
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,10 @@ import warp as wp
 from tests.support.blocks_under_test import (
     FIXED_STEP,
     HILLS,
+    MIXED,
+    NEARLY,
     SOFT,
+    assert_close,
     assert_same,
     batch_of,
     floor_with,
@@ -29,8 +33,9 @@ from warpchain.engine.batch import Batch
 from warpchain.engine.kernel_choice import most_registers
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
-from warpchain.kernels.gpu import functions
+from warpchain.kernels.gpu import functions, increments
 from warpchain.kernels.gpu.loop import make_advance_block
+from warpchain.kernels.methods.method import find_method
 from warpchain.status import Status
 
 LINKS = 24
@@ -40,14 +45,22 @@ pytestmark = pytest.mark.usefixtures("without_fused_operations")
 
 
 @pytest.mark.parametrize(
-    ("method", "fixed_body", "self_contact", "block_dim"),
-    [("bs32", "floor", False, LINKS), ("os32", "sprocket", True, 5 * LINKS), ("os32", "terrain", False, LINKS)],
+    ("method", "fixed_body", "self_contact", "block_dim", "precision"),
+    [
+        ("bs32", "floor", False, LINKS, "double"),
+        ("rkf78", "floor", False, LINKS, "double"),
+        ("os32", "sprocket", True, 5 * LINKS, "double"),
+        ("os32", "terrain", False, LINKS, "mixed"),
+        ("os32", "sprocket", True, 5 * LINKS, "mixed"),
+    ],
 )
-def test_fixed_steps_equal_a_cpu_kernel(method: str, fixed_body: str, self_contact: bool, block_dim: int) -> None:
-    """Forty steps with dozens of impulses of every kind end in the same state, to the bit."""
+def test_fixed_steps_equal_a_cpu_kernel(
+    method: str, fixed_body: str, self_contact: bool, block_dim: int, precision: str
+) -> None:
+    """Forty steps with dozens of impulses of every kind end in the same state, after the same impulses."""
     raised = 0.9 * SOFT.sprocket_radius if fixed_body == "sprocket" else 0.0
     chains = [heap(LINKS, 3, raised=raised), heap(min(40, block_dim), 18, tilt=np.pi, raised=raised)]
-    ours, theirs = (batch_of(chains, method=method, self_contact=self_contact) for _ in range(2))
+    ours, theirs = (batch_of(chains, method=method, self_contact=self_contact, precision=precision) for _ in range(2))
     for batch in (ours, theirs):
         for world in range(2):
             batch.worlds[world].set_floor(floor_with(HILLS, SOFT))
@@ -59,7 +72,7 @@ def test_fixed_steps_equal_a_cpu_kernel(method: str, fixed_body: str, self_conta
         assert counts["sprocket" if fixed_body == "sprocket" else "floor"] > 10
         assert (counts["self"] > 10) == self_contact
     assert (theirs.worlds[1].counts["strands"] > 0) == self_contact
-    assert_same(ours, theirs)
+    assert_same(ours, theirs, MIXED if precision == "mixed" else NEARLY)
 
 
 @pytest.mark.parametrize("links", [LINKS, LINKS + 1])
@@ -108,6 +121,39 @@ def test_free_flight_equals_a_cpu_kernel() -> None:
     assert np.allclose(ours.worlds[0].position, theirs.worlds[0].position, rtol=0, atol=1e-4)
 
 
+def ends_of(batch: Batch) -> tuple[np.ndarray, np.ndarray]:
+    """Places and velocities of the left and right ends of the first chain's links, (place or velocity, x or y, n)."""
+    (x, y, theta), (u, v, omega) = batch.worlds[0].position.T, batch.worlds[0].velocity.T
+    arm = SOFT.link_length / 2 * np.array([np.cos(theta), np.sin(theta)])
+    centre, swing = np.array([[x, y], [u, v]]), np.array([arm, omega * np.array([-arm[1], arm[0]])])
+    return centre - swing, centre + swing
+
+
+def test_joints_carried_on_are_those_of_the_state() -> None:
+    """Until joints are formed anew, in mixed precision, openings and their rates are those of the state to rounding.
+
+    A step that changes the velocities of ends by Δv rounds rates of openings some four times, to 6e-8 Δv each.
+    """
+    position, velocity = lay_chain(ellipse(1.5), LINKS, SOFT.link_length, 2.0, 0.1)
+    batch = batch_of([(position, velocity)], method="os32", self_contact=False, fixed_step=False, precision="mixed")
+    features = batch.features(fixed_body="none")
+    rounding = flown = 0.0
+    while (steps := batch.worlds[0].counts["accepted"]) < increments.RENEWED - 1:
+        before = ends_of(batch)
+        launch_blocks(batch, features, 1, block_dim=LINKS)
+        left, right = ends_of(batch)
+        if steps:
+            rounding += 4 * 6e-8 * np.abs([left - before[0], right - before[1]])[:, 1].max()
+            flown = batch.worlds[0].time
+    kept = batch.scratch.numpy()[0, layout.MASS :].view(np.float32).reshape(-1)[: 4 * batch.columns]
+    carried = kept.reshape(2, batch.columns, 2)[:, :LINKS].transpose(0, 2, 1)
+    wrong = np.abs(carried - (np.roll(left, -1, axis=-1) - right)).max(axis=(1, 2))
+    assert np.all(wrong > 0)
+    assert wrong[1] < rounding
+    assert wrong[0] < rounding * flown
+    assert np.abs(carried[0]).max() > 1e4 * wrong[0]
+
+
 def bounded_heaps(count: int) -> Batch:
     """Heaps on the floor, sampled often, their steps bounded by contacts; the first is not like the others."""
     chains = [heap(LINKS, 5)] + [heap(LINKS, 6)] * (count - 1)
@@ -131,10 +177,11 @@ def test_samples_frames_and_rest_equal_a_cpu_kernel() -> None:
     assert_same(ours, theirs)
     for name in ("first_sample", "last_sample"):
         expected = getattr(theirs.state, name).numpy()
-        assert np.array_equal(getattr(ours.state, name).numpy(), expected)
+        assert_close(getattr(ours.state, name).numpy(), expected, NEARLY)
     recorded, expected = ours.worlds[1].drain(), theirs.worlds[1].drain()
     assert len(recorded.times) > 1 and recorded.loads.shape == (len(recorded.times), LINKS, 3)
-    assert all(map(np.array_equal, recorded, expected))
+    for our, their in zip(recorded, expected, strict=True):
+        assert_close(our, their, NEARLY)
 
 
 def test_frames_between_samples_equal_a_cpu_kernel() -> None:
@@ -156,10 +203,11 @@ def test_frames_between_samples_equal_a_cpu_kernel() -> None:
         runs.append(batch)
     ours, theirs, coarse = runs
     assert_same(ours, theirs)
-    assert_same(theirs, coarse)
+    assert_same(theirs, coarse, 0.0)
     recorded, expected, few = (batch.worlds[1].drain() for batch in runs)
-    assert np.array_equal(recorded.loads, expected.loads)
-    assert np.array_equal(recorded.times, expected.times) and np.array_equal(recorded.frames, expected.frames)
+    assert np.array_equal(recorded.times, expected.times)
+    assert_close(recorded.loads, expected.loads, NEARLY)
+    assert_close(recorded.frames, expected.frames, NEARLY)
     marks = np.floor(recorded.times / (2.5 * FIXED_STEP) + 1e-9)
     assert len(few.times) < 6 and len(marks) > 12 and np.all(np.diff(marks) >= 1)
 
@@ -193,6 +241,14 @@ def test_failures_stop_one_chain_and_leave_the_others() -> None:
     assert stiff.worlds[0].status == Status.STEP_TOO_SMALL
 
 
+def test_registers_of_every_block_fit_into_a_multiprocessor() -> None:
+    """Warps of 32 threads go to four schedulers in turn, each of which has 16384 registers."""
+    for warps in range(1, 33):
+        busiest = len(range(0, warps, 4))
+        registers = functions.available_registers(32 * warps)
+        assert busiest * 32 * registers <= 16384 < busiest * 32 * (registers + 8)
+
+
 SHARED_MEMORY = 163 * 1024
 """Bytes that a block can have on a GPU of the older generation."""
 
@@ -213,5 +269,38 @@ def compiles_for_gpus(folder: Path, features: Features, block_dim: int, *generat
 )
 def test_a_kernel_compiles_for_gpus(tmp_path: Path, fixed_body: str, moves: bool, generations: tuple[int, ...]) -> None:
     """That of the drive compiles for sm_80 and sm_90; those of a profile and of a moving sprocket for one of these."""
-    features = Features("os32", layout.padded_width(60), fixed_body, True, moving_sprocket=moves)
+    features = Features("os32", layout.padded_width(60), fixed_body, True, moving_sprocket=moves, is_mixed=moves)
     compiles_for_gpus(tmp_path, features, 64, *generations)
+
+
+def attempt_loop(ptx: str) -> list[str]:
+    """Instructions of the innermost loop with barriers: that over attempts.
+
+    A loop ends in a branch to an earlier label.
+    """
+    lines = [line.strip() for line in ptx[ptx.index(".entry") :].splitlines()]
+    labels = {line[:-1]: place for place, line in enumerate(lines) if line.endswith(":")}
+    branches = [(place, re.match(r"(?:@!?%p\d+\s+)?bra(?:\.uni)?\s+(\S+);", line)) for place, line in enumerate(lines)]
+    loops = [lines[labels[match[1]] : place + 1] for place, match in branches if match and labels[match[1]] < place]
+    loop = min((loop for loop in loops if any(line.startswith("bar.sync") for line in loop)), key=len)
+    instructions = [re.sub(r"^@!?%p\d+\s+", "", line) for line in loop]
+    return [line for line in instructions if line.endswith(";") and not line.startswith("mov")]
+
+
+def test_attempts_in_mixed_precision_hardly_use_double_precision(tmp_path: Path) -> None:
+    """An attempt has a barrier a stage and one for the error; at most a twentieth of its work is in double precision.
+
+    That is what the new state takes. Conversions between the state and its increments are counted apart.
+    """
+    features = Features("os32", layout.padded_width(60), "floor", True, is_mixed=True)
+    module = make_advance_block(features, 64, most_registers(64)).module
+    module.options["block_dim"] = 64
+    wp.compile_aot_module(module, arch=90, module_dir=str(tmp_path), use_ptx=True)
+    (path,) = tmp_path.glob("*.ptx")
+    loop = attempt_loop(path.read_text(encoding="utf-8", errors="replace"))
+    assert sum(line.startswith("bar.sync") for line in loop) == len(find_method("os32").tableau.matrix)
+    operations = [line.split()[0] for line in loop]
+    double = [name for name in operations if ".f64" in name and not name.startswith(("ld.", "st.", "selp"))]
+    conversions = [name for name in double if name.startswith("cvt")]
+    assert len(double) - len(conversions) <= 0.05 * len(operations)
+    assert len(conversions) <= 30

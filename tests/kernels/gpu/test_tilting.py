@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.kernels.gpu.test_same_as_cpu import compiles_for_gpus
-from tests.support.blocks_under_test import SOFT, launch_blocks, launch_chains
+from tests.support.blocks_under_test import FIXED_STEP, SOFT, launch_blocks, launch_chains
 from warpchain.chain.keep import Keep
 from warpchain.chain.start_shapes import ellipse, lay_chain
 from warpchain.engine.batch import Batch
@@ -23,7 +23,8 @@ pytestmark = pytest.mark.usefixtures("without_fused_operations")
 
 def falling_batch(fixed_step: float | None = None) -> Batch:
     """Two circulating loops in planes that lean and turn, which have sunk into the floor a little."""
-    options = Options(method="os32", tolerance=1e-5 if fixed_step is None else 0.1)
+    tolerance, precision = (1e-5, "mixed") if fixed_step is None else (0.1, "double")
+    options = Options(method="os32", tolerance=tolerance, precision=precision)
     batch = Batch(2, max(LINKS), options, keep=Keep(series_every=1, frame_every=1), tilts=True)
     batch.control.launch_time = 1e9
     if fixed_step is not None:
@@ -49,7 +50,7 @@ def features_of(batch: Batch) -> Features:
 
 def test_a_gpu_kernel_tilts_as_a_cpu_kernel_does() -> None:
     """Through first impulses both find the same links and planes, but for the order in which sums are added up."""
-    one, other = (falling_batch(2e-6) for _ in range(2))
+    one, other = (falling_batch(FIXED_STEP) for _ in range(2))
     launch_chains(one, features_of(one), 60)
     launch_blocks(other, features_of(other), 60, block_dim=64)
     for world in range(2):
@@ -82,4 +83,6 @@ def test_cuts_change_no_bit() -> None:
 
 def test_it_compiles_for_gpus(tmp_path: Path) -> None:
     """The kernel of a tilting walk compiles for the newer GPUs."""
-    compiles_for_gpus(tmp_path, Features("os32", layout.padded_width(60), "floor", True, tilts=True), 64, 90)
+    compiles_for_gpus(
+        tmp_path, Features("os32", layout.padded_width(60), "floor", True, tilts=True, is_mixed=True), 64, 90
+    )

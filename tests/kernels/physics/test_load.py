@@ -60,6 +60,7 @@ def pull(position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         ("dp5", "cpu", 1e-10, 2e-8),
         ("dp5", "cpu", 1e-5, 1e-5),
         ("os32", "fibers", 1e-10, 2e-8),
+        ("os32", "fibers", 1e-5, 1e-5),
         pytest.param("hybrid", "cpu", 1e-10, 2e-8, marks=pytest.mark.slow),
     ],
 )
