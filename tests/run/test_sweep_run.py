@@ -38,7 +38,7 @@ def brief_setup(seed: int, **settings: object) -> Setup:
 
 def outcome(run) -> tuple:
     """Everything of a walk that a row keeps."""
-    return run.status, run.outcome()["walk_time"], tuple(run.counts.values()), tuple(run.energy().values())
+    return run.status, run.outcome().walk_time, str(vars(run.outcome()))
 
 
 def outcomes(setups, **how) -> list:

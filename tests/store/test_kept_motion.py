@@ -103,7 +103,7 @@ def test_long_motions_are_drained_between_launches() -> None:
     setup = brief_setup(1, record_interval=1e-6, walk_limit=0.04)  # a sample after each step
     ((_, run),) = run_setups([setup], keeps=[Keep(series_every=1, frame_every=10)])
     time = run.recorder.motion()["time"]
-    assert run.counts["accepted"] > 3 * CAPACITY_SAMPLES
+    assert run.outcome().steps_accepted > 3 * CAPACITY_SAMPLES
     np.testing.assert_allclose(time, np.arange(40_001) * 1e-6, rtol=1e-12)
     frames = run.recorder.motion()["frame_time"]
     assert len(frames) > 100 and np.all(np.diff(frames) > 0)

@@ -39,13 +39,13 @@ def released_loop(preset: str = "soft", **settings: Any) -> Loop:
     """Carry a walk of a preset's chain to the end of its drive."""
     setup = setup_walk(preset, {"method": "explicit"} | settings)
     batch = Batch(1, setup.scene.links, setup.options)
-    run = WalkRun(batch, 0, setup)
+    run = WalkRun(batch.worlds[0], setup)
     found: Loop | None = None
     for features in run.phases():
         if run.progress().phase == "walk":
             break
         batch.run([0], features)
-        found = Loop(setup, batch.position(0), batch.velocity(0))
+        found = Loop(setup, batch.worlds[0].position, batch.worlds[0].velocity)
     assert found is not None and run.progress().phase == "walk", "it was not released"
     return found
 
@@ -58,11 +58,12 @@ def hold(
     scene = setup.scene
     batch = Batch(1, scene.links, setup.options, keeps_samples=True, frame_every=1)
     other = replace(setup, parameters=parameters)
-    batch.set_chain(0, parameters, scene.links, own, other.contact_radius)
+    batch.worlds[0].set_chain(parameters, scene.links, own, other.contact_radius)
     softness = 1.0 if setup.options.soften_drive else 0.0
-    batch.load(0, loop.position, loop.velocity, stop_time=duration, stop_status=Status.NOT_STEADY, softness=softness)
-    batch.set_drive(
-        0,
+    batch.worlds[0].load(
+        loop.position, loop.velocity, stop_time=duration, stop_status=Status.NOT_STEADY, softness=softness
+    )
+    batch.worlds[0].set_drive(
         sprocket_speed=-2 * np.pi * scene.frequency,
         loop_speed=other.loop_speed,
         loop_period=period_of(setup),
@@ -74,7 +75,7 @@ def hold(
         push_rate=5e3,
     )
     pieces = run_recorded(batch, batch.features(fixed_body="sprocket"))
-    assert batch.status(0) == Status.NOT_STEADY
+    assert batch.worlds[0].status == Status.NOT_STEADY
     rows, times, joints, _, _ = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
     since = duration - period_of(setup)
     shape = rows[rows[:, layout.TIME] > since][:, SHAPE].mean(axis=0)

@@ -51,9 +51,9 @@ def model_of(chains: Sequence[tuple[int, Parameters | UnlikeLinks]]) -> Model:
     batch = Batch(len(chains), max(links for links, _ in chains), Options())
     for world, (links, chain) in enumerate(chains):
         if isinstance(chain, UnlikeLinks):
-            batch.set_chain(world, chain.parameters, links, own=chain.own)
+            batch.worlds[world].set_chain(chain.parameters, links, own=chain.own)
         else:
-            batch.set_chain(world, chain, links)
+            batch.worlds[world].set_chain(chain, links)
     return batch.model
 
 

@@ -12,7 +12,8 @@ from warpchain.engine.tallies import CONTACTS
 from warpchain.loop.stationary_loop import BeforeRelease
 from warpchain.status import Status
 from warpchain.walks.landmarks import RELEASE
-from warpchain.walks.walk_result import ENERGIES, MOTION, NUMBERS, WalkResult
+from warpchain.walks.outcome import ENERGIES
+from warpchain.walks.walk_result import MOTION, NUMBERS, WalkResult
 
 
 def make_walk(links: int = 30, **changes: Any) -> WalkResult:

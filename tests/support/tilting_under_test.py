@@ -56,17 +56,17 @@ def tilting_batch(
     if longest_step is not None:
         batch.control.skin, batch.control.contact_step = 1e-9, longest_step
     for world, ((position, velocity, plane), chain) in enumerate(zip(starts, parameters, strict=True)):
-        batch.set_chain(world, chain, links)
-        batch.load(world, position, velocity, stop_time=stop_time, stop_status=stop_status)
+        batch.worlds[world].set_chain(chain, links)
+        batch.worlds[world].load(position, velocity, stop_time=stop_time, stop_status=stop_status)
         if longest_step is not None:
             batch.state.step.numpy()[world] = longest_step
-        batch.set_plane(world, row_of(plane))
+        batch.worlds[world].set_plane(row_of(plane))
     return batch
 
 
 def end_of(batch: Batch, world: int = 0) -> Start:
     """Where a run has left a chain."""
-    return batch.position(world), batch.velocity(world), plane_of(batch.plane(world))
+    return batch.worlds[world].position, batch.worlds[world].velocity, plane_of(batch.worlds[world].plane)
 
 
 def fly(
@@ -82,8 +82,8 @@ def fly(
     options = Options(method=method, tolerance=tolerance)
     batch = tilting_batch([start], [parameters], options, duration, longest_step=longest_step)
     batch.run([0], batch.features(fixed_body="floor", tilts=True))
-    assert batch.status(0) == Status.FINISHED
-    assert batch.counts(0)["self"] == batch.counts(0)["floor"] == 0
+    assert batch.worlds[0].status == Status.FINISHED
+    assert batch.worlds[0].counts["self"] == batch.worlds[0].counts["floor"] == 0
     return batch
 
 

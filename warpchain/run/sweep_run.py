@@ -280,7 +280,7 @@ def run_shards(planned: Sweep, directory: str, seal: str, shards: Sequence[Shard
                 pulse.beat()
             fill_row(rows[shard][row], run.outcome(), under_way.pop(number).drawn)
             if keeps[number].series_every is not None:
-                motions[shard][row] = run.recorder.motion(run.datum)
+                motions[shard][row] = run.motion()
             if (rows[shard]["status"] != MISSING).all():
                 write_shard(directory, seal, shard, rows.pop(shard), motions.pop(shard))
 

@@ -56,8 +56,8 @@ def run_walk(
         started = time.perf_counter()
         ((_, run),) = run_setups([setup], keeps=[keep], watch=lambda run: report(run.progress()))
         return WalkResult(
-            **run.outcome(),
-            **run.recorder.motion(run.datum),
+            **vars(run.outcome()),
+            **run.motion(),
             setup=setup,
             seed=seed,
             versions=package_versions(),

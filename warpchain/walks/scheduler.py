@@ -10,6 +10,7 @@ from warpchain.chain.setup import Setup
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import Gpu, gpu_turn, start_device
 from warpchain.engine.kernel_choice import block_threads, load_kernels, resident_blocks
+from warpchain.engine.world import World
 from warpchain.inputs.options import Options, on_gpu
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
@@ -62,9 +63,9 @@ def run_setups(
         watch: Called after each launch of each walk.
     """
 
-    def begin(place: int, batch: Batch, world: int) -> WalkRun:
+    def begin(place: int, world: World) -> WalkRun:
         setup = setups[place] if draw is None else draw(place)
-        return WalkRun(batch, world, setup, NOTHING if keeps is None else keeps[place])
+        return WalkRun(world, setup, NOTHING if keeps is None else keeps[place])
 
     def group(places: list[int]) -> list[BatchRun]:
         kept = [] if keeps is None else [keeps[place] for place in places]
@@ -147,13 +148,13 @@ class BatchRun:
         batch: Batch,
         waiting: deque[int],
         capacity: int,
-        begin: Callable[[int, Batch, int], WalkRun],
+        begin: Callable[[int, World], WalkRun],
         watch: Callable[[WalkRun], None] | None,
     ) -> None:
         """Prepare to run waiting walks, of which `capacity` would fill the device; those that begin are taken away."""
         self.batch, self.waiting = batch, waiting
         self._capacity, self._begin, self._watch = capacity, begin, watch
-        self._free = list(reversed(range(len(batch.links))))
+        self._free = list(reversed(range(len(batch.worlds))))
         self._running: dict[int, tuple[int, WalkRun, Iterator[Features]]] = {}
         self._features: dict[int, Features] = {}
 
@@ -166,7 +167,7 @@ class BatchRun:
         """Give some waiting walks free worlds and begin a launch; False if there is nothing to carry on."""
         for _ in range(min(len(self._free), len(self.waiting), BEGUN_AT_ONCE)):
             place, world = self.waiting.popleft(), self._free.pop()
-            run = self._begin(place, self.batch, world)
+            run = self._begin(place, self.batch.worlds[world])
             phases = run.phases()
             self._running[world], self._features[world] = (place, run, phases), next(phases)
         together: dict[Features, list[int]] = defaultdict(list)

@@ -20,17 +20,16 @@ import numpy as np
 
 from warpchain.chain.resolution import SECTIONS
 from warpchain.chain.setup import Setup, State
-from warpchain.engine.tallies import COUNTS, DEPTHS, EXTREMES, IMPULSES, LOST
 from warpchain.files import write_whole
 from warpchain.hdf5_files import Stored, hdf5_image, put, read_fields, reading_hdf5, stored_fields, write_fields
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import InputError, json_value, validated
-from warpchain.kernels import layout
 from warpchain.loop.stationary_loop import BEFORE, FIELDS, BeforeRelease
 from warpchain.pictures.labels import Kind
 from warpchain.status import Status
-from warpchain.walks.landmarks import FAULTS, LENGTHS, MOST_ENERGY_ERROR, RELEASE, bounces, energy_error, faults, least
+from warpchain.walks.landmarks import FAULTS, LENGTHS, MOST_ENERGY_ERROR, bounces, energy_error, faults, least
+from warpchain.walks.outcome import Outcome
 
 if TYPE_CHECKING:
     import h5py
@@ -42,19 +41,8 @@ if TYPE_CHECKING:
 KIND: Final = "warpchain walk"
 WANTED: Final = "give a saved walk; `walk --like SWEEP --index I` saves one"
 
-_SINCE_FLOOR: Final = "time since the last impulse on the floor; NaN if there was none"
 _FIXED: Final = "if the plane is fixed"
-_NEVER: Final = "NaN if it never was"
 
-ENERGIES: Final = {
-    "kinetic_at_release": "kinetic energy at release",
-    "potential_at_release": "energy of gravity, from the floor below the release, and joint springs at release",
-    "kinetic_at_end": "kinetic energy at the end",
-    "potential_at_end": "energy of gravity and joint springs at the end",
-    **LOST,
-    "residual": "energy at release, less that at the end and all losses: the error of the integration",
-}
-"""Keys of `WalkResult.energy`. Losses count as positive."""
 _GROUP: Final = "start"
 """Group of the state that a walk began from, so that it can be run again to the bit."""
 _STATE: Final = {
@@ -67,7 +55,7 @@ _STATE: Final = {
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class WalkResult:
+class WalkResult(Outcome):
     """One walk, from the release to its end: t instants and f frames of a chain of n links.
 
     Time counts from the release, x from the centre of sprocket or ellipse, y up from the floor. Units, meanings and
@@ -77,65 +65,7 @@ class WalkResult:
     `before_release` is the motion on the sprocket just before the release, None if it was not kept.
     """
 
-    status: Status
-    dx: Annotated[
-        float,
-        Stored(
-            "m", "x of the centre of mass from the sprocket (x = 0) on, on a slope along the floor; NaN unless at rest"
-        ),
-    ]
-    walk_time: Annotated[float, Stored("s", "from the release to the end")]
-    simulated_time: Annotated[float, Stored("s", "simulated, the phases before the release included")]
-    hold_time: Annotated[float, Stored("s", "for which the loop was held at full frequency; NaN without a sprocket")]
-    drift: Annotated[
-        float,
-        Stored(
-            "1",
-            "greatest change of the held loop's mean height, width or place, relative to height or width, while it was "
-            f"last watched; {_NEVER}",
-        ),
-    ]
-    lateral_drift: Annotated[
-        float, Stored("m", "z of the centre of mass at rest, to the right; NaN unless the plane tilts")
-    ]
-    final_tilt: Annotated[float, Stored("rad", f"tilt of the plane at the end, positive to the left; NaN {_FIXED}")]
-    final_yaw: Annotated[float, Stored("rad", f"heading of the plane at the end, as yaw but within ±π; NaN {_FIXED}")]
-    greatest_tilt: Annotated[float, Stored("rad", f"greatest size of the tilt in the walk; NaN {_FIXED}")]
-    fell_at: Annotated[float, Stored("s", f"from the release until the plane was first tilted by 45°; {_NEVER}")]
-    fell_over: Annotated[int, Stored("1", "1 if the plane was ever tilted by 45°, 0 if not; −1 if the plane is fixed")]
-    fell_before_collapse: Annotated[
-        int, Stored("1", "1 if it fell over before its loop collapsed, 0 if not; −1 if the plane is fixed")
-    ]
-    self_contact_at: Annotated[
-        float, Stored("s", "from the release to the sample after the first impulse between links; or NaN")
-    ]
-    bounces_before_self_contact: Annotated[int, Stored("1", "bounces begun at self_contact_at; −1 if it never came")]
-    flight_before_self_contact: Annotated[float, Stored("s", f"at self_contact_at, {_SINCE_FLOOR}")]
-    strands_met_at: Annotated[
-        float,
-        Stored("s", f"the same of strands of the loop: links {layout.STRANDS_APART} or more apart along the chain"),
-    ]
-    bounces_before_strands_met: Annotated[int, Stored("1", "bounces begun at strands_met_at; −1 if it never came")]
-    flight_before_strands_met: Annotated[float, Stored("s", f"at strands_met_at, {_SINCE_FLOOR}")]
-    collapsed_at: Annotated[
-        float, Stored("s", "from the release until the loop enclosed less than half of its area; NaN if it never did")
-    ]
-    bounces_before_collapse: Annotated[int, Stored("1", "bounces begun at collapsed_at; −1 if it never came")]
-    flight_before_collapse: Annotated[float, Stored("s", f"at collapsed_at, {_SINCE_FLOOR}")]
-    softened_at: Annotated[float, Stored("s", "from the release to the softening of the joints; NaN if they were not")]
     wall_time: Annotated[float, Stored("s", "that the computer took, without the compilation of kernels")]
-    bounces: Annotated[int, Stored("1", COUNTS["bounces"])]
-    steps_accepted: Annotated[int, Stored("1", COUNTS["accepted"])]
-    steps_rejected: Annotated[int, Stored("1", COUNTS["rejected"])]
-    impulses: Annotated[dict[str, int], Stored("1", "by kind of contact", keys=IMPULSES)]
-    greatest_opening: Annotated[float, Stored("m", EXTREMES["opening"])]
-    greatest_penetration: Annotated[dict[str, float], Stored("m", "by kind of contact", keys=DEPTHS)]
-    energy: Annotated[dict[str, float], Stored("J", "ledger of the walk", keys=ENERGIES)]
-    sprocket_height: Annotated[
-        float, Stored("m", "height of the sprocket's centre at the release; NaN without a sprocket or a release")
-    ]
-    release: Annotated[dict[str, float], Stored("m", "the loop at the release", keys=RELEASE)]
-    release_speed: Annotated[float, Stored("m/s", "mean speed of link centres along the loop at the release")]
     setup: Setup
     seed: int | None
     versions: dict[str, str]
@@ -223,7 +153,7 @@ class WalkResult:
         Raises:
             InputError: `t` is no such time, the chain was never released, or the device of the walk is not here.
         """
-        from warpchain.walks.walk_phases import state_at
+        from warpchain.walks.restart import state_at
 
         is_released = not np.isnan(self.energy["kinetic_at_release"])
         return state_at(self.setup, t, self.walk_time if is_released else np.nan)

@@ -50,7 +50,7 @@ def let_go(start, parameters, duration, longest_step=None):
     options = Options(method="dp5", tolerance=1e-6, rest_time=100.0)
     batch = tilting_batch([start], [parameters], options, duration, longest_step=longest_step, keeps_samples=True)
     pieces = run_recorded(batch, batch.features(fixed_body="floor", tilts=True))
-    assert batch.status(0) == Status.FINISHED
+    assert batch.worlds[0].status == Status.FINISHED
     position, _, plane = end_of(batch)
     assert_allclose(position[:, 2], start[0][:, 2], atol=0.02)
     assert abs(plane.turn[1]) < 0.02

@@ -74,7 +74,8 @@ def test_a_drive_depends_neither_on_its_launches_nor_on_its_neighbours(monkeypat
         found = {}
         for place, run in scheduler.run_setups(setups, slots=slots):
             assert run.status == Status.TIME_LIMIT
-            found[place] = (run.outcome()["hold_time"], run.drift, run.counts, run.energy(), run.raised)
+            outcome = run.outcome()
+            found[place] = outcome.hold_time, str(vars(outcome))
         return found
 
     whole = outcomes(20_000, 1)

@@ -62,10 +62,10 @@ def test_a_load_of_a_script_acts_in_every_stage(method: str, device: str, monkey
     monkeypatch.setitem(LOADS, "tied", Load(tied, stretched))
     start = lay_chain(ellipse(1.5), LINKS, SOFT.link_length, 2.0, 0.1)
     batch = Batch(1, LINKS, Options(method=method, device=device, tolerance=1e-10, self_contact=False))
-    batch.set_chain(0, SOFT, LINKS)
-    batch.load(0, *start, stop_time=DURATION, stop_status=Status.FINISHED)
+    batch.worlds[0].set_chain(SOFT, LINKS)
+    batch.worlds[0].load(*start, stop_time=DURATION, stop_status=Status.FINISHED)
     batch.run([0], batch.features(fixed_body="none", load="tied"))
-    position, velocity = batch.position(0), batch.velocity(0)
+    position, velocity = batch.worlds[0].position, batch.worlds[0].velocity
     energy = batch.state.last_sample.numpy()[0, layout.GRAVITATIONAL]
 
     def rates(_: float, state: np.ndarray) -> np.ndarray:
