@@ -24,8 +24,8 @@ from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
 from warpchain.inputs.scene import Scene
 from warpchain.inputs.validation import FIELDS, LONGEST_LINE, NAME_OF_SYMBOL, InputError
+from warpchain.results import one_walk
 from warpchain.sweeps.plan import load_sweep
-from warpchain.walks import one_walk
 
 SECONDS = 5.0
 """Most processor time of an input."""

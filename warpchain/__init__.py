@@ -44,16 +44,16 @@ if TYPE_CHECKING:
     from warpchain.inputs.parameters import Parameters as Parameters
     from warpchain.inputs.parameters import preset as preset
     from warpchain.inputs.validation import InputError as InputError
+    from warpchain.results.sweep_result import SweepResult as SweepResult
+    from warpchain.results.sweep_result import load as load
+    from warpchain.results.walk_result import WalkResult as WalkResult
+    from warpchain.results.walk_result import load_walk as load_walk
     from warpchain.run.simulation import Chains as Chains
     from warpchain.run.simulation import Trajectory as Trajectory
     from warpchain.run.simulation import simulate as simulate
     from warpchain.run.single_walk import walk as walk
     from warpchain.run.sweep_run import sweep as sweep
     from warpchain.status import Status as Status
-    from warpchain.store.sweep_result import SweepResult as SweepResult
-    from warpchain.store.sweep_result import load as load
-    from warpchain.walks.walk_result import WalkResult as WalkResult
-    from warpchain.walks.walk_result import load_walk as load_walk
 
 __version__ = _version.VERSION
 
@@ -71,8 +71,8 @@ _NAMES = {
     "run.single_walk": "walk",
     "run.sweep_run": "sweep",
     "status": "Status",
-    "store.sweep_result": "SweepResult load",
-    "walks.walk_result": "WalkResult load_walk",
+    "results.sweep_result": "SweepResult load",
+    "results.walk_result": "WalkResult load_walk",
 }
 _HOMES = {name: home for home, names in _NAMES.items() for name in names.split()}
 

@@ -6,7 +6,7 @@ VERSION: Final = "0.2.0.dev0"
 
 NUMERICS_VERSION: Final = 17
 """Raised by every change that changes a number of any walk; shards of two versions never mix."""
-FORMAT_VERSION: Final = 10
+FORMAT_VERSION: Final = 11
 """Of all files of results: sweep.h5, shards, merged files and walks."""
 
 

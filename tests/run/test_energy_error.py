@@ -12,9 +12,9 @@ from tests.support.command_line import Command
 from tests.support.made_walks import make_unreleased, make_walk
 from warpchain.cli.output import print_walk
 from warpchain.engine.tallies import CONTACTS
+from warpchain.results.sweep_result import load
 from warpchain.run.progress_bar import SweepProgress
 from warpchain.run.sweep_run import sweep
-from warpchain.store.sweep_result import load
 from warpchain.sweeps.plan import load_sweep
 from warpchain.walks.landmarks import FAULTS, LENGTHS
 from warpchain.walks.rows import faults_of_columns

@@ -8,12 +8,12 @@ import pytest
 
 import warpchain
 from tests.run.test_sweep_run import TINY, brief_setup, data_of, outcome, outcomes
+from warpchain.chain.keep import Keep
 from warpchain.engine.batch import CAPACITY_SAMPLES
 from warpchain.inputs.validation import InputError, InputWarning
 from warpchain.reports.sweep_page import write_report
+from warpchain.results.sweep_result import load
 from warpchain.run.sweep_run import sweep
-from warpchain.store.sweep_result import load
-from warpchain.walks.motion import Keep
 from warpchain.walks.scheduler import run_setups
 
 OFTEN = {"method": "dp5", "record_interval": 1e-4}
@@ -141,7 +141,7 @@ def test_damage_to_a_motion_is_seen(kept: Path, tmp_path: Path) -> None:
     content[content.index(wanted) + 11] ^= 4
     path.write_bytes(content)
     for read in (lambda: result.series(links=30, frequency=5, sample=3), lambda: load(tmp_path)):
-        with pytest.raises(InputError, match=f"{path}: damaged, .*; delete it and run the sweep again"):
+        with pytest.raises(InputError, match=f"{path}: damaged .*; move it out of this folder and run the sweep again"):
             read()
     with pytest.warns(InputWarning, match=f"{path}: .*; its walks are computed again"):
         sweep(KEPT, tmp_path)
@@ -154,7 +154,7 @@ def test_report_and_pictures_use_kept_frames(kept: Path, tmp_path: Path, monkeyp
     def refuse(*arguments: object, **settings: object) -> None:
         raise AssertionError("run again")
 
-    monkeypatch.setattr("warpchain.walks.one_walk.run_walk", refuse)
+    monkeypatch.setattr("warpchain.results.one_walk.run_walk", refuse)
     write_report(kept, tmp_path / "page.html", animation_of=12)
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "Its frames were kept by the sweep" in page and "run again" not in page

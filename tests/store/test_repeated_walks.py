@@ -12,7 +12,7 @@ import warpchain
 from tests.support.command_line import Command
 from warpchain import InputError, SweepResult, WalkResult
 from warpchain.inputs.validation import InputWarning
-from warpchain.store.sweep_result import merge
+from warpchain.results.sweep_result import merge
 from warpchain.walks.rows import STORED_COLUMNS, fill_row, missing_rows, row_type
 
 SWEEP: dict[str, Any] = {

@@ -12,6 +12,7 @@ from tests.support.folded_chains import folded_chain
 from tests.support.presets import SOFT
 from tests.support.unlike_links import UnlikeLinks
 from warpchain.chain.floor import Floor, floor_from
+from warpchain.chain.keep import NOTHING, Keep
 from warpchain.engine.batch import Batch
 from warpchain.engine.world import Recorded
 from warpchain.inputs.options import Options
@@ -79,8 +80,8 @@ def batch_of(
     """
     longest = max(len(position) for position, _ in chains)
     options = Options(method=method, tolerance=0.1 if fixed_step else tolerance, self_contact=self_contact)
-    kept = {"keeps_samples": keeps, "frame_every": 2 if keeps else None, "keeps_loads": keeps}
-    batch = Batch(len(chains), longest, options, faces=len(HILLS) - 1, **kept)
+    keep = Keep(series_every=1, frame_every=2, loads=True) if keeps else NOTHING
+    batch = Batch(len(chains), longest, options, keep, faces=len(HILLS) - 1)
     batch.control.launch_time = 1e9  # attempts alone end a launch, however busy the machine is
     if fixed_step:
         batch.control.skin = 1e-9

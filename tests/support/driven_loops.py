@@ -8,6 +8,7 @@ import numpy as np
 from tests.support.arrays import Array
 from tests.support.blocks_under_test import run_recorded
 from tests.support.setups import setup_walk
+from warpchain.chain.keep import Keep
 from warpchain.chain.link_values import LinkValues
 from warpchain.chain.setup import Setup
 from warpchain.engine.batch import Batch
@@ -56,7 +57,7 @@ def hold(
     """Hold a loop on for a time [s] with other parameters; means of `SHAPE` at its end and `bottom_curvature`, (5,)."""
     setup = loop.setup
     scene = setup.scene
-    batch = Batch(1, scene.links, setup.options, keeps_samples=True, frame_every=1)
+    batch = Batch(1, scene.links, setup.options, keep=Keep(series_every=1, frame_every=1))
     other = replace(setup, parameters=parameters)
     batch.worlds[0].set_chain(parameters, scene.links, own, other.contact_radius)
     softness = 1.0 if setup.options.soften_drive else 0.0

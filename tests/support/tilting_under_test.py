@@ -10,6 +10,7 @@ import warp as wp
 from tests.oracle_model.tilting_plane import Plane
 from tests.support.arrays import Array
 from tests.support.kernels_under_test import DEVICE, chain_on_cpu, compiled, poisoned
+from warpchain.chain.keep import NOTHING, Keep
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
@@ -27,12 +28,12 @@ Start = tuple[Array, Array, Plane]
 
 
 def row_of(plane: Plane) -> Array:
-    """A plane as `Batch.set_plane` takes it, (12,)."""
+    """A plane as `World.set_plane` takes it, (12,)."""
     return np.array([plane.speed, *plane.turn, *plane.x, *plane.y, *plane.origin])
 
 
 def plane_of(row: Array) -> Plane:
-    """A plane from what `Batch.plane` gives, (12,)."""
+    """A plane from what `World.plane` gives, (12,)."""
     return Plane(float(row[0]), row[1:3].copy(), row[3:6].copy(), row[6:9].copy(), row[9:12].copy())
 
 
@@ -44,15 +45,15 @@ def tilting_batch(
     *,
     longest_step: float | None = None,
     stop_status: Status = Status.FINISHED,
-    **kept: bool | int,
+    keep: Keep = NOTHING,
 ) -> Batch:
-    """A batch of chains of equal length, about to start; `kept` is what it is to keep.
+    """A batch of chains of equal length, about to start.
 
     No step is longer than `longest_step` [s]; all are that long if the tolerance allows more. It needs contacts, among
     links or with the floor, in the kernel's features. A run that stops as `FINISHED` does not end at rest before.
     """
     links = len(starts[0][0])
-    batch = Batch(len(starts), links, options, tilts=True, **kept)
+    batch = Batch(len(starts), links, options, keep, tilts=True)
     if longest_step is not None:
         batch.control.skin, batch.control.contact_step = 1e-9, longest_step
     for world, ((position, velocity, plane), chain) in enumerate(zip(starts, parameters, strict=True)):

@@ -10,10 +10,11 @@ from typing import Any, Final, TypeVar
 
 from warpchain.chain.setup import Setup, State
 from warpchain.inputs.distributions import TABLE, Seed, draw, random_generator
-from warpchain.inputs.options import Options, replaced_by
+from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.parameters import preset as parameter_preset
 from warpchain.inputs.scene import OF_LINKS, Scene
+from warpchain.inputs.unit_slips import check_units
 from warpchain.inputs.validation import InputError, Section, checked, validated
 
 Values = Mapping[str, object]
@@ -39,18 +40,12 @@ def resolve(
     """
     whole = validated(Scene, scene, "scene")
     changed = parameter_preset(preset).with_values(parameters)
-    setup = Setup(preset, changed, whole, options_beside(whole.plane, options, loads)).checked()
+    chosen = Options.chosen(options, tilts=whole.plane == "tilting", loads=loads)
+    setup = Setup(preset, changed, whole, chosen).checked()
     if seed is None:
         return setup
     drawn = {name: distribution for name, distribution in TABLE.items() if name not in {*scene, *parameters}}
     return setup.with_drawn(draw(setup.placed(drawn), random_generator(checked(seed, "seed", Seed))))
-
-
-def options_beside(plane: str, options: Values, loads: bool = False) -> Options:
-    """The checked options; `Scene.plane`, and whether joint forces are recorded, may decide what `standard` is."""
-    if (plane == "tilting" or loads) and options.get("method", "standard") == "standard":
-        options = {**options, "method": "explicit"}
-    return validated(Options, options, "options")
 
 
 def continued(state: State, sections: Mapping[str, Values]) -> Setup:
@@ -58,13 +53,16 @@ def continued(state: State, sections: Mapping[str, Values]) -> Setup:
     if early := [name for name in sections["scene"] if name not in OF_THE_WALK]:
         raise InputError(f"{', '.join(early)}: given together with a state, whose chain is released; leave it out")
     before, given = state.setup, sections["options"]
-    options = validated(Options, {**before.options.model_dump(exclude=replaced_by(given)), **given}, "options")
+    options = validated(Options, {**before.options.beside(given), **given}, "options")
     scene = validated(Scene, {**vars(before.scene), **sections["scene"]}, "scene")
     parameters = before.parameters.with_values(sections["parameters"]) if sections["parameters"] else before.parameters
     setup = Setup(before.preset, parameters, scene, options, state).checked("start")
     for name in OF_THE_WALK[:2]:
         if (end := getattr(scene, name)) is not None and end < state.time:
             raise InputError(f"{name}: {end:g} s is before the state at {state.time:g} s; give a later time")
+    if not options.unusual_values:
+        check_units({name: getattr(parameters, name) for name in sections["parameters"]}, "parameters")
+        check_units(sections["scene"], "scene")
     if scene.plane == "fixed" and not state.is_placed_as_in(setup):  # a moving sprocket may have left it in the floor
         setup.floor.check_above(state.position, state.parameters.link_length, "start")
     return replace(setup, start=replace(state, setup=replace(setup, start=None)))

@@ -2,6 +2,7 @@
 
 import hashlib
 import math
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -15,11 +16,13 @@ from warpchain.chain.link_values import LinkValues, link_values
 from warpchain.chain.outlines import fitted
 from warpchain.chain.start_shapes import links_between
 from warpchain.inputs.arrays import Array, checked_array
+from warpchain.inputs.compound_fields import FARTHEST
 from warpchain.inputs.distributions import Distribution, Gaussian
 from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL, Options
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import Scene, check_links_on_gpu
-from warpchain.inputs.validation import SECTION_OF, InputError, shown, validated
+from warpchain.inputs.unit_slips import check_units
+from warpchain.inputs.validation import SECTION_OF, InputError, InputWarning, shown, validated
 from warpchain.kernels.methods.method import find_method
 
 DEFAULT_PRESET: Final = "paper"
@@ -28,6 +31,12 @@ WIDEST_OPENING: Final = 0.1
 """Greatest distance of two joined link ends, in link lengths; a loop whose ends are farther apart is not closed."""
 LEAST_SPROCKET: Final = 1e-3
 """Least distance of the joints from the sprocket's centre, in link lengths; far smaller ones are lost in rounding."""
+
+
+FARTHEST_MOVED: Final = 0.02
+"""Greatest distance by which fitting links of one length may move a given joint, in link lengths."""
+FARTHEST_UNSAID: Final = 1e-3
+"""Greatest such distance, in link lengths, of which no warning tells."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +58,7 @@ class Setup:
     @property
     def has_drive(self) -> bool:
         """Whether the walk begins on a sprocket."""
-        return self.start is None and self.scene.start != "ellipse"
+        return self.start is None and self.scene.is_on_sprocket
 
     @cached_property
     def link_values(self) -> LinkValues:
@@ -167,6 +176,9 @@ class Setup:
             raise InputError(
                 f"options.method: {shown(options.method)} keeps planes fixed; give explicit, or plane: fixed"
             )
+        if self.start is None and not options.unusual_values:
+            check_units(vars(self.parameters), "parameters")
+            check_units(vars(scene), "scene")
         self._check_links(path)
         if self.has_drive:
             self._check_drive()
@@ -241,7 +253,8 @@ class State:
         memory: what else the walk had at that instant; only the package reads it.
 
     Raises:
-        InputError: an array has another shape or holds no finite numbers, or the loop is not closed.
+        InputError: an array has another shape, holds no finite numbers or places more than 10 km away, or the loop is
+            not closed.
     """
 
     position: Array
@@ -260,6 +273,9 @@ class State:
             shapes |= {"origin": (3,), "axes": (2, 3), "plane_rates": (3,)}
         for name, shape in shapes.items():
             object.__setattr__(self, name, checked_array(getattr(self, name), name, *shape))
+        for name in ("position", "origin") if self.origin is not None else ("position",):
+            if (far := float(np.abs(getattr(self, name)[..., :2]).max())) > FARTHEST:
+                raise InputError(f"{name}: a place {far:.6g} m from the origin; expected at most {FARTHEST:g} m, in m")
         if self.axes is not None and not np.allclose(self.axes @ self.axes.T, np.eye(2), atol=1e-9):
             raise InputError("axes: not two directions at right angles; give unit vectors")
         clock = float(self.memory.get("state/time", 0.0))
@@ -310,12 +326,23 @@ class State:
 
         Raises:
             InputError: two neighbours are not about a link length apart: the loop is not closed, or lengths are in
-                another unit; or an array or the number of links is refused.
+                another unit; a joint would have to move by more than 2 % of a link length; or an array or the number
+                of links is refused.
+
+        An `InputWarning` says how far the joints moved if one of them moved by more than 0.1 % of a link length.
         """
         places = checked_array(joints, "joints", "n", 2)
         rates = np.zeros_like(places) if velocity is None else checked_array(velocity, "velocity", *places.shape)
         setup = _setup(len(places), parameters, "joints")
-        position, rate = links_between(*fitted(places, rates, setup.parameters.link_length))
+        length = setup.parameters.link_length
+        near, rates = fitted(places, rates, length)
+        moved = np.linalg.norm(near - places, axis=1) / length
+        text = f"joints: to fit links of {length:g} m joint {moved.argmax()} moves by {moved.max():.2%} of a link"
+        if moved.max() > FARTHEST_MOVED:
+            raise InputError(f"{text}, more than {FARTHEST_MOVED:.0%}; measure joints or link_length more exactly")
+        if moved.max() > FARTHEST_UNSAID:
+            warnings.warn(f"{text} (mean {moved.mean():.2%}); the walk begins from there", InputWarning, stacklevel=2)
+        position, rate = links_between(near, rates)
         return cls(position=position, velocity=rate, setup=setup)
 
     @property

@@ -8,6 +8,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpchain.chain.keep import NOTHING, Keep
 from warpchain.engine.control import control_of
 from warpchain.engine.devices import Gpu, start_device
 from warpchain.engine.kernel_choice import block_threads, step_kernel
@@ -53,19 +54,15 @@ class Batch:
         worlds: int,
         longest: int,
         options: Options,
+        keep: Keep = NOTHING,
         *,
-        keeps_samples: bool = False,
-        frame_every: int | None = None,
-        frame_interval: float = 0.0,
-        keeps_loads: bool = False,
         tilts: bool = False,
         faces: int = 1,
     ) -> None:
         """Allocate a batch of so many worlds, which are idle (status FINISHED) until a chain is loaded.
 
-        Chains have at most `longest` links, floors at most so many faces. Kept are the time series, joint positions at
-        every so many samples (None: no frames) or, of chains with frame marks of their own, at an interval [s], and
-        with each frame force and moment of every joint; if planes tilt, these with samples and frames.
+        Chains have at most `longest` links, floors at most so many faces. Samples and frames are taken as `keep` says,
+        at its interval those of chains with frame marks of their own; if planes tilt, planes with them.
         """
         self.options = options
         self.device = start_device(options.device)
@@ -76,12 +73,13 @@ class Batch:
         self._lanes = [self._gpu.stream() for _ in range(LANES)] if self._gpu else []
         self.threads = block_threads(longest) if self._gpu else 1
 
-        samples, frames = CAPACITY_SAMPLES * keeps_samples, CAPACITY_FRAMES * (frame_every is not None)
+        samples = 0 if keep.series_every is None else CAPACITY_SAMPLES
+        frames = 0 if keep.frame_every is None else CAPACITY_FRAMES
         recorded = {
             "record/samples": (samples, layout.ALL_COLUMNS if tilts else layout.SAMPLE_COLUMNS),
             "record/frames": (frames, 2 * longest + layout.PLANE_VALUES * tilts),
             "record/frame_times": (frames,),
-            "record/frame_loads": (frames * keeps_loads, 3 * longest),
+            "record/frame_loads": (frames if keep.loads else 0, 3 * longest),
         }
         shapes = {
             **recorded,
@@ -115,8 +113,8 @@ class Batch:
 
         self.control = control_of(options)
         self.control.launch_time = LAUNCH_SECONDS
-        self.control.frame_every = frame_every or 1
-        self.control.frame_interval = frame_interval
+        self.control.frame_every = keep.frame_every or 1
+        self.control.frame_interval = keep.frame_interval
 
         width = self.columns
         rows = board_rows(self.threads, width) if self._gpu else scratch_rows(options.method, width)

@@ -4,6 +4,7 @@ Phases of walks, recorders, experiments with given chains and `bench` work on wo
 `state/time`, are those of the structs in `warpchain.kernels.types`; no other wing knows them.
 """
 
+import hashlib
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple
@@ -18,8 +19,9 @@ from warpchain.chain.setup import Setup
 from warpchain.engine.tallies import COUNTS, EXTREMES, LOSSES
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.validation import InputError
 from warpchain.kernels import layout
-from warpchain.kernels.types import LOADING_TIME
+from warpchain.kernels.types import LOADING_TIME, Drive, State
 from warpchain.status import Status
 
 Snapshot = Mapping[str, NDArray[Any]]
@@ -29,6 +31,8 @@ KEPT: Final = ("state/", "drive/")
 """How the names of arrays begin that are kept."""
 CACHES: Final = ("scratch", "lists")
 """What follows from the state but for rounding, and fits a chain of the same constants and options only."""
+_LAYOUT: Final = "layout"
+"""Name in a snapshot of the digest of rows and fields that it has."""
 FIRST_STEP = 1e-7  # s; it may grow fivefold per step
 
 
@@ -43,6 +47,13 @@ def _beginning() -> dict[str, Any]:
 
 
 _BEGINNING = _beginning()
+
+
+def _layout_digest() -> NDArray[np.uint8]:
+    """What tells snapshots apart that kernels would read otherwise, as bytes: numbers of rows, fields of structs."""
+    rows = sorted((name, value) for name, value in vars(layout).items() if name.isupper() and isinstance(value, int))
+    text = repr((rows, [*State.vars], [*Drive.vars]))
+    return np.frombuffer(hashlib.sha256(text.encode()).digest(), dtype=np.uint8)
 
 
 class Recorded(NamedTuple):
@@ -87,9 +98,9 @@ class World:
         self.set_floor(setup.floor)
 
     def set_chain(
-        self, parameters: Parameters, links: int, own: LinkValues | None = None, sprocket: float = 0.0
+        self, parameters: Parameters, links: int, own: LinkValues | None = None, sprocket: float | None = None
     ) -> None:
-        """Set the chain, and the radius of its sprocket [m]; without values of its own, links alternate."""
+        """Set the chain and the radius of its sprocket [m], by default its parameter; by default, links alternate."""
         own, half, chains = (
             own or alternating(parameters, links),
             parameters.link_length / 2,
@@ -102,7 +113,7 @@ class World:
             "mass": own.total_mass,
             "circle_radius": own.radius.max(),
             "inverse_smoothing": 1 / parameters.friction_smoothing,
-            "sprocket_radius": sprocket,
+            "sprocket_radius": parameters.sprocket_radius if sprocket is None else sprocket,
         }
         for name in chains.dtype.names or ():
             chains[name][self._at] = values.get(name, 0)
@@ -244,10 +255,16 @@ class World:
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """All that the next launch depends on."""
         kept = {name: np.array(values[self._at]) for name, values in self._host.items() if name.startswith(KEPT)}
-        return kept | {name: np.array(array[self._at].numpy()) for name, array in self._caches.items()}
+        caches = {name: np.array(array[self._at].numpy()) for name, array in self._caches.items()}
+        return kept | caches | {_LAYOUT: _layout_digest()}
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Put a snapshot back, of a chain of equal length, options and parameters; its caches may be absent."""
+        """Put a snapshot back, of a chain of equal length, options and parameters; its caches may be absent.
+
+        An `InputError` says that a warpchain with other rows or fields kept it.
+        """
+        if not np.array_equal(snapshot[_LAYOUT], _layout_digest()):
+            raise InputError("start: a warpchain with other kernels kept this state; take it anew from its walk")
         for name, values in snapshot.items():
             if name.startswith(KEPT):
                 self._host[name][self._at] = values

@@ -147,6 +147,6 @@ def draw(distributions: Mapping[str, Distribution], rng: np.random.Generator) ->
     return drawn
 
 
-def random_generator(seed: int, cell: int = 0, sample: int = 0) -> np.random.Generator:
+def random_generator(seed: int, cell: int = 0, sample: int = 0, *more: int) -> np.random.Generator:
     """The random generator of one sample, given the sweep's seed, the number of its cell, and its own in there."""
-    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(cell, sample)))
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(cell, sample, *more)))

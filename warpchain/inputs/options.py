@@ -7,7 +7,7 @@ from typing import Annotated, Any, Final, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from warpchain.inputs.methods import BURST_TOLERANCE, METHODS, METHODS_BY_NEED
-from warpchain.inputs.validation import InputError, Section, Whole, number_field, shown, suggestion
+from warpchain.inputs.validation import InputError, Section, Whole, number_field, shown, suggestion, validated
 from warpchain.kernels.methods.explicit_tableaus import HYBRID
 from warpchain.kernels.methods.method import find_method, method_names
 
@@ -23,17 +23,6 @@ FIBERS: Final = "fibers"
 def on_gpu(device: str) -> bool:
     """Whether a device runs a GPU's kernels."""
     return device != "cpu"
-
-
-def replaced_by(options: Mapping[str, object]) -> set[str]:
-    """Options of a walk that some given ones bring anew.
-
-    A method brings its own settings, and a tolerance also holds where joints are soft, as in a new walk.
-    """
-    replaced = {"soft_tolerance"} if "tolerance" in options else set()
-    if "method" in options:
-        replaced |= {"tolerance", "soft_tolerance"}.union(*METHODS_BY_NEED.values())
-    return replaced
 
 
 def _known_method(method: str) -> str:
@@ -101,8 +90,31 @@ class Options(Section):
     soften_drive: bool = False
     """whether joints are softened on the sprocket: softest until it has spun up, then as soft as the loop's tension
     allows; within 0.03 s after the release they regain their own values"""
+    unusual_values: bool = False
+    """whether lengths, masses, moments of inertia and gravity far from Table 1's are meant; otherwise a value more than
+    10 times as large, or less than a tenth, is refused as a probable mistake of its unit"""
     device: Annotated[str, AfterValidator(_supported_device)] = "cpu"
     """device that runs the walks: cpu, cuda (the first GPU) or cuda:N"""
+
+    @classmethod
+    def chosen(cls, given: Mapping[str, object], *, tilts: bool = False, loads: bool = False) -> Self:
+        """The checked options that a user gives for a walk whose plane tilts, or whose joint loads are recorded.
+
+        `standard` then means `explicit`, as it does on a GPU: rigid flights have neither.
+        """
+        if (tilts or loads) and given.get("method", "standard") == "standard":
+            given = {**given, "method": "explicit"}
+        return validated(cls, given, "options")
+
+    def beside(self, given: Mapping[str, object]) -> dict[str, object]:
+        """The values of these options that stay beside some given ones.
+
+        A method brings its own settings, and a tolerance also holds where joints are soft, as in a new walk.
+        """
+        replaced = {"soft_tolerance"} if "tolerance" in given else set()
+        if "method" in given:
+            replaced |= {"tolerance", "soft_tolerance"}.union(*METHODS_BY_NEED.values())
+        return self.model_dump(exclude=replaced)
 
     @model_validator(mode="before")
     @classmethod

@@ -7,6 +7,7 @@ from pydantic import Field, Strict, model_validator
 
 from warpchain.inputs.compound_fields import FloorField, Rows
 from warpchain.inputs.options import on_gpu
+from warpchain.inputs.starts import STARTS, StartWord
 from warpchain.inputs.validation import InputError, Section, Whole, number_field
 
 MOST_LINKS: Final = 100_000
@@ -41,7 +42,7 @@ class Scene(Section):
     """number of links of the closed chain; must be even if inner and outer links alternate"""
     frequency: float = number_field(15.0, "Hz", symbol="ν", ge=0, le=300.0)  # more is in turns a minute
     """frequency of the sprocket at the release, in revolutions per second"""
-    start: Literal["rest", "spinning", "ellipse"] = "rest"
+    start: StartWord = "rest"
     """initial state: at rest on the sprocket, already circulating on it, or a circulating ellipse without a sprocket"""
     phase: float = number_field(0.0, "1", ge=0, lt=1)
     """moment of the release, as a fraction of a loop period"""
@@ -124,6 +125,11 @@ class Scene(Section):
     """radius of the contact circles of each link; null: circle_radius for all"""
 
     @property
+    def is_on_sprocket(self) -> bool:
+        """Whether the chain starts on a sprocket."""
+        return STARTS[self.start].on_sprocket
+
+    @property
     def is_level(self) -> bool:
         """Whether the floor is y = 0."""
         return self.floor == "flat" and self.slope == 0
@@ -145,8 +151,8 @@ class Scene(Section):
             raise InputError("plane: 'tilting' needs a flat floor; give plane: fixed, or floor: flat and slope: 0")
         if self.plane == "fixed" and (name := next((name for name in TAP if getattr(self, name) != 0), "")):
             raise InputError(f"{name}: moves the plane of the chain, which is fixed; give plane: tilting, or 0")
-        if self.release is not None and (self.start == "ellipse" or self.plane == "tilting"):
-            word = "start: ellipse" if self.start == "ellipse" else "plane: tilting"
+        if self.release is not None and (not self.is_on_sprocket or self.plane == "tilting"):
+            word = "plane: tilting" if self.is_on_sprocket else f"start: {self.start}"
             raise InputError(f"release: a motion of the sprocket, which {word} does not go with; leave one out")
         if self.clearance_of == "hanging" and self.start != "rest":
             raise InputError(f"clearance_of: 'hanging' needs start: rest, not {self.start}; give that, or 'spinning'")

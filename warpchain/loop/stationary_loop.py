@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 
 from warpchain.chain.link_values import mean_value
 from warpchain.chain.setup import Setup
+from warpchain.chain.softened_joints import SOFT
 from warpchain.hdf5_files import Stored, stored_fields
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.parameters import Parameters, preset
+from warpchain.inputs.parameters import Parameters
 
 BEFORE: Final = "before_release"
 """Name of the motion before the release, among the arrays of a walk and in its file."""
@@ -152,7 +153,7 @@ def average_loop(setup: Setup, before: BeforeRelease | None, center: Array | Non
         raise ValueError("walk: nothing was kept of the time before its release; run it again with record_before")
     parameters = setup.parameters
     if setup.options.soften_drive:
-        smoothing = max(parameters.friction_smoothing, preset("soft").friction_smoothing)
+        smoothing = max(parameters.friction_smoothing, SOFT.smoothing)
         parameters = parameters.with_values({"friction_smoothing": smoothing})
     mass = mean_value(setup.link_values.mass)
     return average_frames(before, parameters, mass, center, setup.joint_radius)

@@ -15,7 +15,6 @@ from typing import Annotated, Any, Final, cast
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 from pydantic import Field
@@ -26,8 +25,9 @@ from warpchain.inputs.arrays import Array
 from warpchain.inputs.validation import InputError, checked, short
 from warpchain.pictures import chain
 from warpchain.pictures.chain import center_in_room, checked_joints
-from warpchain.pictures.labels import Walk, headline
-from warpchain.pictures.style import BLUE, GROUND, INK, tidy
+from warpchain.pictures.labels import headline
+from warpchain.pictures.style import BLUE, GROUND, INK, InlineFigure, tidy
+from warpchain.walks.walk_numbers import WalkNumbers as Walk
 
 WIDTH, TALLEST = 960, 560
 """Greatest width and height of a picture [pixels]."""
@@ -212,7 +212,7 @@ class Film:
         space = np.array([WIDTH, TALLEST]) - _PADDING.sum(axis=0)
         scale = float((space / np.diff(box)[:, 0]).min())
         size = 2 * np.rint((np.diff(box)[:, 0] * scale + _PADDING.sum(axis=0)) / 2)
-        self.figure = Figure(figsize=tuple(size / DPI), dpi=DPI)
+        self.figure = InlineFigure(figsize=tuple(size / DPI), dpi=DPI)
         self._canvas: Any = FigureCanvasAgg(self.figure)
         share = _PADDING / size
         self._axes = self.figure.add_axes((*share[0], *(1 - share.sum(axis=0))), xlim=box[0], ylim=box[1])

@@ -16,8 +16,8 @@ from matplotlib.patches import Circle, Patch, Polygon
 
 from warpchain.chain.sprocket_motion import sprocket_places
 from warpchain.inputs.arrays import Array
-from warpchain.pictures.labels import Walk
 from warpchain.pictures.style import DASHES, FAINT, GROUND, INK
+from warpchain.walks.walk_numbers import WalkNumbers as Walk
 
 SIDE: Final = np.eye(3)
 ABOVE: Final = np.eye(3)[[0, 2, 1]]

@@ -85,7 +85,7 @@ def simulate(
         position: (n, 3): x, y [m] and θ [rad] of each link's centre; n as of :class:`State`. Link i's right end meets
             link i + 1's left end, the last link's the first one's. Links 0, 2, … are inner ones.
         velocity: (n, 3): their rates [m/s, m/s, rad/s].
-        duration: Simulated time [s], from time 0, which is that of the state.
+        duration: Simulated time [s], from time 0, which is that of the state; None: up to the last of ``times``.
         times: Instants of the trajectory [s], rising, in [0, duration]; steps land on them exactly. Default: 101
             instants evenly spread.
         floor: True (at y = 0), False (none) or what ``floor`` of a scene may be, such as points ``[x, y]`` [m] or
@@ -107,7 +107,14 @@ def simulate(
     if tolerance is not None:
         chosen["tolerance"] = tolerance
     floor, gravity = plain(floor, "floor"), checked(gravity, "gravity", bool)
-    end: float = checked(duration, "duration", Annotated[float, Field(ge=0, lt=LONGEST)], "s")
+    chosen_times = None if times is None else checked_array(times, "times", "t")
+    if duration is None and chosen_times is None:
+        raise InputError("duration: missing, and so is times; give the simulated time in s, or the instants")
+    if duration is None and chosen_times is not None and len(chosen_times):
+        duration = max(0.0, float(chosen_times[-1]))
+    end: float = checked(
+        0.0 if duration is None else duration, "duration", Annotated[float, Field(ge=0, lt=LONGEST)], "s"
+    )
     options = validated(Options, {**_UNSOFTENED, **settings, **chosen}, "options")
     for name in _UNSOFTENED:
         if getattr(options, name):
@@ -129,8 +136,8 @@ def simulate(
     chain = state.parameters if gravity else state.parameters.with_values({"gravity": 0.0})
     setup = replace(state.setup, scene=scene, parameters=chain)
     check_links_on_gpu(state.links, options.device, "position")
-    instants = np.linspace(0.0, end, 101) if times is None else checked_array(times, "times", "t")
-    is_rising = times is None or bool(np.all(np.diff(instants) > 0))
+    instants = np.linspace(0.0, end, 101) if chosen_times is None else chosen_times
+    is_rising = chosen_times is None or bool(np.all(np.diff(instants) > 0))
     if not len(instants) or instants[0] < 0 or instants[-1] > end or not is_rising:
         raise InputError(f"times: give rising instants between 0 and the duration of {end} s")
     if len(instants) * state.links > MOST_PLACES:

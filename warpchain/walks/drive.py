@@ -1,18 +1,11 @@
-"""What the sprocket does with a chain until the release, as kernels read it, and how chains lie when walks begin."""
+"""What the sprocket does with a chain until the release, as kernels read it."""
 
 import math
-from collections import defaultdict
-from collections.abc import Sequence
-
-import numpy as np
 
 from warpchain.chain.link_values import LinkValues, mean_value
 from warpchain.chain.setup import Setup
-from warpchain.chain.start_shapes import ellipse, lay_chains, stadium
-from warpchain.engine.control import SOFT, SOFT_MASS, SOFTEST
-from warpchain.inputs.arrays import Array
+from warpchain.chain.softened_joints import SOFT, SOFT_MASS, SOFTEST, Joints
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.validation import InputError
 
 HOLD_STRAIN = 3e-4
 """Greatest strain of a held loop on softened joints by its speed."""
@@ -34,40 +27,6 @@ SHORTEST_WINDOW, LONGEST_WINDOW = 0.05, 0.25
 Loops whose links do not alternate are averaged over whole periods, no more than the lower bound needs."""
 BY_ITSELF = -1.0
 """As `steady_time` means: the kernel chooses how long to watch, see :mod:`warpchain.kernels.events.release`."""
-
-
-Motion = tuple[Array, Array]
-"""Position x, y [m], θ [rad] of each link and their rates, (n, 3) each."""
-
-
-def first_motions(setups: Sequence[Setup]) -> list[Motion | None]:
-    """How the chain of each walk lies and moves when the walk begins, about the sprocket's centre or the ellipse's.
-
-    A walk that begins from a given state has None. Chains of equal length are laid together, which takes a tenth of the
-    time, and to the bit as alone. An `InputError` says that a chain does not fit its ellipse.
-    """
-    alike: dict[tuple[int, bool], list[int]] = defaultdict(list)
-    for place, setup in enumerate(setups):
-        if setup.start is None:
-            alike[setup.scene.links, setup.has_drive].append(place)
-    motions: list[Motion | None] = [None] * len(setups)
-    for (links, has_drive), places in alike.items():
-        scenes = [setups[place].scene for place in places]
-        length = np.array([setups[place].parameters.link_length for place in places])
-        radius = np.array([setups[place].joint_radius for place in places])
-        speed = 2 * np.pi * np.array([scene.frequency for scene in scenes]) * radius
-        if has_drive:
-            speed[[scene.start == "rest" for scene in scenes]] = 0.0
-            laid = lay_chains(stadium(radius), links, length, speed, np.zeros(len(places)))
-        else:
-            curve = ellipse([scene.ellipse_aspect for scene in scenes])
-            laid = lay_chains(curve, links, length, speed, np.array([scene.phase for scene in scenes]))
-        for place, position, velocity, fits in zip(places, *laid, strict=True):
-            if not fits:
-                assert not has_drive, "a loop that reaches round its sprocket fits it"
-                raise InputError(f"scene.ellipse_aspect: too far from 1 for {links} links; give one closer to it")
-            motions[place] = position, velocity
-    return motions
 
 
 def drive_of(setup: Setup) -> dict[str, float]:
@@ -115,10 +74,10 @@ def drive_of(setup: Setup) -> dict[str, float]:
     }
 
 
-def _as_soft_as(joints: Parameters, own: float, links: LinkValues) -> float:
+def _as_soft_as(joints: Joints, own: float, links: LinkValues) -> float:
     """Stiffness [N/m] of a chain's joints that are as soft as these; none becomes stiffer than its own."""
     heavier = mean_value(links.mass) / SOFT_MASS
-    return min(own, (heavier if heavier > 2 else 1.0) * joints.joint_stiffness)
+    return min(own, (heavier if heavier > 2 else 1.0) * joints.stiffness)
 
 
 def _softness(own: float, soft: float, softest: float, wanted: float) -> float:

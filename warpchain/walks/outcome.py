@@ -44,7 +44,9 @@ class Outcome:
     dx: Annotated[
         float,
         Stored(
-            "m", "x of the centre of mass from the sprocket (x = 0) on, on a slope along the floor; NaN unless at rest"
+            "m",
+            "x of the centre of mass from the sprocket (x = 0) on; on a slope of the angle α x / cos α, the distance "
+            "along the floor to the point vertically below it; NaN unless at rest",
         ),
     ]
     walk_time: Annotated[float, Stored("s", "from the release to the end")]

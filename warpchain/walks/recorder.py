@@ -11,12 +11,12 @@ from typing import Any, Final
 
 import numpy as np
 
+from warpchain.chain.keep import Keep
 from warpchain.chain.setup import Setup
 from warpchain.engine.world import Recorded, World
 from warpchain.inputs.arrays import Array
 from warpchain.kernels import layout
 from warpchain.loop.stationary_loop import BEFORE, BeforeRelease
-from warpchain.walks.motion import Keep
 from warpchain.walks.moving_plane import angles, frame_axes
 
 SERIES: Final[dict[str, int | list[int]]] = {

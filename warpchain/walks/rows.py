@@ -40,6 +40,11 @@ class Column:
     meaning: str
     path: tuple[str, ...] = ()
 
+    @property
+    def digested(self) -> list[object]:
+        """What a file depends on, see `Stored.digested`."""
+        return [self.kind, self.unit, self.path]
+
 
 def _stored_columns() -> Iterator[tuple[str, Column]]:
     """The columns of the fields of `Outcome`."""

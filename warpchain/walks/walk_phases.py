@@ -14,15 +14,16 @@ from typing import Any
 import numpy as np
 
 from warpchain.chain.floor import circles_of
+from warpchain.chain.keep import NOTHING, Keep
 from warpchain.chain.setup import Setup, State
 from warpchain.chain.sprocket_motion import motion_rows
+from warpchain.chain.starts import Motion, first_motions
 from warpchain.engine.world import CACHES, World
 from warpchain.inputs.arrays import Array
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.status import Status
-from warpchain.walks.drive import Motion, drive_of, first_motions
-from warpchain.walks.motion import NOTHING, Keep
+from warpchain.walks.drive import drive_of
 from warpchain.walks.moving_plane import released_plane, state_of_plane
 from warpchain.walks.outcome import Driven, Outcome, along_floor, datum, outcome_of
 from warpchain.walks.recorder import Recorder

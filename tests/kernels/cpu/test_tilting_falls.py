@@ -13,6 +13,7 @@ from tests.support.blocks_under_test import run_recorded
 from tests.support.presets import SOFT
 from tests.support.tilted_chains import mirrored
 from tests.support.tilting_under_test import end_of, row_of, tilting_batch
+from warpchain.chain.keep import Keep
 from warpchain.chain.start_shapes import ellipse, lay_chain
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
@@ -55,7 +56,9 @@ def run(batch, tilts):
 def fall(start, parameters=SOFT, tolerance=1e-4):
     """Lets a chain fall by dp5."""
     options = Options(method="dp5", tolerance=tolerance)
-    batch = tilting_batch([start], [parameters], options, LIMIT, stop_status=Status.TIME_LIMIT, keeps_samples=True)
+    batch = tilting_batch(
+        [start], [parameters], options, LIMIT, stop_status=Status.TIME_LIMIT, keep=Keep(series_every=1)
+    )
     return Fall(batch, run(batch, True), start)
 
 
@@ -91,7 +94,7 @@ def test_upright_chain_walks_as_the_planar_chain():
     position, velocity, plane = released()
     position += np.array([0.0, plane.origin[1], 0.0])  # the same numbers in both: errors are relative to them
     fallen = fall((position, velocity, tilted_plane()))
-    planar = Batch(1, 30, fallen.batch.options, keeps_samples=True)
+    planar = Batch(1, 30, fallen.batch.options, keep=Keep(series_every=1))
     planar.worlds[0].set_chain(SOFT, 30)
     planar.worlds[0].load(position, velocity, stop_time=LIMIT, stop_status=Status.TIME_LIMIT)
     expected = run(planar, False)

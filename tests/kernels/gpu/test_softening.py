@@ -5,9 +5,9 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from tests.support.blocks_under_test import FIXED_STEP, assert_same, batch_of, heap, launch_blocks, launch_chains
+from tests.support.presets import SOFT
 from warpchain.chain.start_shapes import ellipse, lay_chain
 from warpchain.engine.batch import Batch
-from warpchain.engine.control import SOFT
 from warpchain.kernels import layout
 from warpchain.status import Status
 

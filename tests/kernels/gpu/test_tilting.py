@@ -7,6 +7,7 @@ import pytest
 
 from tests.kernels.gpu.test_same_as_cpu import compiles_for_gpus
 from tests.support.blocks_under_test import SOFT, launch_blocks, launch_chains
+from warpchain.chain.keep import Keep
 from warpchain.chain.start_shapes import ellipse, lay_chain
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
@@ -23,7 +24,7 @@ pytestmark = pytest.mark.usefixtures("without_fused_operations")
 def falling_batch(fixed_step: float | None = None) -> Batch:
     """Two circulating loops in planes that lean and turn, which have sunk into the floor a little."""
     options = Options(method="os32", tolerance=1e-5 if fixed_step is None else 0.1)
-    batch = Batch(2, max(LINKS), options, keeps_samples=True, frame_every=1, tilts=True)
+    batch = Batch(2, max(LINKS), options, keep=Keep(series_every=1, frame_every=1), tilts=True)
     batch.control.launch_time = 1e9
     if fixed_step is not None:
         batch.control.skin, batch.control.contact_step = 1e-9, fixed_step

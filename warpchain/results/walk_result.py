@@ -5,43 +5,36 @@ chain's quantities with their symbols) and, if that was kept, `before_release`; 
 The attributes `setup`, `seed` and `versions`, in JSON, say how to make the walk again. Shards and merged files of
 sweeps keep the motion of a walk in the same groups.
 
-The annotations of `WalkResult` are the one table of a walk's quantities: files, columns of a sweep, units and the
-reference derive from them.
+Its fields are those of `warpchain.walks.walk_numbers`.
 """
 
 import json
 import os
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from warpchain.chain.resolution import SECTIONS
 from warpchain.chain.setup import Setup, State
 from warpchain.files import write_whole
-from warpchain.hdf5_files import Stored, hdf5_image, put, read_fields, reading_hdf5, stored_fields, write_fields
-from warpchain.inputs.arrays import Array
+from warpchain.hdf5_files import Format, hdf5_image, put, read_fields, reading_hdf5, write_fields
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.validation import InputError, json_value, validated
-from warpchain.loop.stationary_loop import BEFORE, FIELDS, BeforeRelease
+from warpchain.inputs.validation import InputError, checked_path, json_value, validated
+from warpchain.loop.stationary_loop import FIELDS
 from warpchain.pictures.labels import Kind
 from warpchain.status import Status
-from warpchain.walks.landmarks import FAULTS, LENGTHS, MOST_ENERGY_ERROR, bounces, energy_error, faults, least
-from warpchain.walks.outcome import Outcome
+from warpchain.walks.landmarks import MOST_ENERGY_ERROR
+from warpchain.walks.restart import state_at
+from warpchain.walks.walk_numbers import NUMBERS, STORED, WalkNumbers, read_motion, write_motion
 
 if TYPE_CHECKING:
     import h5py
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from warpchain.loop.stationary_loop import StationaryLoop
-
-KIND: Final = "warpchain walk"
 WANTED: Final = "give a saved walk; `walk --like SWEEP --index I` saves one"
-
-_FIXED: Final = "if the plane is fixed"
 
 _GROUP: Final = "start"
 """Group of the state that a walk began from, so that it can be run again to the bit."""
@@ -52,10 +45,11 @@ _STATE: Final = {
     "axes": ("1", "axes of x and y of the plane in the room"),
     "plane_rates": ("m/s, rad/s, rad/s", "speed across the plane, and its turning rates about x and y"),
 }
+_FORMAT: Final = Format.of("warpchain walk", STORED, FIELDS, {name: unit for name, (unit, _) in _STATE.items()})
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class WalkResult(Outcome):
+class WalkResult(WalkNumbers):
     """One walk, from the release to its end: t instants and f frames of a chain of n links.
 
     Time counts from the release, x from the centre of sprocket or ellipse, y up from the floor. Units, meanings and
@@ -65,58 +59,6 @@ class WalkResult(Outcome):
     `before_release` is the motion on the sprocket just before the release, None if it was not kept.
     """
 
-    wall_time: Annotated[float, Stored("s", "that the computer took, without the compilation of kernels")]
-    setup: Setup
-    seed: int | None
-    versions: dict[str, str]
-    time: Annotated[Array, Stored("s", "time since the release", "t")]
-    center: Annotated[Array, Stored("m", "centre of mass x, y", "t 2")]
-    center_velocity: Annotated[Array, Stored("m/s", "velocity of the centre of mass x, y", "t 2")]
-    kinetic_energy: Annotated[Array, Stored("J", "kinetic energy", "t")]
-    gravitational_energy: Annotated[Array, Stored("J", "energy of gravity, from the floor below the release", "t")]
-    spring_energy: Annotated[Array, Stored("J", "energy of the joint springs", "t")]
-    lowest: Annotated[Array, Stored("m", "height of the lowest point of all circles", "t")]
-    rms_speed: Annotated[Array, Stored("m/s", "root mean square speed of the links", "t")]
-    frame_time: Annotated[Array, Stored("s", "time since the release", "f")]
-    frame_joints: Annotated[Array, Stored("m", "joints x, y; joint i ends link i, even links inner", "f n 2")]
-    frame_forces: Annotated[
-        Array,
-        Stored(
-            "N",
-            "force x, y in each joint on the link that it ends, with the stiffness and damping of the moment, softened "
-            "just after the release and after a collapse",
-            "f n 2",
-            empty="if not recorded",
-        ),
-    ]
-    frame_moments: Annotated[
-        Array, Stored("N m", "friction moment in each joint on the link that it ends", "f n", empty="if not recorded")
-    ]
-    center_z: Annotated[Array, Stored("m", "centre of mass z, to the right", "t", _FIXED)]
-    tilt: Annotated[Array, Stored("rad", "tilt of the plane", "t", _FIXED)]
-    yaw: Annotated[Array, Stored("rad", "heading of the plane's x axis, anticlockwise, turns counted", "t", _FIXED)]
-    frame_origin: Annotated[Array, Stored("m", "origin of the plane's coordinates in the room", "f 3", _FIXED)]
-    frame_axes: Annotated[Array, Stored("1", "axes of x and y of the plane in the room", "f 2 3", _FIXED)]
-    before_release: BeforeRelease | None = None
-
-    @property
-    def sprocket_center(self) -> Array | None:
-        """Centre of the sprocket x, y at the release [m], shape (2,); None without one."""
-        return None if np.isnan(self.sprocket_height) else np.array([0.0, self.sprocket_height])
-
-    @property
-    def sprocket_radius(self) -> float:
-        """Radius of the sprocket that links touch [m]; NaN without one."""
-        scene, had_none = self.setup.scene, self.setup.start is not None and np.isnan(self.sprocket_height)
-        return np.nan if had_none or scene.start == "ellipse" else self.setup.contact_radius
-
-    @property
-    def joints_in_room(self) -> Array | None:
-        """Joints x, y, z [m] in the room, (f, n, 3), if the plane tilts; else None: `frame_joints` are in the room."""
-        if self.setup.scene.plane == "fixed":
-            return None
-        return self.frame_origin[:, None, :] + self.frame_joints @ self.frame_axes
-
     def __repr__(self) -> str:
         """One line with the most important numbers."""
         error = self.energy_error
@@ -125,20 +67,6 @@ class WalkResult(Outcome):
             f"<WalkResult {self.status.label}: dx {self.dx:.4g} m in {self.walk_time:.4g} s, "
             f"{self.bounces} bounce{'s' * (self.bounces != 1)}, {self.setup.described}, {self.setup.preset}{warning}>"
         )
-
-    @property
-    def energy_error(self) -> float:
-        """Size of the energy unaccounted for, relative to the energy at release; above 0.05 the walk is inaccurate."""
-        at_release = self.energy["kinetic_at_release"] + self.energy["potential_at_release"]
-        return float(energy_error(at_release, self.energy["residual"]))
-
-    def warnings(self) -> list[str]:
-        """Why the walk is inaccurate, each with what to try: energy, joints or contacts; empty if it is not."""
-        values = vars(self.setup.scene) | vars(self.setup.parameters)
-        lengths = {name: least(values[name]) for name in LENGTHS}
-        deepest = max(self.greatest_penetration.values())
-        found = faults(self.energy_error, self.greatest_opening, deepest, lengths)
-        return [FAULTS[name] for name, is_there in found.items() if is_there]
 
     def state(self, t: float) -> State:
         """The chain at the end of its first step at or after a time, as samples and frames are taken.
@@ -153,8 +81,6 @@ class WalkResult(Outcome):
         Raises:
             InputError: `t` is no such time, the chain was never released, or the device of the walk is not here.
         """
-        from warpchain.walks.restart import state_at
-
         is_released = not np.isnan(self.energy["kinetic_at_release"])
         return state_at(self.setup, t, self.walk_time if is_released else np.nan)
 
@@ -180,28 +106,6 @@ class WalkResult(Outcome):
         from warpchain.pictures.walk_figures import draw
 
         return draw(self, kind, figure=figure, ax=ax)
-
-    def mean_loop(self) -> "StationaryLoop":
-        """The loop on its sprocket just before the release: its mean shape, the forces in it, its kink.
-
-        Raises:
-            ValueError: the walk has kept nothing of that time, or too little.
-        """
-        from warpchain.loop.stationary_loop import average_loop
-
-        return average_loop(self.setup, self.before_release, self.sprocket_center)
-
-    def bounce_table(self) -> dict[str, Array]:
-        """The bounces off a flat or sloping floor: columns of equal length, for example for `pandas.DataFrame`.
-
-        `start` and `end` of contact [s], to a sample; `impulse_x`, `impulse_y` of the floor on the chain [N s];
-        `sticks_at` [s], the first sample until which not all that touched slid one way (NaN: all did). A walk without
-        series, or that was never released, has none.
-
-        Raises:
-            InputError: the plane tilts, or the floor is a profile.
-        """
-        return bounces(self.time, self.center_velocity, self.setup)
 
     def animate(self, path: str | os.PathLike[str], *, fps: float = 30.0, slow: float = 4.0) -> None:
         """Write a moving picture of the walk; the suffix of `path` gives the format: .gif, .mp4 or .html.
@@ -233,14 +137,6 @@ class WalkResult(Outcome):
 
         return fragment("\n".join([repr(self), *self.warnings()]), self._repr_png_())
 
-    def unit(self, name: str) -> str:
-        """SI unit of a field; a `KeyError` if there is none of that name."""
-        return STORED[name].unit
-
-    def meaning(self, name: str) -> str:
-        """One line saying what a field is; a `KeyError` if there is none of that name."""
-        return STORED[name].described
-
     def to_dict(self) -> dict[str, Any]:
         """Everything but time series and frames, for JSON; a number that is not finite is None."""
         plain: dict[str, Any] = json_value(
@@ -263,7 +159,7 @@ class WalkResult(Outcome):
         Raises:
             OSError: the file cannot be written, or something else than a regular file is there; one line that names it.
         """
-        write_whole(path, hdf5_image(KIND, self._fill))
+        write_whole(path, hdf5_image(_FORMAT, self._fill))
 
     def _fill(self, file: "h5py.File") -> None:
         """Fill an empty file."""
@@ -279,27 +175,6 @@ class WalkResult(Outcome):
             put(file, f"parameters/{name}", value, quantity.unit, quantity.meaning).attrs["symbol"] = quantity.symbol
 
 
-STORED: Final = stored_fields(WalkResult)
-"""Fields of `WalkResult` that a file keeps: name → unit, meaning, shape."""
-NUMBERS: Final = {name: stored for name, stored in STORED.items() if not stored.shape}
-"""Those that are numbers, or dictionaries of them."""
-MOTION: Final = {name: stored for name, stored in STORED.items() if stored.shape}
-"""Those that are arrays."""
-
-
-def write_motion(group: "h5py.Group", values: Mapping[str, Any], joints: type = np.float64) -> None:
-    """Write the arrays of a walk, and `before_release`, into a group; `joints`: precision of what each joint has."""
-    write_fields(group, values, MOTION, joints)
-    if (before := values[BEFORE]) is not None:
-        write_fields(group.create_group(BEFORE, track_order=True), vars(before), FIELDS, joints)
-
-
-def read_motion(group: "h5py.Group", links: int) -> dict[str, Any]:
-    """What `write_motion` wrote of a chain of so many links."""
-    before = BeforeRelease(**read_fields(group[BEFORE], FIELDS, links)) if BEFORE in group else None
-    return {**read_fields(group, MOTION, links), BEFORE: before}
-
-
 def load_walk(path: str | os.PathLike[str]) -> WalkResult:
     """Read a walk that `WalkResult.save` wrote, or the `walk.h5` of a folder; every number comes back to the bit.
 
@@ -308,13 +183,14 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
         InputError: the file is no walk, or belongs to another version of warpchain. It is a `ValueError`.
         DamagedFileError: the file is damaged, cut short or of an earlier warpchain. It is an `InputError`.
     """
+    path = checked_path(path, "path")
     if os.path.isdir(path):
         record = os.path.join(path, "walk.h5")
         if not os.path.exists(record) and os.path.exists(os.path.join(path, "sweep.h5")):
             raise InputError(f"{path}: the folder of a sweep, not of a saved walk; {WANTED}")
         path = record
     remedy = "run the walk again, or fetch another copy of the file"
-    with reading_hdf5(path, KIND, remedy, WANTED) as file:
+    with reading_hdf5(path, _FORMAT, remedy, WANTED) as file:
         given = json.loads(file.attrs["setup"])
         try:
             sections: Any = {name: validated(model, given[name], name) for name, model in SECTIONS.items()}
