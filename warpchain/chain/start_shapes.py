@@ -1,157 +1,215 @@
-"""Closed chains of rigid links laid along a curve, at rest or circulating.
+"""Closed chains of rigid links laid along a curve, at rest or circulating; walks begin from them.
 
 Joints must close the loop to rounding: at k = 1e9 N/m an opening of 0.1 mm holds 5 J. So Newton's method solves for the
 joints' places on the curve together with the curve's size. The circulating velocities are the exact rigid motion along
 the curve: the derivative of that solution with respect to the first joint's place.
+
+Many chains are laid at once, as arrays with one row for each chain. No number of a chain depends on the others.
 """
 
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from warpchain.inputs.arrays import Array
+
+MOST_ITERATIONS: Final = 50
+"""Newton's method takes five to ten for chains that fit their curves."""
+MISFIT: Final = 1e-9
+"""Greatest relative error of a link's length in a chain that is laid."""
 
 
 @dataclass(frozen=True)
 class Curve:
-    """A family of closed curves P(s, size), clockwise in s.
+    """A family of closed curves P(s, size), clockwise in s, for w chains at once.
 
-    `points` maps s, (m,), and a size to P [m], ∂P/∂s, and ∂P/∂size at fixed s, (2, m) each; `period` a size to the
-    period of s and its derivative; `first_size` the length of a chain [m] to a size for Newton's method to start from.
+    `points` maps s, (w, m), and sizes, (w,), to P [m], ∂P/∂s, and ∂P/∂size at fixed s, (2, w, m) each; `period` sizes
+    to the periods of s, and `period_growth` is their derivative; `first_size` maps lengths of chains [m] to sizes for
+    Newton's method to start from. `is_arc_length` says whether s is a length along the curve.
     """
 
-    points: Callable[[Array, float], tuple[Array, Array, Array]]
-    period: Callable[[float], tuple[float, float]]
-    first_size: Callable[[float], float]
+    points: Callable[[Array, Array], tuple[Array, Array, Array]]
+    period: Callable[[Array], Array]
+    period_growth: float
+    first_size: Callable[[Array], Array]
+    is_arc_length: bool
 
 
-def stadium(radius: float) -> Curve:
+def stadium(radius: ArrayLike) -> Curve:
     """Upper half circle about the origin, two vertical straights, lower half circle: a chain hung on a sprocket.
 
-    Its size is the length of a straight [m], s the arc length from the top [m], `radius` that of the half circles [m].
+    Its size is the length of a straight [m], s the arc length from the top [m], `radius` that of the half circles [m],
+    one for all chains or one for each, (w,).
     """
-    quarter = np.pi * radius / 2
+    radii = np.atleast_1d(np.asarray(radius, dtype=float))[:, np.newaxis]
+    quarter = np.pi * radii / 2
 
-    def points(s: Array, size: float) -> tuple[Array, Array, Array]:
-        turn = 4 * quarter + 2 * size
+    def points(s: Array, size: Array) -> tuple[Array, Array, Array]:
+        straight = size[:, np.newaxis]
+        turn = 4 * quarter + 2 * straight
         laps, s = np.divmod(s, turn)
-        down = np.minimum(np.maximum(s - quarter, 0.0), size)  # distances along the two straights
-        up = np.minimum(np.maximum(s - 3 * quarter - size, 0.0), size)
-        angle = (s - down - up) / radius
+        down = np.minimum(np.maximum(s - quarter, 0.0), straight)  # distances along the two straights
+        up = np.minimum(np.maximum(s - 3 * quarter - straight, 0.0), straight)
+        angle = (s - down - up) / radii
         sine, cosine = np.sin(angle), np.cos(angle)
-        along = np.array([cosine, -sine])
+        along = np.stack([cosine, -sine])
         # A longer straight moves points at the same s: past its end on the right, past its start and end on the left.
-        down_growth = (s > quarter + size) * 1.0
-        up_growth = (s > turn - quarter) * 2.0 - (s > 3 * quarter + size)
+        down_growth = (s > quarter + straight) * 1.0
+        up_growth = (s > turn - quarter) * 2.0 - (s > 3 * quarter + straight)
         growth = -(down_growth + up_growth + 2 * laps) * along  # every lap before grows as well
         growth[1] += up_growth - down_growth
-        point = np.array([radius * sine, radius * cosine - down + up])
-        return point, along, growth
+        return np.stack([radii * sine, radii * cosine - down + up]), along, growth
 
     return Curve(
         points=points,
-        period=lambda size: (4 * quarter + 2 * size, 2.0),
-        first_size=lambda length: max((length - 4 * quarter) / 2, 0.0),
+        period=lambda size: 4 * quarter[:, 0] + 2 * size,
+        period_growth=2.0,
+        first_size=lambda length: np.maximum((length - 4 * quarter[:, 0]) / 2, 0.0),
+        is_arc_length=True,
+    )
+
+
+def ellipse(aspect: ArrayLike) -> Curve:
+    """An ellipse about the origin; `aspect` is its height over its width, one for all chains or one for each, (w,).
+
+    Its size is the geometric mean of the semi-axes [m], s the angle of the parametric form from the top [rad].
+    """
+    aspects = np.atleast_1d(np.asarray(aspect, dtype=float))
+    wide, high = (1 / np.sqrt(aspects))[:, np.newaxis], np.sqrt(aspects)[:, np.newaxis]
+
+    def points(s: Array, size: Array) -> tuple[Array, Array, Array]:
+        scale, sine, cosine = size[:, np.newaxis], np.sin(s), np.cos(s)
+        unit = np.stack([wide * sine, high * cosine])
+        along = np.stack([wide * cosine, -high * sine])
+        return scale * unit, scale * along, unit
+
+    return Curve(
+        points=points,
+        period=lambda size: np.full_like(size, 2 * np.pi),
+        period_growth=0.0,
+        first_size=lambda length: length / np.array([_circumference(each) for each in aspects.tolist()]),
+        is_arc_length=False,
     )
 
 
 @functools.lru_cache
-def ellipse(aspect: float) -> Curve:
-    """An ellipse about the origin; `aspect` is its height over its width.
-
-    Its size is the geometric mean of the semi-axes [m], s the angle of the parametric form from the top [rad].
-    """
-    wide, high = 1 / np.sqrt(aspect), np.sqrt(aspect)
-
-    def points(s: Array, size: float) -> tuple[Array, Array, Array]:
-        sine, cosine = np.sin(s), np.cos(s)
-        unit = np.array([wide * sine, high * cosine])
-        along = np.array([wide * cosine, -high * sine])
-        return size * unit, size * along, unit
-
+def _circumference(aspect: float) -> float:
+    """Circumference of an ellipse whose semi-axes have the geometric mean 1."""
     angles = np.linspace(0, 2 * np.pi, 4096, endpoint=False)
-    unit_length = float(np.mean(np.hypot(wide * np.cos(angles), high * np.sin(angles))) * 2 * np.pi)
-    return Curve(points=points, period=lambda size: (2 * np.pi, 0.0), first_size=lambda length: length / unit_length)
+    pace = np.hypot(1 / np.sqrt(aspect) * np.cos(angles), np.sqrt(aspect) * np.sin(angles))
+    return float(np.mean(pace) * 2 * np.pi)
 
 
 def lay_chain(
     curve: Curve, links: int, link_length: float, speed: float = 0.0, phase: float = 0.0
 ) -> tuple[Array, Array]:
-    """Lay the joints of a closed chain along a curve, the first at a phase, a fraction of the curve's period.
-
-    They move clockwise at a mean speed [m/s]. A `ValueError` says that no closed chain of these links fits the curve.
+    """Lay the joints of one closed chain along a curve, see `lay_chains`; a `ValueError` says that it does not fit.
 
     Returns:
         position (n, 3): x, y [m], θ [rad] of the links, numbered clockwise, and velocity (n, 3), their rates.
     """
-    size = curve.first_size(links * link_length)
-    s = curve.period(size)[0] * (phase + np.arange(links) / links)
-    if curve.period(size)[1] == 0.0:  # s is no arc length: even the chords out first
-        fine = s[0] + np.linspace(0.0, curve.period(size)[0], 1024)
-        pace = np.sqrt(np.sum(curve.points(fine, size)[1] ** 2, axis=0))
-        arc = np.concatenate([[0.0], np.cumsum((pace[1:] + pace[:-1]) / 2 * np.diff(fine))])
-        s = np.interp(arc[-1] * np.arange(links) / links, arc, fine)
-    worst = np.inf
-    for _ in range(50):
-        period, period_growth = curve.period(size)
-        s[0] = phase * period
-        ends, along, growth = curve.points(np.concatenate([s, [s[0] + period]]), size)
-        chord = ends[:, 1:] - ends[:, :-1]
-        residual = (chord * chord).sum(0) - link_length**2
-        to_here = -2 * (chord * along[:, :-1]).sum(0)
-        to_following = 2 * (chord * along[:, 1:]).sum(0)
-        to_size = 2 * (chord * (growth[:, 1:] - growth[:, :-1])).sum(0)
-        # The first joint moves with the period; the last chord ends on it one period later.
-        to_size[0] += to_here[0] * phase * period_growth
-        to_size[-1] += to_following[-1] * (1 + phase) * period_growth
-        last, worst = worst, float(np.abs(residual).max())
-        if last < 1e-9 * link_length**2 and worst > last / 2:  # rounding is reached
-            break
-        change = _solve_loop(to_here, to_following, to_size, -residual)
-        if not np.isfinite(change).all():
-            break
-        s[1:] += change[:-1]
-        size = max(size + float(change[-1]), 0.0)
-    joints, along, growth = ends[:, :-1], along[:, :-1], growth[:, :-1]
-    if not (np.abs(np.hypot(*chord) - link_length) <= 1e-9 * link_length).all():
+    position, velocity, fits = lay_chains(curve, links, *(np.array([value]) for value in (link_length, speed, phase)))
+    if not fits[0]:
         raise ValueError(f"a closed chain of {links} links of {link_length} m does not fit this curve")
+    return position[0], velocity[0]
+
+
+def lay_chains(
+    curve: Curve, links: int, link_length: Array, speed: Array, phase: Array
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Lay the joints of w closed chains of n links along curves of one family.
+
+    Args:
+        curve: The family, of one shape for all chains or of one for each.
+        links: Number n of links of each chain.
+        link_length: Length of the links of each chain [m], (w,).
+        speed: Mean speed with which the joints move clockwise [m/s], (w,).
+        phase: Place of the first joint, as a fraction of the curve's period, (w,).
+
+    Returns:
+        position (w, n, 3): x, y [m], θ [rad] of the links, numbered clockwise; velocity (w, n, 3), their rates; and
+        whether each chain fits its curve, (w,). Rows of chains that do not are no chains.
+    """
+    length, start = link_length[:, np.newaxis], phase[:, np.newaxis]
+    size = curve.first_size(links * link_length)
+    s = curve.period(size)[:, np.newaxis] * (start + np.arange(links) / links)
+    if not curve.is_arc_length:
+        s = _evenly_spaced(curve, s, size)
+    worst, is_done = np.full(len(size), np.inf), np.zeros(len(size), dtype=bool)
+    for _ in range(MOST_ITERATIONS):
+        period = curve.period(size)
+        s[:, 0] = phase * period
+        ends, along, growth = curve.points(np.concatenate([s, (s[:, 0] + period)[:, np.newaxis]], axis=1), size)
+        chord = ends[..., 1:] - ends[..., :-1]
+        residual = (chord * chord).sum(0) - length**2
+        to_here = -2 * (chord * along[..., :-1]).sum(0)
+        to_following = 2 * (chord * along[..., 1:]).sum(0)
+        to_size = 2 * (chord * (growth[..., 1:] - growth[..., :-1])).sum(0)
+        # The first joint moves with the period; the last chord ends on it one period later.
+        to_size[:, 0] += to_here[:, 0] * phase * curve.period_growth
+        to_size[:, -1] += to_following[:, -1] * (1 + phase) * curve.period_growth
+        last, worst = worst, np.abs(residual).max(-1)
+        is_done |= (last < MISFIT * link_length**2) & (worst > last / 2)  # rounding is reached
+        change = _solve_loop(to_here, to_following, to_size, -residual)
+        is_done |= ~np.isfinite(change).all(-1)
+        if is_done.all():
+            break
+        change[is_done] = 0.0
+        s[:, 1:] += change[:, :-1]
+        size = np.maximum(size + change[:, -1], 0.0)
+    fits = (np.abs(np.hypot(*chord) - length) <= MISFIT * length).all(-1)
+    joints, along, growth = ends[..., :-1], along[..., :-1], growth[..., :-1]
     # Rigid motion along the curve: s[0] moves at unit rate, the chords keep their lengths.
-    drive = np.zeros(links)
-    drive[0] = -to_here[0]
-    drive[-1] -= to_following[-1]
+    drive = np.zeros_like(s)
+    drive[:, 0] = -to_here[:, 0]
+    drive[:, -1] -= to_following[:, -1]
     rates = _solve_loop(to_here, to_following, to_size, drive)
-    first_rate = 1.0 + phase * period_growth * rates[-1]
-    joint_rate = np.concatenate([[first_rate], rates[:-1]]) * along + rates[-1] * growth
-    joint_rate *= speed / np.sqrt((joint_rate * joint_rate).sum(0)).mean()
-    return links_between(joints.T, joint_rate.T)
+    size_rate = rates[:, -1:]
+    along_rates = np.concatenate([1.0 + start * curve.period_growth * size_rate, rates[:, :-1]], axis=1)
+    joint_rate = along_rates * along + size_rate * growth
+    joint_rate *= (speed / np.sqrt((joint_rate * joint_rate).sum(0)).mean(-1))[:, np.newaxis]
+    return *links_between(np.moveaxis(joints, 0, -1), np.moveaxis(joint_rate, 0, -1)), fits
+
+
+def _evenly_spaced(curve: Curve, s: Array, size: Array) -> Array:
+    """Places s, (w, n), of joints that divide each curve into arcs of about equal length from its first s on."""
+    fine = s[:, :1] + np.linspace(0.0, curve.period(size), 1024, axis=-1)
+    pace = np.sqrt(np.sum(curve.points(fine, size)[1] ** 2, axis=0))
+    steps = (pace[:, 1:] + pace[:, :-1]) / 2 * np.diff(fine)
+    arc = np.concatenate([np.zeros((len(size), 1)), steps.cumsum(-1)], axis=1)
+    n = s.shape[1]
+    return np.stack([np.interp(way[-1] * np.arange(n) / n, way, at) for way, at in zip(arc, fine, strict=True)])
 
 
 def _solve_loop(to_here: Array, to_following: Array, to_size: Array, right: Array) -> Array:
-    """Solve the n equations of a loop's chords for the changes of s[1:] and of the size, all shapes (n,).
+    """Solve the n equations of each loop's chords for the changes of s[1:] and of the size, all shapes (w, n).
 
     Chord i: to_here[i] δs[i] + to_following[i] δs[i + 1] + to_size[i] δsize = right[i], with δs[0] = δs[n] = 0.
     From the first chord on, each gives the next δs as a + b δsize; the last one then gives δsize.
     """
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # a singular loop gives no finite change
-        scale = (-to_here[:-1] / to_following[:-1]).cumprod()  # of each δs per first δs
-        divisor = to_following[:-1] * scale
-        constant, slope = (scale * (side[:-1] / divisor).cumsum() for side in (right, -to_size))
-        size = (right[-1] - to_here[-1] * constant[-1]) / (to_size[-1] + to_here[-1] * slope[-1])
-        return np.concatenate([constant + slope * size, [size]])
+        following = to_following[:, :-1]
+        scale = (-to_here[:, :-1] / following).cumprod(-1)  # of each δs per first δs
+        divisor = following * scale
+        constant, slope = (scale * (side[:, :-1] / divisor).cumsum(-1) for side in (right, -to_size))
+        last = to_here[:, -1]
+        size = (right[:, -1] - last * constant[:, -1]) / (to_size[:, -1] + last * slope[:, -1])
+        return np.concatenate([constant + slope * size[:, np.newaxis], size[:, np.newaxis]], axis=1)
 
 
 def links_between(joints: Array, joint_rate: Array) -> tuple[Array, Array]:
-    """Links that span the joints, (n, 2) [m], link i from joint i − 1 to joint i: positions and velocities, (n, 3).
+    """Links that span the joints, (…, n, 2) [m], link i from joint i − 1 to joint i: positions, velocities (…, n, 3).
 
-    The rates of the joints, (n, 2) [m/s], keep all distances of neighbours.
+    The rates of the joints, (…, n, 2) [m/s], keep all distances of neighbours.
     """
-    order = np.arange(len(joints)) - 1
-    before, before_rate = joints[order], joint_rate[order]
+    before, before_rate = np.roll(joints, 1, axis=-2), np.roll(joint_rate, 1, axis=-2)
     span, span_rate = joints - before, joint_rate - before_rate
-    angle = np.unwrap(np.arctan2(span[:, 1], span[:, 0]))
-    spin = (span[:, 0] * span_rate[:, 1] - span[:, 1] * span_rate[:, 0]) / np.sum(span**2, axis=1)
-    position = np.column_stack([(joints + before) / 2, angle])
-    velocity = np.column_stack([(joint_rate + before_rate) / 2, spin])
+    angle = np.unwrap(np.arctan2(span[..., 1], span[..., 0]))
+    spin = (span[..., 0] * span_rate[..., 1] - span[..., 1] * span_rate[..., 0]) / np.sum(span**2, axis=-1)
+    position = np.concatenate([(joints + before) / 2, angle[..., np.newaxis]], axis=-1)
+    velocity = np.concatenate([(joint_rate + before_rate) / 2, spin[..., np.newaxis]], axis=-1)
     return position, velocity

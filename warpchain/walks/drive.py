@@ -5,8 +5,6 @@ import math
 from warpchain.chain.link_values import LinkValues, mean_value
 from warpchain.chain.setup import Setup
 from warpchain.chain.softened_joints import SOFT, SOFT_MASS, SOFTEST, Joints
-from warpchain.chain.start_shapes import lay_chain, stadium
-from warpchain.inputs.arrays import Array
 from warpchain.inputs.parameters import Parameters
 
 HOLD_STRAIN = 3e-4
@@ -31,8 +29,8 @@ BY_ITSELF = -1.0
 """As `steady_time` means: the kernel chooses how long to watch, see :mod:`warpchain.kernels.events.release`."""
 
 
-def drive_of(setup: Setup) -> tuple[tuple[Array, Array], dict[str, float]]:
-    """Position and velocity (n, 3) of a chain on its sprocket, about the origin, and fields of `Drive` by name."""
+def drive_of(setup: Setup) -> dict[str, float]:
+    """The fields of `Drive`, by name, of a walk that begins on a sprocket."""
     scene, parameters, options, links = setup.scene, setup.parameters, setup.options, setup.link_values
     from_rest = scene.start == "rest"
     radius = setup.joint_radius
@@ -57,7 +55,7 @@ def drive_of(setup: Setup) -> tuple[tuple[Array, Array], dict[str, float]]:
         window = period * math.ceil(SHORTEST_WINDOW / period)
     longest_step = max(options.contact_step, options.soft_contact_step if options.soften_drive else 0.0)
     settled, spin_up = setup.settling_time, scene.spin_up_time if from_rest and speed > 0 else 0.0
-    drive = {
+    return {
         "sprocket_speed": -2 * math.pi * scene.frequency,  # clockwise, so that the walk goes towards +x
         "spin_up_start": settled,
         "spin_up_time": spin_up,
@@ -74,7 +72,6 @@ def drive_of(setup: Setup) -> tuple[tuple[Array, Array], dict[str, float]]:
         "loaded_softness": loaded_softness,
         "push_rate": min(FASTEST_PUSH, PUSH / longest_step),
     }
-    return lay_chain(stadium(radius), scene.links, parameters.link_length, 0.0 if from_rest else speed), drive
 
 
 def _as_soft_as(joints: Joints, own: float, links: LinkValues) -> float:

@@ -8,6 +8,7 @@ from functools import partial
 
 from warpchain.chain.keep import NOTHING, Keep
 from warpchain.chain.setup import Setup
+from warpchain.chain.starts import first_motions
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import Gpu, gpu_turn, start_device
 from warpchain.engine.kernel_choice import block_threads, load_kernels, resident_blocks
@@ -33,8 +34,8 @@ took a fifth longer in blocks of five sizes than in blocks of 192 threads, some 
 """
 BATCHES_PER_GPU = 4
 """While the host handles one of them, the others go on and fill the device."""
-BEGUN_AT_ONCE = 16
-"""Most walks that begin with a launch. Each takes the host 1 to 3 ms, in which launches that are over would wait."""
+BEGUN_AT_ONCE = 64
+"""Most walks that begin with a launch, together; launches that are over wait meanwhile."""
 NAP = 5e-4
 """Pause [s] before asking again whether a batch is done."""
 
@@ -63,9 +64,10 @@ def run_setups(
         watch: Called after each launch of each walk.
     """
 
-    def begin(place: int, world: World) -> WalkRun:
-        setup = setups[place] if draw is None else draw(place)
-        return WalkRun(world, setup, NOTHING if keeps is None else keeps[place])
+    def begin(places: Sequence[int], worlds: Sequence[World]) -> list[WalkRun]:
+        complete = [setups[place] if draw is None else draw(place) for place in places]
+        kept = [NOTHING if keeps is None else keeps[place] for place in places]
+        return [*map(WalkRun, worlds, complete, kept, first_motions(complete))]
 
     def group(places: list[int]) -> list[BatchRun]:
         kept = [] if keeps is None else [keeps[place] for place in places]
@@ -142,7 +144,7 @@ class BatchRun:
         batch: Batch,
         waiting: deque[int],
         capacity: int,
-        begin: Callable[[int, World], WalkRun],
+        begin: Callable[[Sequence[int], Sequence[World]], list[WalkRun]],
         watch: Callable[[WalkRun], None] | None,
     ) -> None:
         """Prepare to run waiting walks, of which `capacity` would fill the device; those that begin are taken away."""
@@ -159,9 +161,10 @@ class BatchRun:
 
     def start(self) -> bool:
         """Give some waiting walks free worlds and begin a launch; False if there is nothing to carry on."""
-        for _ in range(min(len(self._free), len(self.waiting), BEGUN_AT_ONCE)):
-            place, world = self.waiting.popleft(), self._free.pop()
-            run = self._begin(place, self.batch.worlds[world])
+        count = min(len(self._free), len(self.waiting), BEGUN_AT_ONCE)
+        places, worlds = [self.waiting.popleft() for _ in range(count)], [self._free.pop() for _ in range(count)]
+        runs = self._begin(places, [self.batch.worlds[world] for world in worlds])
+        for place, world, run in zip(places, worlds, runs, strict=True):
             phases = run.phases()
             self._running[world], self._features[world] = (place, run, phases), next(phases)
         together: dict[Features, list[int]] = defaultdict(list)

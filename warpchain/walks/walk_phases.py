@@ -17,7 +17,7 @@ from warpchain.chain.floor import circles_of
 from warpchain.chain.keep import NOTHING, Keep
 from warpchain.chain.setup import Setup, State
 from warpchain.chain.sprocket_motion import motion_rows
-from warpchain.chain.starts import laid_start
+from warpchain.chain.starts import Motion, first_motions
 from warpchain.engine.world import CACHES, World
 from warpchain.inputs.arrays import Array
 from warpchain.kernels import layout
@@ -72,10 +72,14 @@ class WalkRun:
         is_free: Whether the chain walks without a sprocket, and all that its start brings has been done.
     """
 
-    def __init__(self, world: World, setup: Setup, keep: Keep = NOTHING) -> None:
-        """Prepare a walk; the batch of the world has its options, and records what is to be kept."""
+    def __init__(self, world: World, setup: Setup, keep: Keep = NOTHING, motion: Motion | None = None) -> None:
+        """Prepare a walk; the batch of the world has its options, and records what is to be kept.
+
+        ``motion``: how the chain lies at first, of `first_motions`, if many walks begin at once.
+        """
         scene = setup.scene
         self.world, self.setup = world, setup
+        self._first_motion = first_motions([setup])[0] if motion is None else motion
         self.recorder = Recorder(world, keep, setup)
         self.driven = Driven(has_sprocket=setup.has_drive)
         self.status = Status.RUNNING
@@ -107,13 +111,14 @@ class WalkRun:
                 world.set_state(first_area=area)
                 world.resume(self._walk_end, Status.TIME_LIMIT)
         elif not setup.has_drive:
-            self._release(*laid_start(setup))
+            assert self._first_motion is not None
+            self._release(*self._first_motion)
         else:
-            hanging = math.nan
-            (position, velocity), drive = drive_of(setup)
+            assert self._first_motion is not None
+            hanging, drive = math.nan, drive_of(setup)
             driven.full_speed_at, self._hold_softness = drive["hold_start"], drive["hold_softness"]
             world.set_drive(**drive)
-            load = partial(world.load, position, velocity, softness=self._hold_softness)
+            load = partial(world.load, *self._first_motion, softness=self._hold_softness)
             load(stop_time=setup.settling_time, stop_status=Status.FINISHED)
             if setup.scene.start == "rest":
                 yield features["driven"]
