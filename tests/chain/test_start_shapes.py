@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from tests.oracle_model import motion_equations
 from tests.support.presets import PAPER
-from warpchain.chain.start_shapes import ellipse, lay_chain, stadium
+from warpchain.chain.start_shapes import ellipse, lay_chain, lay_chains, stadium
 from warpchain.chain.starts import SHAPES
 from warpchain.inputs.starts import STARTS, StartWord
 
@@ -108,3 +108,24 @@ def test_every_start_has_a_shape_or_a_sprocket() -> None:
     """The words that a user may write, and the shapes that chains without a sprocket are laid along, are one table."""
     assert {word for word, start in STARTS.items() if not start.on_sprocket} == SHAPES.keys()
     assert set(get_args(StartWord)) == STARTS.keys()
+
+
+@pytest.mark.parametrize("family", [stadium, ellipse])
+def test_chains_laid_together_are_those_laid_alone(family) -> None:
+    """Chains of unlike curves, lengths, speeds and phases are the same to the bit, whichever chains are beside them."""
+    random = np.random.default_rng(3)
+    sizes = (RADIUS if family is stadium else 1.5) * random.uniform(0.9, 1.1, 5)
+    values = LENGTH * random.uniform(0.99, 1.01, 5), random.uniform(0.0, 5.0, 5), random.uniform(0.0, 1.0, 5)
+    positions, velocities, fits = lay_chains(family(sizes), 60, *values)
+    assert fits.all()
+    for place, one in enumerate(zip(*values, strict=True)):
+        position, velocity = lay_chain(family(sizes[place]), 60, *one)
+        assert np.array_equal(position, positions[place]) and np.array_equal(velocity, velocities[place])
+
+
+def test_a_chain_that_does_not_fit_leaves_the_others_alone() -> None:
+    """Of two chains one is too short for its sprocket; the other is laid as alone."""
+    length = np.full(2, LENGTH)
+    positions, _, fits = lay_chains(stadium([RADIUS, 5 * RADIUS]), 60, length, np.zeros(2), np.zeros(2))
+    assert fits.tolist() == [True, False]
+    assert np.array_equal(positions[0], lay_chain(stadium(RADIUS), 60, LENGTH)[0])

@@ -47,7 +47,8 @@ LEAST_SHARE: Final = 0.05
 class PlannedWalk:
     """One walk of a sweep: its number, that of its block, its cell along every axis of that, its number in the cell.
 
-    The setup is everything that says what it is; what was drawn for it stands in the order of drawing, too.
+    The setup is everything that says what it is, `laws` what is drawn for it; what was drawn stands in the order of
+    drawing, too.
     """
 
     index: int
@@ -55,6 +56,7 @@ class PlannedWalk:
     cell: Cell
     sample: int
     setup: Setup
+    laws: Mapping[str, Distribution]
     drawn: Point
 
 
@@ -102,13 +104,20 @@ class Sweep:
         if not block.drawn:
             return walk
         row, member = divmod(walk.sample, walks_per_sample(block.sampler, len(block.drawn)))
-        distributions, designed = fixed.placed(block.distributions), block.sampler != "random"
-        points, setups = self._first_possible(block, walk.cell, fixed, distributions, row, designed=designed)
+        points, setups = self._first_possible(
+            block, walk.cell, fixed, walk.laws, row, designed=block.sampler != "random"
+        )
         return replace(walk, setup=setups[member], drawn=points[member])
 
     def undrawn(self, indices: Iterable[int]) -> Iterator[PlannedWalk]:
         """Walks without their draws, which take most of the time; options and number of links never depend on them."""
-        fixed = lru_cache(2**12)(lambda number, cell: self.blocks[number].fixed(cell))  # for all samples of a cell
+
+        @lru_cache(2**12)
+        def of_cell(number: int, cell: Cell) -> tuple[Setup, Mapping[str, Distribution]]:
+            """What all samples of a cell have in common."""
+            setup = self.blocks[number].fixed(cell)
+            return setup, setup.placed(self.blocks[number].distributions)
+
         for index in map(int, indices):
             sample, place = divmod(index, self.blocks[0].stride)
             number = bisect.bisect_right(self.blocks, place, key=lambda block: block.first_cell) - 1
@@ -116,7 +125,7 @@ class Sweep:
             if not 0 <= sample < block.samples:
                 raise IndexError(f"walk {index} of a sweep of {self.walk_count} walks")
             cell = tuple(map(int, np.unravel_index(place - block.first_cell, block.shape[:-1])))
-            yield PlannedWalk(index, number, cell, sample, fixed(number, cell), {})
+            yield PlannedWalk(index, number, cell, sample, *of_cell(number, cell), {})
 
     def keep(self, walk: PlannedWalk) -> Keep:
         """What is kept of the motion of a walk."""
@@ -151,7 +160,8 @@ class Sweep:
         """Check the options of a cell beside those of the block's first cell; else an `InputError`."""
         for name in Options.model_fields:
             here, there = getattr(first, name), getattr(options, name)
-            if here != there and name not in block.varied:
+            follows = name == "precision" and not {"tolerance", "soft_tolerance"}.isdisjoint(block.varied)
+            if here != there and name not in block.varied and not follows:
                 both = f"{here!r} in one cell, {there!r} in another"
                 raise InputError(f"{block.path}.grid: {name} is {both}; give each a block of its own")
         for name, choice in self.recording.choices.items():
