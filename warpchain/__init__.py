@@ -13,6 +13,8 @@ To run:
     simulate(...)    the motion of any given chain, without sprocket
     Chains(...)      many given chains, whose velocities may be changed between runs
 
+    live(folder)     a page in a notebook on which sliders change a walk
+
 To read:
 
     load(folder)     results of a sweep, as far as it has run
@@ -43,6 +45,7 @@ if TYPE_CHECKING:
     from warpchain.inputs.parameters import preset as preset
     from warpchain.inputs.state import State as State
     from warpchain.inputs.validation import InputError as InputError
+    from warpchain.live_page.opened import live as live
     from warpchain.run.simulation import Chains as Chains
     from warpchain.run.simulation import Trajectory as Trajectory
     from warpchain.run.simulation import simulate as simulate
@@ -61,6 +64,7 @@ _NAMES = {
     "inputs.parameters": "Parameters preset",
     "inputs.state": "State",
     "inputs.validation": "InputError",
+    "live_page.opened": "live",
     "run.simulation": "Chains Trajectory simulate",
     "run.single_walk": "walk",
     "run.sweep_run": "sweep",

@@ -9,6 +9,7 @@ import itertools
 import json
 import math
 import os
+import re
 import subprocess
 from pathlib import Path
 from typing import Annotated, Any, Final, cast
@@ -43,8 +44,10 @@ _CORNER: Final = (-35.0, 22.0)
 _PADDING: Final = np.array([[50, 50], [50, 30]])
 """Pixels to the left and below, and to the right and above."""
 
-_PLAYER: Final = Path(__file__).with_name("player.html")
-"""The page with a player, which says what its data are."""
+_PAGE: Final = Path(__file__).with_name("player.html")
+"""The page with a player."""
+PLAYER: Final = Path(__file__).with_name("player.js")
+"""The player, which says what its data are; other pages have it as well."""
 _HOLD: Final = 1.5
 """Time for which GIF and MP4 show their last picture [s]."""
 
@@ -135,18 +138,29 @@ def _write_mp4(walk: Walk, path: Path, fps: float, slow: float) -> None:
 
 
 def player(walk: Walk, slow: float = 4.0) -> str:
-    """A page with a player of the frames from the side: lengths in tenths of a millimetre, times in microseconds.
+    """A page with a player of the frames from the side, which starts `slow` times slower than the walk.
 
-    It starts `slow` times slower than the walk. A `ValueError` says that the walk has no frames or broken ones.
+    A `ValueError` says that the walk has no frames or broken ones.
+    """
+    title = html.escape(headline(walk) + ", from the side" * (walk.joints_in_room is not None))
+    content = json.dumps(player_data(walk) | {"slow": slow}, separators=(",", ":"), allow_nan=False)
+    parts = {"title": title, "player": PLAYER.read_text(encoding="utf-8"), "data": content}
+    return re.sub(r"{{(\w+)}}", lambda found: parts[found[1]], _PAGE.read_text(encoding="utf-8"))
+
+
+def player_data(walk: Walk, most: int = 2000) -> dict[str, Any]:
+    """What a player needs: lengths in tenths of a millimetre, times in microseconds; with so many frames at most.
+
+    With 60 links 2000 frames make a page of about 1 MB. A `ValueError` is raised as by `player`.
     """
     joints, sprocket = checked_joints(walk), walk.sprocket_center
-    count = min(len(walk.frame_time), 2000)  # with 60 links the page has about 1 MB then
+    count = min(len(walk.frame_time), most)
     frames = np.rint(np.linspace(0, len(walk.frame_time) - 1, count)).astype(int)
     times, box = walk.frame_time[frames], side_box(walk, joints)
     marks = floor_marks(*box[0])
     center = np.stack([np.interp(times, walk.time, walk.center[:, axis]) for axis in (0, 1)], axis=1)
     places, ends = chain.sprocket_centers(walk, times), box[0] + np.array([-3, 3]) * np.ptp(box[0])
-    data = {
+    return {
         "time": _whole(times, 1e6),
         "joints": _whole(joints[frames, :, :2].reshape(count, -1)),
         "center": _whole(center),
@@ -158,12 +172,8 @@ def player(walk: Walk, slow: float = 4.0) -> str:
         "heights": _whole(np.array(walk.setup.floor.heights(np.array(marks)))),
         "floor": _whole(walk.setup.floor.line(*ends)),
         "stretches": [[color, label, _whole(faces)] for color, label, faces in chain.stretches(walk, *ends)],
-        "slow": slow,
         "colors": {"inner": INNER, "outer": OUTER, "edge": EDGE},
     }
-    title = html.escape(headline(walk) + ", from the side" * (walk.joints_in_room is not None))
-    content = json.dumps(data, separators=(",", ":"), allow_nan=False)
-    return _PLAYER.read_text(encoding="utf-8").replace("{{title}}", title).replace("{{data}}", content)
 
 
 def _whole(values: NDArray[np.float64], parts: float = 1e4) -> list[int] | list[list[int]]:

@@ -7,7 +7,7 @@ the release. The state of a walk at any time after that is that of the walk, run
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -52,12 +52,19 @@ class Progress:
         time: Simulated time [s] since the start, in phase ``"walk"`` since the release.
         speed: Speed [m/s] along the loop, in phase ``"walk"`` of the centre of mass.
         attempts: Attempted steps so far.
+        frame_time: Times [s] since the release of the frames recorded since the last call, shape (f,).
+        frame_joints: Joints in the room [m] of these frames, as in `WalkResult`: x, y, shape (f, n, 2), and z, shape
+            (f, n, 3), if the plane tilts.
+        sprocket_height: Height [m] of the sprocket's centre at the release; NaN before it, and without a sprocket.
     """
 
     phase: str
     time: float
     speed: float
     attempts: int
+    frame_time: Array = field(default_factory=lambda: np.empty(0), compare=False)
+    frame_joints: Array = field(default_factory=lambda: np.empty((0, 0, 2)), compare=False)
+    sprocket_height: float = math.nan
 
 
 def phase_features(setup: Setup) -> dict[str, Features]:
@@ -181,7 +188,8 @@ class WalkRun:
         attempts = self.counts["accepted"] + self.counts["rejected"]
         if self._released:
             speed = math.hypot(sample[layout.CENTER_U], sample[layout.CENTER_V])
-            return Progress("walk", now or self.drive_time, speed, attempts)
+            height = self.raised if self._has_sprocket else math.nan
+            return Progress("walk", now or self.drive_time, speed, attempts, *self.recorder.latest_frames(), height)
         phase = "settle" if now < self._settled else "spin up" if now < self._at_full_speed else "hold"
         return Progress(phase, now, float(sample[layout.LOOP_SPEED]), attempts)
 

@@ -1,0 +1,63 @@
+"""The live page as text, and the page of walks that needs neither a server nor Python."""
+
+import json
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from warpchain.inputs.parameters import preset
+from warpchain.inputs.scene import Scene
+from warpchain.inputs.validation import FIELDS, SECTION_OF, field_unit, json_value
+
+if TYPE_CHECKING:
+    from warpchain.store.sweep_result import SweepResult
+
+FIRST: Final = {"links": 60, "frequency": 15, "start": "spinning"}
+"""The first set-up on the page."""
+_EDGES: Final = [[[step / 5, -0.04 * (step - 1)], [step / 5, -0.04 * step]] for step in range(1, 9)]
+STAIRS: Final = [[-1.0, 0.0], *([x, round(y, 2)] for edge in _EDGES for x, y in edge), [2.0, -0.32]]
+"""A floor that falls in eight steps; beyond the last it goes on level."""
+MOST_CELLS: Final = 2000
+"""Most cells of a sweep on the page."""
+_HERE: Final = Path(__file__).parent
+_PLAYER: Final = _HERE.parent / "pictures/player.js"
+
+
+def live_page(sweep: "SweepResult | None" = None, walks: dict[str, Any] | None = None, data: str = "") -> str:
+    """The page, with `{{nonce}}` for what permits its script; instead of a server it may have `walks` and their data."""
+    defaults = {name: field.default for name, field in Scene.model_fields.items()} | vars(preset("paper"))
+    fields = {
+        name: {"unit": field_unit(FIELDS[name]), "text": FIELDS[name].description, "default": default}
+        for name, default in defaults.items()
+    }
+    about = {"fields": fields, "first": FIRST, "stairs": STAIRS, "walks": walks}
+    about |= {"sweep": None if sweep is None else sweep_points(sweep)}
+    parts = {name: (_HERE / f"live.{name}").read_text(encoding="utf-8") for name in ("css", "js")}
+    parts["player"] = _PLAYER.read_text(encoding="utf-8")
+    parts["about"] = json.dumps(json_value(about), allow_nan=False, ensure_ascii=False).replace("<", "\\u003c")
+    parts["data"] = data
+    template = (_HERE / "live.html").read_text(encoding="utf-8")
+    return re.sub(r"{{(\w+)}}", lambda found: parts.get(found[1], found[0]), template)
+
+
+def sweep_points(sweep: "SweepResult") -> dict[str, Any]:
+    """Mean Δx of each cell with its standard error, the values of the axes, and the numbers of its walks."""
+    blocks, left = [], MOST_CELLS
+    for name, found in sweep.cell_statistics().items():
+        index = sweep.blocks[name].columns["index"]
+        places = [*np.ndindex(found.mean.shape)][:left]
+        left -= len(places)
+        cells = [
+            {
+                "at": [values[k] for values, k in zip(found.axes.values(), place, strict=True)],
+                "mean": found.mean[place],
+                "error": found.standard_error[place],
+                "walks": index[place].tolist()[:100],
+            }
+            for place in places
+        ]
+        units = [field_unit(FIELDS[axis]) if axis in SECTION_OF else "" for axis in found.axes]
+        blocks.append({"name": name, "axes": [*found.axes], "units": units, "cells": cells})
+    return {"name": sweep.name, "blocks": blocks}
