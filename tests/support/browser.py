@@ -75,7 +75,7 @@ class Page:
     def wait(self, condition: str, seconds: float = 60.0) -> float:
         """Wait until an expression is true; the time [s] that took."""
         began = time.monotonic()
-        while not self.do(f"Boolean({condition})"):
+        while not self.do(f"(() => {{ try {{ return Boolean({condition}); }} catch {{ return false; }} }})()"):
             assert time.monotonic() < began + seconds, (condition, self.do("document.body.innerText"), self.errors)
             time.sleep(0.01)
         return time.monotonic() - began

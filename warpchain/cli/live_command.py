@@ -38,7 +38,7 @@ def live(
 
     address, mark, fragment = (what or "").partition("#")
     sweep, folder = None, Path(address)
-    if what is not None and not mark and "://" not in what:
+    if address and "://" not in address:
         from warpchain.store.sweep_result import load
 
         sweep = load(folder)

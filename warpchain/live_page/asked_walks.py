@@ -75,7 +75,7 @@ class Walker:
         if others := sorted(sections["options"].keys() - {"method", "tolerance"}):
             raise InputError(f"options.{others[0]}: not possible on a live page; leave it out, or use `warpchain walk`")
         if index is None:
-            return resolve(preset or DEFAULT_PRESET, **sections, seed=seed), seed
+            return resolve(DEFAULT_PRESET if preset is None else preset, **sections, seed=seed), seed  # type: ignore[arg-type]
         if self.sweep is None:
             raise InputError(f"index: {shown(index)} of no sweep; start `warpchain live FOLDER`")
         block, place = self.sweep.located(index)
@@ -152,7 +152,7 @@ class Walker:
 
 
 def _watch(is_gone: IsGone, walks: int = 1) -> Callable[[Progress], None]:
-    """What ends walks after their time, or when they are no longer wanted; the compilation of kernels is not counted."""
+    """What ends walks after their time, without that of compiling kernels, or when they are no longer wanted."""
     ends: list[float] = []
 
     def watch(progress: Progress) -> None:
@@ -163,7 +163,8 @@ def _watch(is_gone: IsGone, walks: int = 1) -> Callable[[Progress], None]:
         if not ends:
             ends.append(time.monotonic() + walks * MOST_SECONDS)
         if time.monotonic() > ends[0]:
-            raise InputError(f"scene.links: more than {MOST_SECONDS:g} s of computing; give fewer, or a method as standard")
+            problem = f"more than {walks * MOST_SECONDS:g} s of computing, too much for a live page"
+            raise InputError(f"scene.walk_limit: {problem}; give less, such as 10, or fewer links")
 
     return watch
 

@@ -53,13 +53,17 @@ class Film:
             frame_joints=joints,
             joints_in_room=None,
             sprocket_center=None if math.isnan(height) else np.array([0.0, height]),
-            sprocket_radius=math.nan if math.isnan(height) else contact_radius(self._setup.scene, self._setup.parameters),
+            sprocket_radius=math.nan
+            if math.isnan(height)
+            else contact_radius(self._setup.scene, self._setup.parameters),
         )
         data = player_data(cast(Walk, walk), len(times))
         if is_first:
             return {"first": data}
         moving = {name: data[name][had:] for name in ("time", "joints", "center")}
-        return {"more": moving | {name: data[name] for name in ("view", "marks", "heights", "floor", "places", "stretches")}}
+        return {
+            "more": moving | {name: data[name] for name in ("view", "marks", "heights", "floor", "places", "stretches")}
+        }
 
 
 def summary(walk: WalkResult) -> dict[str, Any]:

@@ -43,6 +43,7 @@ _NO_TOKEN: Final = (
 )
 _Setup = dict[str, Any]
 _Setups = Annotated[list[_Setup], Field(min_length=1, max_length=2)]
+_First = Annotated[int, Field(ge=0)]
 _Count = Annotated[int, Field(ge=1, le=MOST_SAMPLES)]
 
 
@@ -53,7 +54,11 @@ class LiveServer(ThreadingHTTPServer):
 
     def __init__(self, port: int = 0, sweep: "SweepResult | None" = None, folder: Path = Path()) -> None:
         """Listen at a port, or at any that is free; an `OSError` if it is taken."""
-        self.token, self.closing, self.slots = secrets.token_urlsafe(24), threading.Event(), threading.Semaphore(WALKS_AT_ONCE)
+        self.token, self.closing, self.slots = (
+            secrets.token_urlsafe(24),
+            threading.Event(),
+            threading.Semaphore(WALKS_AT_ONCE),
+        )
         self._sweep, self._folder, self._connections = sweep, folder, threading.Semaphore(MOST_CONNECTIONS)
         super().__init__((ADDRESS, port), _Handler)
         self.page = live_page(sweep)
@@ -136,7 +141,10 @@ class _Handler(BaseHTTPRequestHandler):
                 self._answer(lambda *to: self.server.walker.play(asked, *to))
             elif self.path == "/samples":
                 setups = checked(asked.get("setups"), "setups", _Setups)
-                first, count = checked(asked.get("first"), "first", _Count), checked(asked.get("count"), "count", _Count)
+                first, count = (
+                    checked(asked.get("first"), "first", _First),
+                    checked(asked.get("count"), "count", _Count),
+                )
                 self._answer(lambda *to: self.server.walker.samples(setups, first, count, *to))
             else:
                 self._reply(404, "Ask for /walk or /samples.\n")

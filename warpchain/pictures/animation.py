@@ -137,13 +137,26 @@ def _write_mp4(walk: Walk, path: Path, fps: float, slow: float) -> None:
             raise OSError("ffmpeg ended early") from error
 
 
-def player(walk: Walk, slow: float = 4.0) -> str:
+def framed_player(walk: Walk, most: int = 2000) -> str:
+    """An HTML element, a frame with the page of `player`, as high as it needs on a page of some 1000 pixels.
+
+    A `ValueError` is raised as by `player`.
+    """
+    content = html.escape(player(walk, most=most))
+    wide, high = np.ptp(walk.frame_joints[..., 0]), walk.frame_joints[..., 1].max()
+    height = round(min(600.0, 170.0 + 960.0 * high / wide))  # of the drawing at full width, and of its controls
+    # No sandbox: browsers run sandboxed frames in another process, where the player may draw before it has a size.
+    style = f'style="width:100%;height:{height}px;border:1px solid #ccc" loading="lazy"'
+    return f'<iframe title="the walk in motion" {style} srcdoc="{content}"></iframe>'
+
+
+def player(walk: Walk, slow: float = 4.0, most: int = 2000) -> str:
     """A page with a player of the frames from the side, which starts `slow` times slower than the walk.
 
     A `ValueError` says that the walk has no frames or broken ones.
     """
     title = html.escape(headline(walk) + ", from the side" * (walk.joints_in_room is not None))
-    content = json.dumps(player_data(walk) | {"slow": slow}, separators=(",", ":"), allow_nan=False)
+    content = json.dumps(player_data(walk, most) | {"slow": slow}, separators=(",", ":"), allow_nan=False)
     parts = {"title": title, "player": PLAYER.read_text(encoding="utf-8"), "data": content}
     return re.sub(r"{{(\w+)}}", lambda found: parts[found[1]], _PAGE.read_text(encoding="utf-8"))
 

@@ -59,7 +59,8 @@ class Player {
   get layout() {
     const [left, right, bottom, top] = this.walk.view, width = this.canvas.clientWidth;
     const scale = Math.min(width / (right - left), 0.75 * window.innerHeight / (top - bottom));
-    return { left, right, bottom, top, scale, height: scale * (top - bottom), shift: (width - scale * (right - left)) / 2 };
+    const height = scale * Math.max(top - bottom, top + 28 / scale); // below the floor there is room for its marks
+    return { left, right, bottom: top - height / scale, top, scale, height, shift: (width - scale * (right - left)) / 2 };
   }
 
   // Where a pointer is, in tenths of a millimetre.
@@ -145,7 +146,7 @@ class Player {
     pen.fillStyle = colorOf("ink");
     pen.font = "13px system-ui, sans-serif";
     [pen.textAlign, pen.textBaseline] = ["center", "top"];
-    for (const mark of walk.marks) pen.fillText(mark + " m", shift + (mark * 1e4 - left) * scale, top * scale + 9);
+    for (const mark of walk.marks) pen.fillText(mark + " m", shift + (mark * 1e4 - left) * scale, height - 18);
     if (this.clock) this.clock.textContent = (walk.time[frame] / 1e6).toFixed(3) + " s";
     if (this.slider) this.slider.value = frame;
     this.shown(this.moment);

@@ -43,6 +43,8 @@ if TYPE_CHECKING:
 KIND: Final = "warpchain walk"
 WANTED: Final = "give a saved walk; `walk --like SWEEP --index I` saves one"
 
+SHOWN: Final = 12_000
+"""Joints that a notebook keeps of the frames of a walk: 200 frames of 60 links take 0.12 MB."""
 _SINCE_FLOOR: Final = "time since the last impulse on the floor; NaN if there was none"
 _FIXED: Final = "if the plane is fixed"
 _NEVER: Final = "NaN if it never was"
@@ -299,10 +301,18 @@ class WalkResult:
         return first_png(partial(self.plot, kind) for kind in ("film_strip", "height_and_speed"))
 
     def _repr_html_(self) -> str:
-        """The most important numbers, why the walk is inaccurate if it is, and the picture."""
+        """The most important numbers, why the walk is inaccurate if it is, a player if there are frames, the picture.
+
+        What shows no frames, such as a notebook that is not trusted, shows the picture.
+        """
+        from warpchain.pictures.animation import framed_player
         from warpchain.pictures.style import fragment
 
-        return fragment("\n".join([repr(self), *self.warnings()]), self._repr_png_())
+        shown = fragment("\n".join([repr(self), *self.warnings()]), self._repr_png_())
+        try:
+            return framed_player(self, max(60, SHOWN // self.setup.scene.links)) + shown
+        except ValueError:  # no frames, or broken ones
+            return shown
 
     def unit(self, name: str) -> str:
         """SI unit of a field; a `KeyError` if there is none of that name."""
