@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from warpchain.inputs.parameters import preset as preset
     from warpchain.inputs.state import State as State
     from warpchain.inputs.validation import InputError as InputError
-    from warpchain.live_page.opened import live as live
+    from warpchain.live_page.server import live as live
     from warpchain.run.simulation import Chains as Chains
     from warpchain.run.simulation import Trajectory as Trajectory
     from warpchain.run.simulation import simulate as simulate
@@ -64,7 +64,7 @@ _NAMES = {
     "inputs.parameters": "Parameters preset",
     "inputs.state": "State",
     "inputs.validation": "InputError",
-    "live_page.opened": "live",
+    "live_page.server": "live",
     "run.simulation": "Chains Trajectory simulate",
     "run.single_walk": "walk",
     "run.sweep_run": "sweep",

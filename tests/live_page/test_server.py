@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -69,7 +70,9 @@ def test_a_walk_is_that_of_the_library(server: LiveServer) -> None:
     times = first["time"] + [time for each in more for time in each["time"]]
     joints = first["joints"] + [frame for each in more for frame in each["joints"]]
     assert more and times == (walk.frame_time * 1e6).round().astype(int).tolist() == told[-1]["whole"]["time"]
-    assert joints == told[-1]["whole"]["joints"] == (walk.frame_joints * 1e4).round().astype(int).reshape(-1, 80).tolist()
+    assert (
+        joints == told[-1]["whole"]["joints"] == (walk.frame_joints * 1e4).round().astype(int).reshape(-1, 80).tolist()
+    )
 
 
 @pytest.mark.parametrize(
@@ -222,7 +225,14 @@ def test_samples_are_those_of_the_library(server: LiveServer) -> None:
     found = {(each["sample"]["side"], each["sample"]["seed"]): each["sample"]["dx"] for each in messages(text)[:-1]}
     setups = (FIRST, other)
     assert found == {(side, seed): warpchain.walk(**setups[side], seed=seed).dx for side in (0, 1) for seed in (3, 4)}
-    for wrong in ({"count": 10**6}, {"count": 0}, {"first": -1}, {"first": "x"}, {"setups": []}, {"setups": [FIRST] * 3}):
+    for wrong in (
+        {"count": 10**6},
+        {"count": 0},
+        {"first": -1},
+        {"first": "x"},
+        {"setups": []},
+        {"setups": [FIRST] * 3},
+    ):
         assert ask(server, "/samples", {"setups": [FIRST], "first": 0, "count": 1} | wrong)[0] == 400
     _, text = ask(server, "/samples", {"setups": [FIRST | {"links": 31}], "first": 0, "count": 1})
     assert messages(text)[-1]["error"].startswith("scene.links: 31 is odd")
@@ -236,7 +246,7 @@ def test_what_is_pushed_goes_on_from_its_state(server: LiveServer) -> None:
         mass = [walk.setup.parameters.inner_mass, walk.setup.parameters.outer_mass][link % 2]
         velocity = state.velocity.copy()
         velocity[link, :2] += [part / mass for part in impulse]
-        walk = warpchain.walk(start=__import__("dataclasses").replace(state, velocity=velocity))
+        walk = warpchain.walk(start=replace(state, velocity=velocity))
         told = messages(ask(server, "/walk", FIRST | {"push": pushes[:count]})[1])
         assert told[-1]["end"]["dx"] == walk.dx
 
@@ -260,7 +270,9 @@ def test_no_process_stays(number: signal.Signals, tmp_path: Path) -> None:
         port, token = int(url.split(":")[2].split("/")[0]), url.partition("token=")[2]
         line = socket.create_connection(("127.0.0.1", port), timeout=60)
         body = json.dumps(LONG).encode()
-        head = f"POST /walk HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nX-Token: {token}\r\nContent-Length: {len(body)}\r\n\r\n"
+        head = (
+            f"POST /walk HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nX-Token: {token}\r\nContent-Length: {len(body)}\r\n\r\n"
+        )
         line.sendall(head.encode() + body)
         while b"first" not in line.recv(65536):  # the walk is under way
             pass

@@ -34,16 +34,10 @@ def live(
             raise InputError("--export: given together with a folder or an address; leave one out")
         print(printable(str(export_page(export))))
         return
-    from warpchain.live_page.server import LiveServer
+    from warpchain.live_page.server import live as serve
 
     address, mark, fragment = (what or "").partition("#")
-    sweep, folder = None, Path(address)
-    if address and "://" not in address:
-        from warpchain.store.sweep_result import load
-
-        sweep = load(folder)
-    server = LiveServer(port, sweep, folder)
-    server.start()
+    server = serve(address if address and "://" not in address else None, port=port)
     url = server.url + mark + fragment
     print(f"{printable(url)}\nCtrl-C ends it", flush=True)
     if browser:

@@ -36,8 +36,6 @@ MOST_SECONDS: Final = 60.0
 """Most time [s] for which a walk of the page is computed, beside that of the compilation of kernels."""
 MOST_NUMBERS: Final = 4_000_000
 """Most coordinates that the page gets of a walk."""
-MOST_SAMPLES: Final = 100
-"""Most samples that the page can ask for at once."""
 INTERVAL: Final = 4e-3
 """Time [s] between two frames: one for each picture of a screen, if the walk is played four times slower."""
 MOST_KEPT: Final = 8
@@ -138,7 +136,8 @@ class Walker:
             setup, _ = self.setup({**setups[side], "seed": seed})
             walk = run_walk(setup=setup, seed=seed, frame_interval=None, on_progress=watch)
             path = np.rint(walk.center[:: max(1, len(walk.center) // 200)] * 1e4).astype(int).tolist()
-            return json_value({"seed": seed, "side": side, "dx": walk.dx, "status": walk.status.label, "path": path})
+            said = {"seed": seed, "side": side, "dx": walk.dx, "status": walk.status.label, "path": path}
+            return dict(json_value(said))
 
         with ThreadPoolExecutor(processors()) as threads:
             try:
@@ -174,4 +173,4 @@ def change_of_velocity(setup: Setup, link: int, impulse: Sequence[float]) -> Arr
     masses = link_values(setup.scene, setup.parameters).mass
     if not 0 <= link < len(masses):
         raise InputError(f"push: link {link} is not in the chain; give 0 to {len(masses) - 1}")
-    return np.array(impulse) / masses[link]
+    return np.asarray(np.array(impulse) / masses[link])

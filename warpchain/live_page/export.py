@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from warpchain.engine.processors import processors
-from warpchain.files import make_folder, write_whole
+from warpchain.files import Kind, checked_output, make_folder, write_whole
 from warpchain.live_page.asked_walks import Walker
 from warpchain.live_page.messages import recipes, summary
 from warpchain.live_page.page import FIRST, STAIRS, live_page
@@ -26,11 +26,15 @@ AXES: Final[dict[str, list[Any]]] = {
 _FLOORS: Final[dict[str, dict[str, Any]]] = {"flat": {}, "slope": {"slope": 6}, "stairs": {"floor": STAIRS}}
 _INTERVAL: Final = 5e-3
 """Time [s] between two frames."""
+_MARK: Final = b"<!-- warpchain live -->"
+PAGES: Final = Kind("page that warpchain live has written", lambda path: _MARK in path.read_bytes())
+"""All that an export replaces."""
 
 
 def export_page(folder: Path) -> Path:
     """Run the walks and write the page, whole or not at all; its path. An `OSError` if it cannot be written."""
     make_folder(folder)
+    path = checked_output(folder / "index.html", PAGES)
     with ThreadPoolExecutor(processors()) as threads:
         places = [*itertools.product(*(range(len(values)) for values in AXES.values()))]
         texts = threads.map(_packed, places)
@@ -38,9 +42,9 @@ def export_page(folder: Path) -> Path:
             f'<script type="text/plain" id="walk-{"-".join(map(str, place))}">{text}</script>'
             for place, text in zip(places, texts, strict=True)
         ]
-    page = live_page(walks=AXES, data="\n".join(elements)).replace(' nonce="{{nonce}}"', "")
-    write_whole(folder / "index.html", page)
-    return folder / "index.html"
+    page = live_page(walks=AXES, data="\n".join([_MARK.decode(), *elements])).replace(' nonce="{{nonce}}"', "")
+    write_whole(path, page, PAGES)
+    return path
 
 
 def _packed(place: tuple[int, ...]) -> str:

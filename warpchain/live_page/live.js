@@ -3,27 +3,20 @@
 // server or null.
 const CONTROLS = { // field: label, least, greatest and step of its slider; or words to choose among
   Chain: {
-    links: ["links", 30, 180, 2],
-    coulomb_friction: ["friction in the joints", 0, 5e-4, 1e-5],
-    charm_mass: ["mass of a charm", 0, 0.03, 0.001],
-    charm_link: ["link that carries the charm", 0, 179, 1],
+    links: ["links", 30, 180, 2], coulomb_friction: ["friction in the joints", 0, 5e-4, 1e-5],
+    charm_mass: ["mass of a charm", 0, 0.03, 0.001], charm_link: ["link that carries the charm", 0, 179, 1],
     preset: ["preset", "paper", "soft"],
   },
   Sprocket: {
-    frequency: ["frequency", 1, 30, 0.5],
-    clearance: ["clearance from the floor", 0, 0.1, 0.001],
-    start: ["start", "spinning", "rest", "ellipse"],
-    seed: ["seed of a random sample (empty: means)"],
+    frequency: ["frequency", 1, 30, 0.5], clearance: ["clearance from the floor", 0, 0.1, 0.001],
+    start: ["start", "spinning", "rest", "ellipse"], seed: ["seed of a random sample (empty: means)"],
   },
   Floor: {
-    floor_friction: ["friction", 0, 1, 0.01],
-    floor_restitution: ["restitution", 0, 1, 0.01],
-    slope: ["slope, downhill", -20, 20, 0.5],
-    floor: ["profile"],
+    floor_friction: ["friction", 0, 1, 0.01], floor_restitution: ["restitution", 0, 1, 0.01],
+    slope: ["slope, downhill", -20, 20, 0.5], floor: ["profile"],
   },
   "Plane of the chain": {
-    plane: ["plane", "fixed", "tilting"],
-    tilt: ["tilt at the release", -0.3, 0.3, 0.01],
+    plane: ["plane", "fixed", "tilting"], tilt: ["tilt at the release", -0.3, 0.3, 0.01],
     lateral_speed: ["speed sideways at the release", -1, 1, 0.05],
   },
 };
@@ -45,11 +38,12 @@ let asking = null, sampling = null; // what can be aborted
 
 // Texts
 
-const unitOf = name => ((about.fields[name]?.unit ?? "1") === "1" ? "" : about.fields[name].unit);
+const unitOf = name => about.fields[name]?.unit ?? "";
 const number = (value, digits = 3) => (value === null ? "unknown" : String(Number(value.toPrecision(digits))));
 const written = value => (typeof value === "string" ? value : JSON.stringify(value));
 const read = text => { try { return JSON.parse(text); } catch { return text; } };
-const shapeOf = floor => (!Array.isArray(floor) ? floor : written(floor) === written(about.stairs) ? "stairs" : "drawn");
+const isStairs = floor => written(floor) === written(about.stairs);
+const shapeOf = floor => (!Array.isArray(floor) ? floor : isStairs(floor) ? "stairs" : "drawn");
 const described = given => Object.entries(given)
   .map(([name, value]) => `${name} = ${name === "floor" ? shapeOf(value) : written(value)}`).join(", ");
 
@@ -72,8 +66,9 @@ function writeAddress() {
 // Ask for something, and take each message, one a line; a refusal is an error, and so is an end before the end.
 async function ask(path, content, { signal }, take) {
   const headers = { "Content-Type": "application/json", "X-Token": token };
+  const lost = new Error("The server has ended: see its terminal, or start `warpchain live` again.");
   const answer = await fetch(path, { method: "POST", headers, body: JSON.stringify(content), signal }).catch(error => {
-    throw signal.aborted ? error : new Error("The server has ended; start `warpchain live` again.");
+    throw signal.aborted ? error : lost;
   });
   if (!answer.ok) throw new Error(await answer.text());
   const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
@@ -87,7 +82,7 @@ async function ask(path, content, { signal }, take) {
       if (!signal.aborted) take(message);
     }
   }
-  if (!isOver) throw new Error("The server broke off; its terminal says why.");
+  if (!isOver) throw lost;
 }
 
 // What is refused is said beside its control, or at the top if it has none.
@@ -163,7 +158,7 @@ function tell(end) {
   const texts = [["python", end.python], ["command", end.command], ["yaml", end.yaml]].filter(([, text]) => text);
   $("lines").replaceChildren($("lines").firstElementChild, ...texts.flatMap(([name, text]) => [
     make("pre", { id: "line-" + name, textContent: text }),
-    make("button", { textContent: "Copy", ariaLabel: "Copy " + name, onclick: () => navigator.clipboard.writeText(text) }),
+    make("button", { textContent: `Copy ${name}`, onclick: () => navigator.clipboard.writeText(text) }),
   ]));
   values = { ...end.values, seed: end.seed };
   showValues();
@@ -245,7 +240,7 @@ function middle(joints, link) {
 
 function linkAt([x, y]) {
   const joints = player.walk.joints[player.frame];
-  const far = player.walk.radii.map((_, link) => Math.hypot(...middle(joints, link).map((part, i) => part - [x, y][i])));
+  const apart = ([u, v]) => Math.hypot(u - x, v - y), far = player.walk.radii.map((_, link) => apart(middle(joints, link)));
   const link = far.indexOf(Math.min(...far));
   return far[link] < NEAR ? { link, from: middle(joints, link), to: [x, y] } : null;
 }
@@ -316,8 +311,8 @@ player.above = hair => {
   if (stroke) player.line(stroke);
   if (!arrow) return;
   const { from, to } = arrow, turn = Math.atan2(to[1] - from[1], to[0] - from[0]);
-  const [one, two] = [2.6, -2.6].map(a => [to[0] + 12 * hair * Math.cos(turn + a), to[1] + 12 * hair * Math.sin(turn + a)]);
-  player.line([from, to, one, to, two]);
+  const beside = angle => [to[0] + 12 * hair * Math.cos(turn + angle), to[1] + 12 * hair * Math.sin(turn + angle)];
+  player.line([from, to, beside(2.6), to, beside(-2.6)]);
 };
 player.shown = moment => {
   if (!sideA || !other.walk) return;
@@ -329,7 +324,8 @@ player.shown = moment => {
 
 async function more() {
   const sides = [setup, ...(sideA ? [sideA] : [])].map(({ seed: _, push: __, ...given }) => given);
-  const first = Math.max(-1, ...samples.map(each => each.seed)) + 1, count = 12, mine = (sampling = new AbortController());
+  const first = Math.max(-1, ...samples.map(each => each.seed)) + 1, count = 12, mine = new AbortController();
+  sampling = mine;
   const isBusy = on => { $("bar").hidden = $("cancel").hidden = !on; $("more").disabled = on; };
   isBusy(true);
   $("bar").value = 0;
@@ -343,21 +339,23 @@ async function more() {
 }
 
 const mean = list => list.reduce((sum, each) => sum + each, 0) / list.length;
-const deviation = list => Math.sqrt(list.reduce((sum, each) => sum + (each - mean(list)) ** 2, 0) / (list.length - 1));
-const average = list => (list.length < 2 ? "…" : `${number(mean(list))} ± ${number(deviation(list) / Math.sqrt(list.length), 2)} m`);
+const spread = list => Math.sqrt(list.reduce((sum, each) => sum + (each - mean(list)) ** 2, 0) / (list.length - 1));
+const errorOf = list => (list.length < 2 ? 0 : spread(list) / Math.sqrt(list.length));
+const average = list => (list.length < 2 ? "…" : `${number(mean(list), 4)} ± ${number(errorOf(list), 2)} m`);
 
 function showSamples() {
-  const sides = (sideA ? [1, 0] : [0]).map(side => new Map(samples.filter(each => each.side === side).map(each => [each.seed, each.dx])));
+  const sides = (sideA ? [1, 0] : [0]).map(side => samples.filter(each => each.side === side));
+  const known = sides.map(side => side.map(each => each.dx).filter(dx => dx !== null));
   const texts = sides.map((side, i) => {
-    const rested = [...side.values()].filter(dx => dx !== null), lost = side.size - rested.length;
-    return `${sideA ? "AB"[i] + ": " : ""}${side.size} samples, Δx = ${average(rested)}${lost ? `, ${lost} without Δx` : ""}`;
+    const lost = side.length - known[i].length, name = sideA ? "AB"[i] + ": " : "";
+    return `${name}${side.length} samples, Δx = ${average(known[i])}${lost ? `, ${lost} without Δx` : ""}`;
   });
   if (sideA) {
-    const apart = [...sides[1]].map(([seed, dx]) => [dx, sides[0].get(seed) ?? null]).filter(pair => !pair.includes(null));
-    texts.push(`B − A = ${average(apart.map(([b, a]) => b - a))} over ${apart.length} pairs of equal samples`);
+    const earlier = new Map(sides[0].map(each => [each.seed, each.dx]));
+    const pairs = sides[1].map(each => [each.dx, earlier.get(each.seed) ?? null]).filter(pair => !pair.includes(null));
+    texts.push(`B − A = ${average(pairs.map(([b, a]) => b - a))} over ${pairs.length} pairs of equal samples`);
   }
   $("statistics").textContent = samples.length ? texts.join("; ") + ". Errors are standard errors of the mean." : "";
-  const known = sides.map(side => [...side.values()].filter(dx => dx !== null));
   $("histogram").replaceChildren(...(known.flat().length > 1 ? bars(known) : []));
   player.draw();
 }
@@ -368,47 +366,60 @@ const node = (tag, attributes, ...children) => {
   element.append(...children);
   return element;
 };
+const label = (x, y, anchor, text) => node("text", { x, y, "text-anchor": anchor }, text);
 
-function bars(sides) {
-  const low = Math.min(...sides.flat()), wide = (Math.max(...sides.flat()) - low || 1e-3) / 15;
-  const counts = sides.map(list => list.reduce((found, dx) => (found[Math.floor((dx - low) / wide)]++, found), Array(16).fill(0)));
-  const most = Math.max(...counts.flat()), bar = 36 / sides.length;
-  const parts = counts.flatMap((row, side) => row.map((count, i) => node("rect", {
-    x: 40 * i + bar * side, y: 80 - 76 * count / most, width: bar, height: 76 * count / most,
-    fill: `var(--${sides.length > 1 && side === 0 ? "red" : "blue"})`,
-  })));
-  const marks = [0, 15].map(i => node("text", { x: 40 * i + 18, y: 96, "text-anchor": i ? "end" : "start" }, `${number(low + i * wide)} m`));
-  return [node("svg", { viewBox: "0 0 640 100", role: "img", "aria-label": "Histogram of the distance walked" }, ...parts, ...marks)];
+// Histograms of several lists of numbers, and above them their means with standard errors.
+function bars(lists) {
+  const low = Math.min(...lists.flat()), wide = (Math.max(...lists.flat()) - low || 1e-3) / 15;
+  const counts = lists.map(() => Array(16).fill(0)), width = 36 / lists.length, parts = [];
+  lists.forEach((list, side) => list.forEach(dx => counts[side][Math.floor((dx - low) / wide)]++));
+  const most = Math.max(...counts.flat()), at = dx => 40 * (dx - low) / wide;
+  lists.forEach((list, side) => {
+    const fill = `var(--${lists.length > 1 && side === 0 ? "red" : "blue"})`;
+    counts[side].forEach((count, i) => {
+      const height = 70 * count / most;
+      parts.push(node("rect", { x: 40 * i + width * side, y: 80 - height, width, height, fill }));
+    });
+    const error = Math.max(errorOf(list), wide / 20), x = at(mean(list) - error);
+    if (list.length) parts.push(node("rect", { x, y: 3, width: 80 * error / wide, height: 4, fill }));
+  });
+  const marks = [label(0, 96, "start", number(low) + " m"), label(640, 96, "end", number(low + 16 * wide) + " m")];
+  const about = { viewBox: "0 0 640 100", role: "img", "aria-label": "Histogram of the distance walked" };
+  return [node("svg", about, ...parts, ...marks)];
 }
 
-// A sweep: a point for each cell
+// A block of a sweep: a point for each cell, along the axis with the most values
 
 function sweepFigure({ name, axes, units, cells }) {
-  const along = axes.map((_, i) => new Set(cells.map(cell => cell.at[i])).size).reduce((best, size, i, all) => (size > all[best] ? i : best), 0);
-  const found = cells.filter(cell => cell.mean !== null), xOf = cell => Number(cell.at[along]) || 0, lines = new Map();
-  const left = Math.min(...found.map(xOf)), right = Math.max(...found.map(xOf)), top = Math.max(...found.map(cell => cell.mean));
+  const sizes = axes.map((_, i) => new Set(cells.map(cell => cell.at[i])).size), lines = new Map();
+  const along = sizes.indexOf(Math.max(...sizes)), xOf = cell => Number(cell.at[along]) || 0;
+  const [left, right] = [Math.min, Math.max].map(end => end(...cells.map(xOf)));
+  const top = Math.max(...cells.map(cell => cell.mean));
   const place = cell => [50 + 560 * (xOf(cell) - left) / (right - left || 1), 280 - 250 * cell.mean / (top || 1)];
-  const said = (cell, some) => axes.map((axis, i) => `${axis} = ${cell.at[i]} ${units[i]}`).filter((_, i) => some(i)).join(", ");
-  for (const cell of found) {
-    const key = said(cell, i => i !== along);
+  const said = cell => axes.map((axis, i) => `${axis} = ${cell.at[i]} ${units[i]}`.trim());
+  for (const cell of cells) {
+    const key = said(cell).filter((_, i) => i !== along).join(", ");
     lines.set(key, [...(lines.get(key) ?? []), cell]);
   }
+  const point = cell => {
+    const text = `${said(cell).join(", ")}: Δx = ${number(cell.mean)} ± ${number(cell.error, 2)} m`;
+    const [cx, cy] = place(cell), named = { tabindex: 0, role: "button", "aria-label": text };
+    const title = node("title", {}, text + "; each click walks the next sample");
+    const circle = node("circle", { cx, cy, r: 6, fill: "var(--blue)", ...named }, title);
+    let next = 0;
+    circle.onclick = () => { setup = { index: cell.walks[next++ % cell.walks.length] }; start(); };
+    circle.onkeydown = event => { if (event.key === "Enter") circle.onclick(); };
+    return circle;
+  };
   const parts = [...lines].flatMap(([key, list]) => [
     node("polyline", { points: list.map(place).join(" "), fill: "none", stroke: "var(--faint)" }),
-    node("text", { x: place(list.at(-1))[0], y: place(list.at(-1))[1] - 9, "text-anchor": "end" }, key),
-    ...list.map(cell => {
-      const label = `${said(cell, () => true)}: Δx = ${number(cell.mean)} ± ${number(cell.error, 2)} m`;
-      const [cx, cy] = place(cell), attributes = { cx, cy, r: 6, fill: "var(--blue)", tabindex: 0, role: "button" };
-      const point = node("circle", { ...attributes, "aria-label": label }, node("title", {}, label + "; each click walks the next sample"));
-      let next = 0;
-      point.onclick = () => { setup = { index: cell.walks[next++ % cell.walks.length] }; start(); };
-      point.onkeydown = event => { if (event.key === "Enter") point.onclick(); };
-      return point;
-    }),
+    label(place(list.at(-1))[0], place(list.at(-1))[1] - 9, "end", key),
+    ...list.map(point),
   ]);
-  const ends = [[left, 50, "start"], [right, 610, "end"]].map(([x, at, anchor]) => node("text", { x: at, y: 298, "text-anchor": anchor }, `${x} ${units[along] ?? ""}`));
-  const titles = [node("text", { x: 330, y: 314, "text-anchor": "middle" }, axes[along] ?? ""), node("text", { x: 50, y: 14 }, `mean Δx, up to ${number(top)} m`)];
-  return node("svg", { viewBox: "0 0 640 320", role: "group", "aria-label": `${name}: mean distance` }, ...parts, ...ends, ...titles);
+  const unit = units[along] ?? "", title = label(330, 314, "middle", axes[along] ?? "");
+  const marks = [label(50, 298, "start", `${left} ${unit}`), label(610, 298, "end", `${right} ${unit}`), title];
+  const about = { viewBox: "0 0 640 320", role: "group", "aria-label": `${name}: mean distance` };
+  return node("svg", about, ...parts, ...marks, label(50, 14, "start", `mean Δx, up to ${number(top)} m`));
 }
 
 // A page without a server: walks that it brings along
@@ -435,7 +446,8 @@ function buildChoices() {
     const options = list.map((value, i) => new Option(`${value} ${unitOf(name)}`, i));
     const select = make("select", { id: name, onchange: update }, ...options);
     select.value = given.get(name) in list ? given.get(name) : 0;
-    $("setup").append(make("div", { className: "control" }, make("label", { htmlFor: name, textContent: name }), select));
+    const label = make("label", { htmlFor: name, textContent: name });
+    $("setup").append(make("div", { className: "control" }, label, select));
   }
   update().catch(refuse);
 }
@@ -450,7 +462,7 @@ function buildLive() {
   };
   $("push-undo").onclick = () => { if (setup.push?.pop() && !setup.push.length) delete setup.push; start(); };
   window.onhashchange = () => { readAddress(); startA(); start(); };
-  $("sweep").append(...(about.sweep?.blocks ?? []).map(sweepFigure));
+  $("sweep").append(...(about.sweep ?? []).map(sweepFigure));
   useMouse($("stage"));
   buildControls();
   readAddress();

@@ -9,7 +9,8 @@ import numpy as np
 
 from warpchain.inputs.parameters import preset
 from warpchain.inputs.scene import Scene
-from warpchain.inputs.validation import FIELDS, SECTION_OF, field_unit, json_value
+from warpchain.inputs.validation import FIELDS, json_value
+from warpchain.pictures.labels import unit_text
 
 if TYPE_CHECKING:
     from warpchain.store.sweep_result import SweepResult
@@ -20,16 +21,16 @@ _EDGES: Final = [[[step / 5, -0.04 * (step - 1)], [step / 5, -0.04 * step]] for 
 STAIRS: Final = [[-1.0, 0.0], *([x, round(y, 2)] for edge in _EDGES for x, y in edge), [2.0, -0.32]]
 """A floor that falls in eight steps; beyond the last it goes on level."""
 MOST_CELLS: Final = 2000
-"""Most cells of a sweep on the page."""
+"""Most cells of a block of a sweep on the page."""
 _HERE: Final = Path(__file__).parent
 _PLAYER: Final = _HERE.parent / "pictures/player.js"
 
 
 def live_page(sweep: "SweepResult | None" = None, walks: dict[str, Any] | None = None, data: str = "") -> str:
-    """The page, with `{{nonce}}` for what permits its script; instead of a server it may have `walks` and their data."""
+    """The page, with `{{nonce}}` for what permits its script; without a server it has `walks`, the axes, and `data`."""
     defaults = {name: field.default for name, field in Scene.model_fields.items()} | vars(preset("paper"))
     fields = {
-        name: {"unit": field_unit(FIELDS[name]), "text": FIELDS[name].description, "default": default}
+        name: {"unit": unit_text(name), "text": FIELDS[name].description, "default": default}
         for name, default in defaults.items()
     }
     about = {"fields": fields, "first": FIRST, "stairs": STAIRS, "walks": walks}
@@ -42,22 +43,20 @@ def live_page(sweep: "SweepResult | None" = None, walks: dict[str, Any] | None =
     return re.sub(r"{{(\w+)}}", lambda found: parts.get(found[1], found[0]), template)
 
 
-def sweep_points(sweep: "SweepResult") -> dict[str, Any]:
-    """Mean Δx of each cell with its standard error, the values of the axes, and the numbers of its walks."""
-    blocks, left = [], MOST_CELLS
+def sweep_points(sweep: "SweepResult") -> list[dict[str, Any]]:
+    """Of each block the axes, and of each cell their values, mean Δx with its standard error, numbers of its walks."""
+    blocks = []
     for name, found in sweep.cell_statistics().items():
-        index = sweep.blocks[name].columns["index"]
-        places = [*np.ndindex(found.mean.shape)][:left]
-        left -= len(places)
         cells = [
             {
                 "at": [values[k] for values, k in zip(found.axes.values(), place, strict=True)],
                 "mean": found.mean[place],
                 "error": found.standard_error[place],
-                "walks": index[place].tolist()[:100],
+                "walks": sweep.blocks[name].columns["index"][place].tolist()[:100],
             }
-            for place in places
+            for place in list(zip(*np.nonzero(found.count), strict=True))[:MOST_CELLS]
         ]
-        units = [field_unit(FIELDS[axis]) if axis in SECTION_OF else "" for axis in found.axes]
-        blocks.append({"name": name, "axes": [*found.axes], "units": units, "cells": cells})
-    return {"name": sweep.name, "blocks": blocks}
+        if cells and found.axes:
+            units = [*map(unit_text, found.axes)]
+            blocks.append({"name": name, "axes": [*found.axes], "units": units, "cells": cells})
+    return blocks

@@ -48,7 +48,11 @@ _Count = Annotated[int, Field(ge=1, le=MOST_SAMPLES)]
 
 
 class LiveServer(ThreadingHTTPServer):
-    """Serves the page until it is closed; a `sweep` from a folder is shown on it."""
+    """A live page: its server, which ends by `close` or with its process, and how a notebook shows it.
+
+    Attributes:
+        url: address of the page, with the token that it asks for; only this machine reaches it.
+    """
 
     daemon_threads, block_on_close, request_queue_size = True, False, MOST_CONNECTIONS
 
@@ -61,12 +65,15 @@ class LiveServer(ThreadingHTTPServer):
         )
         self._sweep, self._folder, self._connections = sweep, folder, threading.Semaphore(MOST_CONNECTIONS)
         super().__init__((ADDRESS, port), _Handler)
-        self.page = live_page(sweep)
+        self.page, self.url = live_page(sweep), f"http://{ADDRESS}:{self.server_port}/?token={self.token}"
 
-    @property
-    def url(self) -> str:
-        """Address of the page, with the token."""
-        return f"http://{ADDRESS}:{self.server_port}/?token={self.token}"
+    def __repr__(self) -> str:
+        """The address."""
+        return f"<live page at {self.url}>"
+
+    def _repr_html_(self) -> str:
+        """The page in a frame."""
+        return f'<iframe title="live page" style="width:100%;height:820px;border:0" src="{self.url}"></iframe>'
 
     @cached_property
     def walker(self) -> "Walker":
@@ -155,7 +162,7 @@ class _Handler(BaseHTTPRequestHandler):
         """Whether the request is meant for this server and brings its token; else it is refused."""
         hosts = [f"{name}:{self.server.server_port}" for name in (ADDRESS, "localhost")]
         origins = self.headers.get_all("Origin", [])
-        if self.headers.get_all("Host") not in ([host] for host in hosts):
+        if self.headers.get_all("Host", []) not in [[host] for host in hosts]:
             self._reply(403, "This is another host.\n")
         elif any(origin not in [f"http://{host}" for host in hosts] for origin in origins):
             self._reply(403, "The page of another site asks.\n")
@@ -204,3 +211,24 @@ class _Handler(BaseHTTPRequestHandler):
         with suppress(OSError):
             return self.server.closing.is_set() or bool(readable and not self.connection.recv(1, 2))  # 2: MSG_PEEK
         return True
+
+
+def live(folder: str | Path | None = None, *, port: int = 0) -> LiveServer:
+    """Show a live page, on which sliders change a walk, in a notebook whose kernel runs on this machine.
+
+    Args:
+        folder: folder of a sweep, or a merged file, whose cells can be clicked to see their walks; None: no sweep.
+        port: port of the server on 127.0.0.1; 0: any that is free.
+
+    Returns:
+        The page: a notebook shows it, `url` is its address, `close` ends its server.
+
+    Raises:
+        InputError: the folder holds no sweep.
+        OSError: the port is taken.
+    """
+    from warpchain.store.sweep_result import load
+
+    server = LiveServer(port, None if folder is None else load(folder), Path(folder or "."))
+    server.start()
+    return server

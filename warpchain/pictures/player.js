@@ -1,14 +1,16 @@
 "use strict";
-// Of a `walk`: time of each frame in µs; joints, center, radii of the links, sprocket at the release (x, y, radius), its places in the
-// frames that it is in, and view (left, right, bottom, top) in tenths of a millimetre; marks on the floor in m, and its heights there;
-// floor, its profile; stretches of it with coefficients of their own (colour, label, faces); slow, playing time per simulated time at
-// the start; colors.
+// Of a `walk`: time of each frame in µs; joints, center, radii of the links, sprocket at the release (x, y, radius), its
+// places in the frames that it is in, and view (left, right, bottom, top) in tenths of a millimetre; marks on the floor
+// in m, and its heights there; floor, its profile; stretches of it with coefficients of their own (colour, label, faces);
+// colors; isWhole, false while more frames are to come.
 const colorOf = name => getComputedStyle(document.documentElement).getPropertyValue("--" + name);
 
-// Draws a walk on a canvas and plays it. `controls` are elements: play, slider, clock, speed; without them another player leads.
+// Draws a walk on a canvas and plays it. `controls` are elements: play, slider, clock, speed; without them another
+// player leads.
 class Player {
   constructor(canvas, controls = {}) {
-    Object.assign(this, controls, { canvas, pen: canvas.getContext("2d"), walk: null, frame: 0, moment: 0, playing: false });
+    Object.assign(this, controls, { canvas, pen: canvas.getContext("2d"), walk: null });
+    Object.assign(this, { frame: 0, moment: 0, playing: false });
     this.below = this.above = () => {}; // draw more, in the units of the walk, before and after the chain
     this.shown = () => {}; // is told of each moment that is shown
     if (this.play) {
@@ -16,7 +18,8 @@ class Player {
       this.slider.oninput = () => { this.toggle(false); this.show(Number(this.slider.value)); };
       for (const slow of [1, 2, 4, 8, 16, 32, 64]) this.offer(slow);
     }
-    new ResizeObserver(() => this.draw()).observe(canvas.parentElement); // a frame may get its size after the first drawing
+    // a frame may get its size after the first drawing
+    new ResizeObserver(() => this.draw()).observe(canvas.parentElement);
     window.addEventListener("resize", () => this.draw());
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
   }
@@ -60,7 +63,8 @@ class Player {
     const [left, right, bottom, top] = this.walk.view, width = this.canvas.clientWidth;
     const scale = Math.min(width / (right - left), 0.75 * window.innerHeight / (top - bottom));
     const height = scale * Math.max(top - bottom, top + 28 / scale); // below the floor there is room for its marks
-    return { left, right, bottom: top - height / scale, top, scale, height, shift: (width - scale * (right - left)) / 2 };
+    const shift = (width - scale * (right - left)) / 2;
+    return { left, right, bottom: top - height / scale, top, scale, height, shift };
   }
 
   // Where a pointer is, in tenths of a millimetre.
@@ -188,7 +192,8 @@ class Player {
 
   // Arrow keys step, the space bar plays; where these keys have a meaning of their own, they keep it.
   onKey(event) {
-    const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key], own = event.target.closest("input, select, button, textarea, summary, a");
+    const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+    const own = event.target.closest("input, select, button, textarea, summary, a, [role=button]");
     if (!this.walk || (own && own !== this.slider) || !(step || event.key === " ")) return;
     this.toggle(step ? false : !this.playing);
     if (step) this.show(this.frame + step);
