@@ -12,7 +12,8 @@ from tests.support.setups import setup_walk
 from warpchain import Status
 from warpchain.inputs.link_values import alternating
 from warpchain.inputs.scene import link_values, riding_radius
-from warpchain.pictures.chain import circle_radii, link_outlines
+from warpchain.pictures.chain import link_outlines
+from warpchain.pictures.places import circle_radii
 
 BRIEF = {"preset": "soft", "method": "explicit", "links": 36, "frequency": 15.0}
 """A short chain, which walks for a second of one core."""

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
 from pydantic import Field, Strict
@@ -24,11 +24,13 @@ from warpchain.inputs.scene import link_values
 from warpchain.inputs.setup import DEFAULT_PRESET, SECTIONS, Setup, resolve
 from warpchain.inputs.validation import InputError, by_section, checked, json_value, shown
 from warpchain.live_page.messages import Film, recipes, summary
-from warpchain.pictures.animation import player_data
+from warpchain.pictures.player import player_data
 from warpchain.run.single_walk import walk as run_walk
-from warpchain.store.sweep_result import SweepResult
 from warpchain.walks.walk_phases import Progress
 from warpchain.walks.walk_result import WalkResult
+
+if TYPE_CHECKING:
+    from warpchain.store.sweep_result import SweepResult
 
 MOST_LINKS: Final = 400
 """Most links of a chain on the page; longer ones need kernels of their own, and minutes."""
@@ -57,7 +59,7 @@ class GoneError(Exception):
 class Walker:
     """Runs the walks of a page, of several threads at once; an `index` names a walk of the `sweep` in the `folder`."""
 
-    sweep: SweepResult | None = None
+    sweep: "SweepResult | None" = None
     folder: Path = Path()
     _kept: dict[str, WalkResult] = field(default_factory=dict)
     _lock: threading.Lock = field(default_factory=threading.Lock)

@@ -15,7 +15,7 @@ from warpchain.files import Kind, checked_output, make_folder, write_whole
 from warpchain.live_page.asked_walks import Walker
 from warpchain.live_page.messages import recipes, summary
 from warpchain.live_page.page import FIRST, STAIRS, live_page
-from warpchain.pictures.animation import player_data
+from warpchain.pictures.player import player_data
 
 AXES: Final[dict[str, list[Any]]] = {
     "links": [40, 60, 80, 120],

@@ -15,8 +15,8 @@ from warpchain.inputs.arrays import Array
 from warpchain.inputs.scene import contact_radius, link_values
 from warpchain.inputs.setup import DEFAULT_PRESET, Setup
 from warpchain.inputs.validation import by_section, json_value
-from warpchain.pictures.animation import player_data
 from warpchain.pictures.labels import Walk, headline
+from warpchain.pictures.player import player_data
 from warpchain.walks.walk_phases import Progress
 from warpchain.walks.walk_result import WalkResult
 

@@ -3,13 +3,10 @@
 A film shows a walk to one scale, from the side, or from a corner if its plane tilts.
 """
 
-import html
 import importlib
 import itertools
-import json
 import math
 import os
-import re
 import subprocess
 from pathlib import Path
 from typing import Annotated, Any, Final, cast
@@ -17,7 +14,6 @@ from typing import Annotated, Any, Final, cast
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 from pydantic import Field
 from scipy.spatial.transform import Rotation
@@ -26,9 +22,10 @@ from warpchain.files import checked_output, replacing, write_whole
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.validation import InputError, checked, short
 from warpchain.pictures import chain
-from warpchain.pictures.chain import center_in_room, checked_joints
 from warpchain.pictures.labels import Walk, headline
-from warpchain.pictures.style import BLUE, GROUND, INK, tidy
+from warpchain.pictures.places import center_in_room, checked_joints, circle_radii, sprocket_circle, walk_box
+from warpchain.pictures.player import EDGE, INNER, OUTER, floor_marks, player, side_box
+from warpchain.pictures.style import GROUND, INK, tidy
 
 WIDTH, TALLEST = 960, 560
 """Greatest width and height of a picture [pixels]."""
@@ -36,18 +33,11 @@ DPI: Final = 100
 MOST: Final = {".gif": 1200, ".mp4": 100_000}
 """Most pictures: those of a GIF are in memory at once, up to 0.5 MB each; so many of an MP4 take an hour."""
 
-INNER, OUTER, EDGE = "#9CCBE6", BLUE, "#00385A"
-"""Colours of inner links, of outer links and of their edges."""
-
 _CORNER: Final = (-35.0, 22.0)
 """View from the front right, slightly above: angles about the vertical, then about what points to the right."""
 _PADDING: Final = np.array([[50, 50], [50, 30]])
 """Pixels to the left and below, and to the right and above."""
 
-_PAGE: Final = Path(__file__).with_name("player.html")
-"""The page with a player."""
-PLAYER: Final = Path(__file__).with_name("player.js")
-"""The player, which says what its data are; other pages have it as well."""
 _HOLD: Final = 1.5
 """Time for which GIF and MP4 show their last picture [s]."""
 
@@ -137,98 +127,23 @@ def _write_mp4(walk: Walk, path: Path, fps: float, slow: float) -> None:
             raise OSError("ffmpeg ended early") from error
 
 
-def framed_player(walk: Walk, most: int = 2000) -> str:
-    """An HTML element, a frame with the page of `player`, as high as it needs on a page of some 1000 pixels.
-
-    A `ValueError` is raised as by `player`.
-    """
-    content = html.escape(player(walk, most=most))
-    wide, high = np.ptp(walk.frame_joints[..., 0]), walk.frame_joints[..., 1].max()
-    height = round(min(600.0, 170.0 + 960.0 * high / wide))  # of the drawing at full width, and of its controls
-    # No sandbox: browsers run sandboxed frames in another process, where the player may draw before it has a size.
-    style = f'style="width:100%;height:{height}px;border:1px solid #ccc" loading="lazy"'
-    return f'<iframe title="the walk in motion" {style} srcdoc="{content}"></iframe>'
-
-
-def player(walk: Walk, slow: float = 4.0, most: int = 2000) -> str:
-    """A page with a player of the frames from the side, which starts `slow` times slower than the walk.
-
-    A `ValueError` says that the walk has no frames or broken ones.
-    """
-    title = html.escape(headline(walk) + ", from the side" * (walk.joints_in_room is not None))
-    content = json.dumps(player_data(walk, most) | {"slow": slow}, separators=(",", ":"), allow_nan=False)
-    parts = {"title": title, "player": PLAYER.read_text(encoding="utf-8"), "data": content}
-    return re.sub(r"{{(\w+)}}", lambda found: parts[found[1]], _PAGE.read_text(encoding="utf-8"))
-
-
-def player_data(walk: Walk, most: int = 2000) -> dict[str, Any]:
-    """What a player needs: lengths in tenths of a millimetre, times in microseconds; with so many frames at most.
-
-    With 60 links 2000 frames make a page of about 1 MB. A `ValueError` is raised as by `player`.
-    """
-    joints, sprocket = checked_joints(walk), walk.sprocket_center
-    count = min(len(walk.frame_time), most)
-    frames = np.rint(np.linspace(0, len(walk.frame_time) - 1, count)).astype(int)
-    times, box = walk.frame_time[frames], side_box(walk, joints)
-    marks = floor_marks(*box[0])
-    center = np.stack([np.interp(times, walk.time, walk.center[:, axis]) for axis in (0, 1)], axis=1)
-    places, ends = chain.sprocket_centers(walk, times), box[0] + np.array([-3, 3]) * np.ptp(box[0])
-    return {
-        "time": _whole(times, 1e6),
-        "joints": _whole(joints[frames, :, :2].reshape(count, -1)),
-        "center": _whole(center),
-        "radii": _whole(chain.circle_radii(walk)),
-        "sprocket": None if sprocket is None else _whole(np.array([*sprocket, walk.sprocket_radius])),
-        "places": _whole(places[~np.isnan(places[:, 0])]),
-        "view": _whole(box.ravel()),
-        "marks": marks,
-        "heights": _whole(np.array(walk.setup.floor.heights(np.array(marks)))),
-        "floor": _whole(walk.setup.floor.line(*ends)),
-        "stretches": [[color, label, _whole(faces)] for color, label, faces in chain.stretches(walk, *ends)],
-        "colors": {"inner": INNER, "outer": OUTER, "edge": EDGE},
-    }
-
-
-def _whole(values: NDArray[np.float64], parts: float = 1e4) -> list[int] | list[list[int]]:
-    """Numbers in whole parts, as lists: lengths [m] in tenths of a millimetre."""
-    whole: list[int] | list[list[int]] = np.rint(values * parts).astype(int).tolist()
-    return whole
-
-
-def floor_marks(low: float, high: float, most: int = 9) -> list[float]:
-    """Round numbers [m] along the floor between two ends."""
-    marks = MaxNLocator(most, steps=[1, 2, 5, 10]).tick_values(low, high)
-    return [round(float(mark), 6) for mark in marks if low <= mark <= high]
-
-
-def side_box(walk: Walk, joints: Array) -> Array:
-    """Left and right, bottom and top of what is shown from the side [m], shape (2, 2), with some of the floor.
-
-    It is at least as broad as high, so that titles and marks have room.
-    """
-    low, high = chain.walk_box(walk, joints)
-    broad = max(0.0, (high[1] - low[1]) - (high[0] - low[0])) / 2
-    low[0], high[0] = low[0] - broad, high[0] + broad
-    return np.array([[low[0], low[1] - 0.045 * max(high[:2] - low[:2])], high[:2]]).T
-
-
 class Film:
     """Draws frames of a walk, dashed where the sprocket was at the release; even pixels wide and high, for video."""
 
     def __init__(self, walk: Walk) -> None:
         """Fit the walk and the floor below it into the picture; a `ValueError` if frames are none or broken."""
         self._walk, self._joints, self._center = walk, checked_joints(walk), center_in_room(walk)
-        self._radii = chain.circle_radii(walk)
+        self._radii = circle_radii(walk)
         self._tilts = walk.joints_in_room is not None
         self._view = Rotation.from_euler("yx", _CORNER, degrees=True).as_matrix() if self._tilts else chain.SIDE
-        low, high = chain.walk_box(walk, self._joints)
+        low, high = walk_box(walk, self._joints)
         if not self._tilts:
             box = side_box(walk, self._joints)
         else:  # the floor at least as broad as the chain is high
             broad = max(0.0, high[1] - (high[2] - low[2])) / 2
             low[2], high[2] = low[2] - broad, high[2] + broad
             corners = np.array([[x, 0.0, z] for z in (low[2], high[2]) for x in (low[0], high[0])])
-            circle = chain.sprocket_circle(walk)
+            circle = sprocket_circle(walk)
             shown = [corners, self._joints.reshape(-1, 3), *([] if circle is None else [circle])]
             seen = np.concatenate(shown) @ self._view[:2].T
             box = np.array([seen.min(axis=0), seen.max(axis=0)]).T

@@ -160,7 +160,7 @@ def _walk(result: SweepResult, index: int, device: str | None) -> str:
 
 def _player(walk: WalkResult) -> str:
     """A frame with the page of the moving picture, or the reason why there is none."""
-    from warpchain.pictures.animation import framed_player
+    from warpchain.pictures.player import framed_player
 
     try:
         return framed_player(walk)

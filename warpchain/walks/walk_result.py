@@ -305,7 +305,7 @@ class WalkResult:
 
         What shows no frames, such as a notebook that is not trusted, shows the picture.
         """
-        from warpchain.pictures.animation import framed_player
+        from warpchain.pictures.player import framed_player
         from warpchain.pictures.style import fragment
 
         shown = fragment("\n".join([repr(self), *self.warnings()]), self._repr_png_())
