@@ -87,7 +87,7 @@ def test_the_whole_page_without_a_server(tmp_path: Path) -> None:
 def test_a_cell_of_a_sweep_walks(tmp_path: Path, browser: Page) -> None:  # noqa: F811
     """Each cell is a point with its mean; a click, or Enter, walks its samples one after the other, to the bit."""
     result = warpchain.sweep(SWEEP, tmp_path / "small")
-    server = LiveServer(0, result, tmp_path / "small")
+    server = LiveServer(0, tmp_path / "small")
     server.start()
     try:
         browser.size(1280)

@@ -34,16 +34,18 @@ def live(
             raise InputError("--export: given together with a folder or an address; leave one out")
         print(printable(str(export_page(export))))
         return
-    from warpchain.live_page.server import live as serve
+    from warpchain.live_page.server import LiveServer
 
     address, mark, fragment = (what or "").partition("#")
-    server = serve(address if address and "://" not in address else None, port=port)
+    folder = Path(address) if address and "://" not in address else None
+    server = LiveServer(port, folder)
     url = server.url + mark + fragment
     print(f"{printable(url)}\nCtrl-C ends it", flush=True)
     if browser:
         import webbrowser
 
         webbrowser.open(url)
+    server.start()  # what it imports now takes a second, in which the browser opens
     try:
         while True:
             time.sleep(3600)

@@ -25,7 +25,6 @@ from warpchain.live_page.page import FIRST, live_page
 
 if TYPE_CHECKING:
     from warpchain.live_page.asked_walks import IsGone, Send, Walker
-    from warpchain.store.sweep_result import SweepResult
 
 ADDRESS: Final = "127.0.0.1"
 MOST_BYTES: Final = 65_536
@@ -56,14 +55,16 @@ class LiveServer(ThreadingHTTPServer):
 
     daemon_threads, block_on_close, request_queue_size = True, False, MOST_CONNECTIONS
 
-    def __init__(self, port: int = 0, sweep: "SweepResult | None" = None, folder: Path = Path()) -> None:
-        """Listen at a port, or at any that is free; an `OSError` if it is taken."""
-        self.token, self.closing, self.slots = (
-            secrets.token_urlsafe(24),
-            threading.Event(),
-            threading.Semaphore(WALKS_AT_ONCE),
-        )
-        self._sweep, self._folder, self._connections = sweep, folder, threading.Semaphore(MOST_CONNECTIONS)
+    def __init__(self, port: int = 0, folder: Path | None = None) -> None:
+        """Listen at a port, or at any that is free, and read the sweep of a folder; errors as of `live`."""
+        sweep = None
+        if folder is not None:
+            from warpchain.store.sweep_result import load
+
+            sweep = load(folder)
+        self.token, self.closing = secrets.token_urlsafe(24), threading.Event()
+        self.slots, self._connections = threading.Semaphore(WALKS_AT_ONCE), threading.Semaphore(MOST_CONNECTIONS)
+        self._sweep, self._folder = sweep, folder or Path()
         super().__init__((ADDRESS, port), _Handler)
         self.page, self.url = live_page(sweep), f"http://{ADDRESS}:{self.server_port}/?token={self.token}"
 
@@ -83,13 +84,14 @@ class LiveServer(ThreadingHTTPServer):
         return Walker(self._sweep, self._folder)
 
     def start(self) -> None:
-        """Serve in threads of their own, and run the first walk, so that it is there when the page asks for it."""
+        """Serve in threads of their own, and load what the first walk needs."""
         threading.Thread(target=self.serve_forever, args=(0.1,), daemon=True).start()
         threading.Thread(target=self._warm_up, daemon=True).start()
 
     def _warm_up(self) -> None:
-        with suppress(Exception):  # the page will ask for it again, and is told
-            self.walker.play(FIRST, lambda message: None, self.closing.is_set)
+        first = iter([False])  # the walk is given up once its kernels are there
+        with suppress(Exception):  # the page asks for it again, and is told
+            self.walker.play(FIRST, lambda message: None, lambda: next(first, True))
 
     def close(self) -> None:
         """End walks and connections, and serve no more."""
@@ -227,8 +229,6 @@ def live(folder: str | Path | None = None, *, port: int = 0) -> LiveServer:
         InputError: the folder holds no sweep.
         OSError: the port is taken.
     """
-    from warpchain.store.sweep_result import load
-
-    server = LiveServer(port, None if folder is None else load(folder), Path(folder or "."))
+    server = LiveServer(port, None if folder is None else Path(folder))
     server.start()
     return server
