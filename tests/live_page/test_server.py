@@ -164,7 +164,7 @@ def test_what_is_no_request(content: bytes, status: int, server: LiveServer) -> 
         ({"preset": {}}, "preset: "),
         ({"seed": -1}, "seed: "),
         ({"slope": 10, "floor": [[0, 0], [1, 0]]}, "scene.slope: 10.0 of a floor that is a profile"),
-        ({"index": 3}, "index: 3 of no sweep"),
+        ({"index": 3, "preset": None}, "index: 3 of no sweep"),
         ({"push": []}, "push: "),
         ({"push": [[0.1, 0, 0.1]]}, "push[0]"),
         ({"push": [[0.1, 99, 0.1, 0]]}, "push: link 99 is not in the chain; give 0 to 39"),

@@ -113,6 +113,11 @@ def test_a_cell_of_a_sweep_walks(tmp_path: Path, browser: Page) -> None:  # noqa
         assert names["walk"].setup.parameters.floor_friction == 0.5 and names["walk"].setup.scene.frequency == 8
         assert names["walk"].setup.scene.phase == result.phase_drawn[0, 1, 1]
         assert distance(browser.do("$('said').textContent")) == rounded(names["walk"].dx)
+        for beside in ({"seed": 1}, {"preset": "soft"}, {"links": 31}):
+            with pytest.raises(warpchain.InputError, match=r"^(index|scene\.links): "):
+                server.walker.setup({"index": 1, **beside})
+        with pytest.raises(warpchain.InputError, match=r"^index: the sweep has no walk 99"):
+            server.walker.setup({"index": 99})
     finally:
         server.close()
 

@@ -41,15 +41,14 @@ def live(
     server = LiveServer(port, folder)
     url = server.url + mark + fragment
     print(f"{printable(url)}\nCtrl-C ends it", flush=True)
-    if browser:
-        import webbrowser
-
-        webbrowser.open(url)
-    server.start()  # what it imports now takes a second, in which the browser opens
     try:
+        if browser:
+            import webbrowser
+
+            webbrowser.open(url)
+        server.start()  # what it imports now takes a second, in which the browser opens
         while True:
             time.sleep(3600)
     except KeyboardInterrupt:
-        server.closing.set()
         print("interrupted", file=sys.stderr, flush=True)
         os._exit(INTERRUPTED)  # kernels may be being compiled, which nothing else ends

@@ -75,15 +75,18 @@ class Walker:
         if others := sorted(sections["options"].keys() - {"method", "tolerance"}):
             raise InputError(f"options.{others[0]}: not possible on a live page; leave it out, or use `warpchain walk`")
         if index is None:
-            return resolve(DEFAULT_PRESET if preset is None else preset, **sections, seed=seed), seed  # type: ignore[arg-type]
+            chosen = DEFAULT_PRESET if preset is None else preset
+            return resolve(chosen, **sections, seed=seed, loads=False), seed
         if self.sweep is None:
             raise InputError(f"index: {shown(index)} of no sweep; start `warpchain live FOLDER`")
+        if seed is not None or preset is not None:
+            raise InputError("index: names a walk with its own preset and seed; leave preset and seed out")
         block, place = self.sweep.located(index)
         setup, replaced = block.setup_at(place), replaced_by(sections["options"])
         if not settings:
             return setup, block.origin.seed
         own = {name: getattr(setup, name).model_dump(exclude=replaced) | sections[name] for name in SECTIONS}
-        return resolve(setup.preset, **own), None
+        return resolve(setup.preset, **own, seed=None, loads=False), None
 
     def walk(self, asked: Asked, watch: Callable[[Progress], None], record: Mapping[str, Any]) -> WalkResult:
         """The walk of a set-up, pushes included."""

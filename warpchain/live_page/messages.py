@@ -13,9 +13,9 @@ import yaml
 
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.scene import contact_radius, link_values
-from warpchain.inputs.setup import DEFAULT_PRESET, Setup
+from warpchain.inputs.setup import DEFAULT_PRESET, SECTIONS, Setup
 from warpchain.inputs.validation import by_section, json_value
-from warpchain.pictures.labels import Walk, headline
+from warpchain.pictures.labels import Walk
 from warpchain.pictures.player import player_data
 from warpchain.walks.walk_phases import Progress
 from warpchain.walks.walk_result import WalkResult
@@ -44,34 +44,32 @@ class Film:
         times, joints = np.concatenate(self._times), np.concatenate(self._joints)
         links = (joints + np.roll(joints, 1, axis=1)) / 2
         center = (links * self._masses).sum(axis=1) / self._masses.sum()
-        height = progress.sprocket_height
+        height, setup = progress.sprocket_height, self._setup
+        is_bare = math.isnan(height)
         walk = SimpleNamespace(
-            setup=self._setup,
+            setup=setup,
             time=times,
             center=center,
             frame_time=times,
             frame_joints=joints,
             joints_in_room=None,
-            sprocket_center=None if math.isnan(height) else np.array([0.0, height]),
-            sprocket_radius=math.nan
-            if math.isnan(height)
-            else contact_radius(self._setup.scene, self._setup.parameters),
+            sprocket_center=None if is_bare else np.array([0.0, height]),
+            sprocket_radius=math.nan if is_bare else contact_radius(setup.scene, setup.parameters),
         )
         data = player_data(cast(Walk, walk), len(times))
         if is_first:
             return {"first": data}
         moving = {name: data[name][had:] for name in ("time", "joints", "center")}
-        return {
-            "more": moving | {name: data[name] for name in ("view", "marks", "heights", "floor", "places", "stretches")}
-        }
+        around = {name: data[name] for name in ("view", "marks", "heights", "floor", "places", "stretches")}
+        return {"more": moving | around}
 
 
 def summary(walk: WalkResult) -> dict[str, Any]:
     """The results that a page shows, and the values of its controls."""
-    names = ("dx", "walk_time", "bounces", "energy", "energy_error", "wall_time", "lateral_drift", "fell_over")
+    names = ("dx", "walk_time", "bounces", "energy", "wall_time", "fell_over")
     said = {name: getattr(walk, name) for name in names} | {"status": walk.status.label, "warnings": walk.warnings()}
     values = walk.setup.parameters.model_dump() | walk.setup.scene.model_dump() | {"preset": walk.setup.preset}
-    told = {"title": headline(walk), "sentence": walk.status.sentence, "values": values, "seed": walk.seed}
+    told = {"sentence": walk.status.sentence, "values": values, "seed": walk.seed}
     return cast(dict[str, Any], json_value(said | told))
 
 
@@ -90,15 +88,13 @@ def recipes(asked: Mapping[str, Any], walk: WalkResult, folder: Path, kicks: Seq
     file = yaml.safe_dump({"preset": preset or DEFAULT_PRESET} | sections, sort_keys=False, default_flow_style=None)
     note = "# warpchain walk --config FILE.yaml" + f" --seed {seed}" * (seed is not None)
     if index is not None and fields:  # the fields of the sweep's walk, one by one
-        setup = walk.setup
-        fields = {**setup.parameters.model_dump(), **setup.scene.model_dump(), **setup.options.model_dump()}
-        preset = setup.preset
-    given = {"preset": preset, "seed": seed}
-    keywords = {name: value for name, value in given.items() if value is not None} | fields
+        preset, dumps = walk.setup.preset, [vars(walk.setup)[name].model_dump() for name in SECTIONS]
+        fields = {name: value for dump in dumps for name, value in dump.items()}
+    keywords = {name: value for name, value in {"preset": preset, "seed": seed}.items() if value is not None} | fields
     made = f"walk({', '.join(f'{name}={value!r}' for name, value in keywords.items())})"
-    lines = ["import warpchain\n", f"walk = warpchain.{made}" if index is None or fields else ""]
     if index is not None and not fields:
-        lines[1] = f"walk = warpchain.load({str(folder)!r}).walk({index})"
+        made = f"load({str(folder)!r}).walk({index})"
+    lines = ["import warpchain\n", f"walk = warpchain.{made}"]
     for (moment, link, *impulse), kick in zip(asked.get("push", []), kicks, strict=True):
         lines += [
             f"state = walk.state({moment!r})",
@@ -106,8 +102,6 @@ def recipes(asked: Mapping[str, Any], walk: WalkResult, folder: Path, kicks: Seq
             f"velocity[{link}, :2] += {kick.tolist()}  # m/s, by an impulse of {impulse} N s",
             "walk = warpchain.walk(start=replace(state, velocity=velocity))",
         ]
-    if kicks:
-        lines.insert(0, "from dataclasses import replace\n")
-    is_walk, is_file = not kicks, not kicks and index is None
-    python = "\n".join(lines)
-    return {"python": python, "command": shlex.join(words) * is_walk, "yaml": f"{note}\n{file}" * is_file}
+    python = "\n".join([*["from dataclasses import replace\n"] * bool(kicks), *lines])
+    command, is_whole = shlex.join(words) if not kicks else "", not kicks and index is None
+    return {"python": python, "command": command, "yaml": f"{note}\n{file}" if is_whole else ""}
