@@ -171,12 +171,17 @@ def with_tables(text: str, tables: Mapping[str, str]) -> str:
     return text
 
 
+def show(tables: Mapping[str, str]) -> None:
+    """Print tables by their names; those that stand on no page are shown only."""
+    for name, text in tables.items():
+        print(f"\n{name}\n{text}")
+
+
 def publish(
     folder: Path, tables: Mapping[str, str], figures: Mapping[str, Figure] | None = None, dpi: int = 200
 ) -> None:
     """Put tables between the markers of a study's page, and print them; write its figures, figures/NAME.png."""
-    for name, table in tables.items():
-        print(f"\n{name}\n{table}")
+    show(tables)
     page = folder / "README.md"
     if tables:
         page.write_text(with_tables(page.read_text(encoding="utf-8"), tables), encoding="utf-8")

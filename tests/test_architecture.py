@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-import warpchain
+import warpchain.kernels
 
 ROOT = Path(__file__).parents[1]
-HOST = sorted(path for path in (ROOT / "warpchain").rglob("*.py") if "kernels" not in path.relative_to(ROOT).parts)
+HOST = sorted((ROOT / "warpchain").rglob("*.py"))
 KERNELS = sorted((ROOT / "kernels").rglob("*.py"))
 STUDIES = sorted((ROOT / "studies").rglob("*.py"))
 LONGEST_FILE = 450
@@ -109,12 +109,20 @@ def tracked() -> list[str]:
 def test_every_module_has_a_wing() -> None:
     """The package finds its kernels at the top level; each module stands on a storey, and its package is installed."""
     assert len(HOST) > 50 and len(KERNELS) > 30
-    assert (ROOT / "warpchain/kernels").resolve() == ROOT / "kernels"
+    assert (
+        Path(warpchain.kernels.__file__) == ROOT / "kernels/__init__.py" and not (ROOT / "warpchain/kernels").exists()
+    )
     known = {wing for storey in STOREYS for wing in storey} | {"", "__main__", "kernels/"}
     assert {wing_of(name) for name in MODULES} <= known
     text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     listed = set(re.findall(r'^    "(warpchain[\w.]*)",$', text, flags=re.MULTILINE))
-    assert listed == {name for name, path in MODULES.items() if path.name == "__init__.py"}
+    packages = {name for name, path in MODULES.items() if path.name == "__init__.py"}
+    assert listed == packages | {"warpchain.shipped_sweeps"}
+
+
+def test_there_are_no_symbolic_links() -> None:
+    """A ZIP of the repository, and a checkout on a system without symbolic links, has every file."""
+    assert not [name for name in tracked() if (ROOT / name).is_symlink()]
 
 
 def test_imports_go_downwards() -> None:

@@ -35,6 +35,7 @@ What they return, take and raise:
 The version is `__version__`.
 """
 
+from pathlib import Path as _Path
 from typing import TYPE_CHECKING, Any
 
 from warpchain import version as _version
@@ -58,6 +59,11 @@ if TYPE_CHECKING:
     from warpchain.walks.walk_result import load_walk as load_walk
 
 __version__ = _version.VERSION
+
+_HOME = _Path(__file__).parent
+if not (_HOME / "kernels").is_dir():
+    # In a checkout the kernels are beside the package instead of in it, where an installation has them.
+    __path__.append(str(_HOME.parent))
 
 _NAMES = {
     "films": "films",

@@ -1,33 +1,57 @@
-"""Draws the figure of README.md, whose three loops walk anew, and writes its tables, from the folder of the sweep."""
+"""Writes the tables of README.md; from a folder of the sweep, if one is given, results/charm.csv and the figure.
 
+The three loops of the figure walk anew.
+"""
+
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
+import typer
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import warpchain
 from studies import common
-from studies.common import DISTANCE, LINE_COLORS, RED, Array, Block
+from studies.common import DISTANCE, LINE_COLORS, RED, Array, Block, Columns
 
 FOLDER = Path(__file__).parent
+RESULTS = "results/charm.csv"  # In the folder of the page
+AXES = ("links", "frequency", "charm_mass")
+ON_SPROCKET = 15.0  # Frequency of the sprocket in its block of the sweep [Hz]
 TIMES = (0.0, 0.04, 0.08, 0.16, 0.32)  # Moments of the loops [s] since the release
 DRAWN = (0.0, 0.02, 0.1)  # Masses of their charms [kg]
 
 
-def distances(block: Block) -> str:
-    """Δx with its errors, duration, bounces and share at rest of each cell, in Markdown."""
-    cells, time, bounces = (block.statistics(name) for name in ("dx", "walk_time", "bounces"))
-    rows = []
-    for place, at in common.of_cells(block):
-        *values, mass = at.values()
-        share = cells.count[place] / block.shape[-1]
-        text = f"{cells.mean[place]:.3f} ± {cells.standard_error[place]:.3f}"
-        numbers = text, cells.sd[place], time.mean[place], bounces.mean[place]
-        rows.append((*values, 1e3 * mass, *(numbers if share else ("–",) * 4), share))
-    names = [name.replace("frequency", "ν / Hz") for name in block.axes][:-1]
-    heads = (*names, "charm / g", "Δx / m", "σ / m", "t / s", "bounces", "at rest")
-    return common.table(heads, rows, len(at) * "g " + "s .3f .2f .1f .0%")
+def reduced(blocks: Mapping[str, Block]) -> Iterator[dict[str, Any]]:
+    """Rows of the file: Δx of each cell [m] with its errors, duration [s], bounces and share at rest."""
+    for name, block in blocks.items():
+        cells, time, bounces = (block.statistics(column) for column in ("dx", "walk_time", "bounces"))
+        for place, at in common.of_cells(block):
+            yield {
+                "block": name,
+                **{axis: at.get(axis, ON_SPROCKET) for axis in AXES},
+                "dx": cells.mean[place],
+                "standard_error": cells.standard_error[place],
+                "sd": cells.sd[place],
+                "walk_time": time.mean[place],
+                "bounces": bounces.mean[place],
+                "at_rest": cells.count[place] / block.shape[-1],
+            }
+
+
+def distances(rows: Columns) -> str:
+    """Δx and (standard deviation of a walk) of each cell, a row for each mass, in Markdown."""
+    cells: dict[str, dict[str, str]] = {}
+    for row in zip(*rows.values(), strict=True):
+        at = dict(zip(rows, row, strict=True))
+        text = "{dx:.3f} ({sd:.3f})".format(**at) if at["at_rest"] else "–"
+        share = "" if at["at_rest"] in (0, 1) else f", {100 * at['at_rest']:.0f} %"
+        chain = "{links:g} links, {frequency:g} Hz".format(**at)
+        cells.setdefault(f"{1e3 * at['charm_mass']:g}", {})[chain] = text + share
+    heads = ("added mass / g", *next(iter(cells.values())))
+    return common.table(heads, ((mass, *texts.values()) for mass, texts in cells.items()))
 
 
 def draw_distances(panel: Axes, block: Block) -> None:
@@ -60,14 +84,21 @@ def draw_loops(panels: Array, links: int = 60, frequency: float = 15.0) -> None:
         panel.set_axis_off()
 
 
-def main(folder: str) -> None:
-    """Write the tables into the page and draw the figure: distances on the left, loops on the right."""
-    blocks = warpchain.load(folder).blocks
-    figure = Figure(figsize=(9.2, 4.2), layout="constrained")
-    left, right = figure.subfigures(1, 2, width_ratios=(1, 1.25))
-    draw_distances(left.subplots(), blocks["ellipse"])
-    draw_loops(right.subplots(len(DRAWN), 1))
-    common.publish(FOLDER, {name: distances(block) for name, block in blocks.items()}, {"charm": figure})
+def main(folder: Annotated[str | None, typer.Argument()] = None) -> None:
+    """Reduce a folder and draw its distances beside loops if it is given; write the tables."""
+    if folder is not None:
+        blocks = warpchain.load(folder).blocks
+        common.write_rows(FOLDER / RESULTS, reduced(blocks))
+        figure = Figure(figsize=(9.2, 4.2), layout="constrained")
+        left, right = figure.subfigures(1, 2, width_ratios=(1, 1.25))
+        draw_distances(left.subplots(), blocks["ellipse"])
+        draw_loops(right.subplots(len(DRAWN), 1))
+        common.publish(FOLDER, {}, {"charm": figure})
+    columns, tables = common.read_columns(FOLDER / RESULTS), {}
+    for name in dict.fromkeys(columns["block"].tolist()):
+        chosen = columns["block"] == name
+        tables[name] = distances({key: values[chosen] for key, values in columns.items()})
+    common.publish(FOLDER, tables)
 
 
 if __name__ == "__main__":

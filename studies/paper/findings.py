@@ -192,10 +192,7 @@ def floor_friction(numbers: Numbers) -> Found:
 
 def collapse(numbers: Numbers) -> Found:
     """Longer links lose their loop after fewer bounces."""
-    verdict, words = monotonic(numbers, "link_length", numbers["paper_claims"]["collapse"]["values"], -1)
-    distances = effects(numbers)["link_length"]["values"]
-    texts = (f"{effect.notes['value']:g}: {percent(effect.cells.mean)}" for effect in distances)
-    return verdict, {**words, "distances": ", ".join(texts)}
+    return monotonic(numbers, "link_length", numbers["paper_claims"]["collapse"]["values"], -1)
 
 
 def lost_on_floor(numbers: Numbers) -> Found:
@@ -226,14 +223,13 @@ def small(kind_and_names: str) -> Check:
 
     def check(numbers: Numbers) -> Found:
         bound, known = getattr(BOUNDS, kind), {name: effects(numbers)[name]["values"] for name in names}
-        greatest = {name: max(found, key=lambda each: abs(each.cells.mean)) for name, found in known.items()}
         every = [effect for found in known.values() for effect in found]
+        _, name, greatest = max((abs(each.cells.mean), name, str(each)) for name in names for each in known[name])
         sizes = np.abs(np.concatenate([effect.relative[effect.known] for effect in every]))
         widths = np.concatenate([effect.half_width[effect.known] for effect in every])
         above, inside = int(np.sum(sizes - widths > bound)), int(np.sum(sizes + widths <= bound))
         words = {"bound": 100 * bound, "above": above, "inside": inside, "total": len(sizes)}
-        symbols = {name: quantity.symbol for name, quantity in Parameters.quantities().items()}
-        words["worst"] = ", ".join(f"{symbols[name]} {effect}" for name, effect in greatest.items())
+        words |= {"most": f"{greatest} ({Parameters.quantities()[name].symbol})", "cell": plain(sizes.max())}
         return share(len(sizes) - above, len(sizes)), words
 
     return check
@@ -270,18 +266,14 @@ def gradual(numbers: Numbers) -> Found:
 
 def nonlinear(numbers: Numbers) -> Found:
     """Linear propagation of the uncertainties fails: linear terms explain less than half of the variance in a cell."""
-    texts, fails = [], []
+    words, fails = {}, []
     for start, found in numbers["paper_footnote"]["nonlinear"].items():
         shares = {name: np.maximum(each, 0.0) for name, each in found.items()}
-        linear, squares, products, repeated = (plain(np.median(each)) for each in shares.values())
-        least = shares["linear"]
-        texts.append(
-            f"{'as an ellipse' if start == 'ellipse' else 'from the sprocket'}: linear terms {linear} "
-            f"({plain(least.min())} to {plain(least.max())}), with squares {squares}, with products {products}, "
-            f"all but chaos {repeated}"
-        )
-        fails.append(share(int((least < BOUNDS.most).sum()), least.size))
-    return together(*fails), {"shares": "; ".join(texts)}
+        linear = shares["linear"]
+        words[start] = {name: plain(np.median(each)) for name, each in shares.items()}
+        words[start] |= {"least": plain(linear.min()), "most": plain(linear.max())}
+        fails.append(share(int((linear < BOUNDS.most).sum()), linear.size))
+    return together(*fails), words
 
 
 def same_distributions(numbers: Numbers) -> Found:

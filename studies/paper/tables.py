@@ -7,14 +7,13 @@ import re
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
 
-from studies.common import table
+from studies.common import minus, table
 from studies.paper import findings
 from studies.paper.findings import Numbers
 from studies.paper.statistics import percent, plain
@@ -23,15 +22,16 @@ from warpchain import Parameters
 
 SYMBOLS = {"phase": "phase of the release", "clearance": "height of the release / m"}  # None of Table 1
 NAMES = {
-    "sprocket_radius_is": "the sprocket's radius is that of",
-    "circle_radius": "radius of the circles of links / m",
+    "sprocket_radius_is": "sprocket radius, measured to",
+    "circle_radius": "radius of the contact circles / m",
     "clearance": "height of the release / m",
-    "clearance_of": "height is that of the chain",
-    "phase": "moment of the release, in loop periods",
-    "ellipse_aspect": "aspect of the ellipse",
+    "clearance_of": "height of the release, of the loop",
+    "phase": "time of the release / loop periods",
+    "ellipse_aspect": "aspect ratio of the ellipse",
 }
 """What the paper leaves open, by field."""
-WORDS = {"pitch": "where joints ride", "contact": "where circles touch"}
+SHOWN = 0.02  # Least change of Δx that the table of Table 1's quantities has
+WORDS = {"pitch": "the joints", "contact": "the contact surface"}
 
 
 def page(numbers: Numbers) -> str:
@@ -42,21 +42,22 @@ def page(numbers: Numbers) -> str:
 
 @dataclass(frozen=True)
 class Claim:
-    """A sentence of the paper."""
+    """A statement of the paper."""
 
     sentence: str  # In short
     source: str  # Where its numbers are from, in Markdown
-    says: str  # What came out, with the names of numbers in braces
+    finds: str  # What came out, in one line, with the names of numbers in braces
+    details: str = ""  # Further numbers, likewise
     check: str = ""  # Name of the function of `findings`, and its argument; none of what another page shows
     verdict: str = ""  # Set by hand, where it is not clear what the paper says
     reasons: Mapping[str, str] = field(default_factory=dict)  # Verdict → why
 
-    def finding(self, numbers: Numbers) -> tuple[str, Verdict]:
-        """What came out, and what it says of the claim."""
+    def finding(self, numbers: Numbers) -> tuple[str, str, Verdict]:
+        """What came out, in one line and in detail, and what it says of the claim."""
         name, _, argument = self.check.partition(" ")
         found: Any = getattr(findings, name) if name else lambda _: (Verdict.OPEN, {})
         verdict, words = (found(argument) if argument else found)(numbers)
-        return self.says.format(**words), Verdict(self.verdict or verdict)
+        return self.finds.format(**words), self.details.format(**words), Verdict(self.verdict or verdict)
 
     def reason(self, verdict: Verdict) -> str:
         """Why the verdict is what it is; the page admits it if no reason is known."""
@@ -73,45 +74,50 @@ CLAIMS = [
 
 def all_verdicts(numbers: Numbers) -> list[Verdict]:
     """The verdicts of all claims."""
-    return [claim.finding(numbers)[1] for claim in CLAIMS]
+    return [claim.finding(numbers)[-1] for claim in CLAIMS]
 
 
 def claims(numbers: Numbers) -> str:
     """All claims with what came out; a mark stands at what a person wrote, from another page."""
     rows = []
     for number, claim in enumerate(CLAIMS, 1):
-        text, verdict = claim.finding(numbers)
-        mark = " †" if claim.check in ("", "waves") else ""
-        rows.append((number, claim.sentence, f"{text}{mark}", claim.source, f"*{verdict}*"))
-    return table(["", "the paper", "here", "from", "verdict"], rows)
+        text, _, verdict = claim.finding(numbers)
+        mark = "" if claim.check else " †"
+        rows.append((number, claim.sentence, f"{text}{mark}", verdict))
+    return table(["", "the paper says", "warpchain finds", "verdict"], rows)
+
+
+def notes(numbers: Numbers) -> str:
+    """Of each claim that has them: where its numbers are from, further ones, and the reason of its verdict."""
+    lines = []
+    for number, claim in enumerate(CLAIMS, 1):
+        _, details, verdict = claim.finding(numbers)
+        texts = [*filter(None, (details, claim.reason(verdict)))]
+        lines += [f"- **{number}** ({claim.source}) {' '.join(texts)}"] if texts else []
+    return "\n".join(lines)
 
 
 def verdicts(numbers: Numbers) -> str:
     """How many claims have which verdict."""
     counts = Counter(all_verdicts(numbers))
-    each = ", ".join(f"{counts[verdict]} × *{verdict}*" for verdict in Verdict if counts[verdict])
-    return f"Of {len(CLAIMS)} statements of the paper {each}"
+    return "Of {} statements {} agree, {} agree in part, {} differ and {} cannot be compared".format(
+        len(CLAIMS), *(counts[verdict] for verdict in Verdict)
+    )
 
 
 def thresholds(numbers: Numbers) -> str:
-    """Which verdicts change if one bound of the rules is halved or doubled."""
+    """Which claims get another verdict if one bound of the rules is halved or doubled."""
     usual, rows = all_verdicts(numbers), []
     for name, value in asdict(BOUNDS).items():
         texts = []
         for factor in (0.5, 2.0):
             setattr(BOUNDS, name, factor * value)
             pairs = enumerate(zip(usual, all_verdicts(numbers), strict=True), 1)
-            changed = (f"{number}: *{before}* → *{after}*" for number, (before, after) in pairs if before != after)
-            texts.append("; ".join(changed) or "none")
+            changed = (f"{number}" for number, (before, after) in pairs if before != after)
+            texts.append(", ".join(changed) or "none")
         setattr(BOUNDS, name, value)
         rows.append([name, f"{value:g}", *texts])
     return table(["bound", "value", "halved", "doubled"], rows)
-
-
-def reasons(numbers: Numbers) -> str:
-    """The reasons of all claims that have one, numbered as in the table."""
-    found = enumerate(zip(CLAIMS, all_verdicts(numbers), strict=True), 1)
-    return "\n".join(f"- {k} *{verdict}*: {why}" for k, (claim, verdict) in found if (why := claim.reason(verdict)))
 
 
 def of_cells(cells: Mapping[str, Any], head: str, rows: Mapping[str, Any]) -> str:
@@ -121,12 +127,11 @@ def of_cells(cells: Mapping[str, Any], head: str, rows: Mapping[str, Any]) -> st
 
 
 def distances(numbers: Numbers) -> str:
-    """Mean Δx ± standard deviation of a walk, by start, links and frequency."""
+    """Mean Δx by start, links and frequency."""
     cells, rows = numbers["paper_claims"]["cells"], {}
     for place, links in enumerate(cells["links"]):
         for start in ("rest", "ellipse"):
-            mean, sd = (findings.of_start(numbers, start, name)[place] for name in ("mean", "sd"))
-            rows[f"{links} | {start}"] = [f"{one:.3f} ± {other:.3f}" for one, other in zip(mean, sd, strict=True)]
+            rows[f"{links} | {start}"] = [f"{each:.3f}" for each in findings.of_start(numbers, start, "mean")[place]]
     return of_cells(cells, "links | start", rows)
 
 
@@ -138,43 +143,27 @@ def ellipses(numbers: Numbers) -> str:
 
 
 def impacts(numbers: Numbers) -> str:
-    """Changes in the first impact: means over the numbers of links at each frequency, and their range."""
-    content, rows = numbers["paper_shapes"], []
-    for place, frequency in enumerate(content["cells"]["frequency"]):
-        row = [f"{frequency:g} Hz"]
-        for name in ("area", "height", "width", "speed"):
-            values = content["impacts"][name][:, place]
-            ends = (percent(each(values[np.isfinite(values)])) for each in (np.mean, np.min, np.max))
-            row.append("{} ({} to {})".format(*ends) if np.isfinite(values).any() else "—")
-        rows.append(row)
-    return table(["", "area", "height", "width", "speed along the loop"], rows)
+    """Changes in the first impact, means over the numbers of links, of the frequencies at which loops rise again."""
+    content = numbers["paper_shapes"]
+    rise = np.isfinite(content["impacts"]["speed"]).any(axis=0)
+    frequencies = ", ".join(f"{each:g}" for each in np.array(content["cells"]["frequency"])[rise])
+    texts = []
+    for name in ("speed", "width", "height", "area"):
+        means = map(percent, np.nanmean(content["impacts"][name][:, rise], axis=0))
+        texts.append(f"their {name} by {', '.join(means)}")
+    return f"at {frequencies} Hz {'; '.join(texts)}"
 
 
 def effects(numbers: Numbers) -> str:
-    """What each value of each quantity does to Δx."""
-    rows, cells = [], numbers["paper_claims"]["cells"]
+    """What each value of a quantity does to Δx, mean of the cells, if it does more than `SHOWN`."""
+    rows = []
     for name, content in findings.effects(numbers).items():
-        if name == "start":
+        if name == "start" or max(abs(effect.cells.mean) for effect in content["values"]) < SHOWN:
             continue
-        first = SYMBOLS.get(name) or "{0.symbol} ({0.value:g})".format(Parameters.quantities()[name])
-        for effect in content["values"]:
-            counts = str(effect), effect.rises, effect.falls, plain(effect.cells.typical)
-            ends, relative = [], np.where(effect.known, effect.relative, np.nan)
-            for place in (np.nanargmin(relative), np.nanargmax(relative)):
-                row, column = np.unravel_index(place, relative.shape)
-                at = f"{cells['links'][row]}, {cells['frequency'][column]:g} Hz"
-                ends.append(f"{percent(relative[row, column])} ({at})")
-            rows.append([first, effect.notes["value"], *counts, ", ".join(ends), effect.lost or ""])
-            first = ""
-    head = "quantity | value | Δx, mean of cells | rise | fall | typical | least and greatest cell | pairs lost"
-    return table(head, rows, "s g s d d s s d")
-
-
-def friction(numbers: Numbers) -> str:
-    """The best friction of the floor in each cell."""
-    content = numbers["paper_claims"]
-    best = zip(content["cells"]["links"], content["friction"]["best"], strict=True)
-    return of_cells(content["cells"], "links", {f"{links}": [f"{value:g}" for value in row] for links, row in best})
+        symbol = SYMBOLS.get(name) or "{0.symbol} ({0.value:g})".format(Parameters.quantities()[name])
+        texts = (f"{effect.notes['value']:g}: {effect}" for effect in content["values"])
+        rows.append([symbol, "; ".join(texts)])
+    return minus(table("quantity | value: change of Δx", rows))
 
 
 def walks(numbers: Numbers) -> str:
@@ -185,35 +174,15 @@ def walks(numbers: Numbers) -> str:
     return f"{', '.join(parts)}; {inaccurate} with an energy error above 5 %"
 
 
-def through(numbers: Numbers) -> str:
-    """What it does to Δx if links pass through one another, cell by cell."""
-    cells, rows = numbers["paper_through"]["cells"], {}
-    for start, name in (("sprocket", "paper_through"), ("ellipse", "paper_through_ellipse")):
-        effect = numbers[name]["through"]
-        for place, links in enumerate(cells["links"]):
-            rows[f"{start} | {links} links"] = [effect[place, column] for column in range(len(cells["frequency"]))]
-    return of_cells(cells, "from | ", rows)
-
-
 def left_open(numbers: Numbers) -> str:
-    """What each other choice of what the paper leaves open does to Δx, over the cells, beside the spread of a walk."""
+    """What each other choice of what the paper leaves open does to Δx, mean of the cells."""
     rows = []
     for name, found in numbers["paper_open"]["left_open"].items():
-        first, walk = NAMES[name], plain(found["spread"])
-        for effect in found["values"]:
-            both = effect.notes["value"], found["reference"]
-            texts = (WORDS.get(each, each) if isinstance(each, str) else f"{each:g}" for each in both)
-            ends = ", ".join(percent(end(effect.relative[effect.known])) for end in (np.min, np.max))
-            rows.append([first, " for ".join(texts), effect, plain(effect.cells.typical), ends, walk])
-            first = walk = ""
-    return table("left open | value | Δx, mean of cells | typical | least and greatest cell | spread of a walk", rows)
+        texts = (f"{_word(effect.notes['value'])}: {effect}" for effect in found["values"])
+        rows.append([NAMES[name], _word(found["reference"]), "; ".join(texts)])
+    return table("left open | chosen here | other choice: change of Δx", rows)
 
 
-def nonlinear(numbers: Numbers) -> str:
-    """What explains the variance of Δx in a cell, by start."""
-    content, rows = numbers["paper_footnote"], []
-    for start, found in content["nonlinear"].items():
-        for (i, links), (j, frequency) in product(*(enumerate(axis) for axis in content["cells"].values())):
-            shares = (max(0.0, found[name][i, j]) for name in ("linear", "squares", "products", "repeated"))
-            rows.append([start, f"{links} × {frequency:g} Hz", *(f"{100 * share:.0f} %" for share in shares)])
-    return table("start | cell | linear terms | and squares, turning phase | and products | all but chaos", rows)
+def _word(value: str | float) -> str:
+    """A value of what the paper leaves open, in words or as a number."""
+    return WORDS.get(value, value) if isinstance(value, str) else f"{value:g}"

@@ -20,6 +20,7 @@ Fit = Callable[[Points], tuple[Array, Prediction]]  # Cells → the numbers of a
 
 TIME = scales.NORMAL_TIME  # τ = (R/g)^½ [s]
 BLOCKS = ("links", "frequency")
+SHOWN = ("all", "the paper's range")  # Ranges of cells whose laws stand on the page
 ROUNDS = 40  # Samples of blocks
 
 
@@ -124,20 +125,24 @@ def ranges(cells: Columns) -> dict[str, Points]:
     }
 
 
-def table(cells: Columns) -> str:
-    """Markdown: what each law leaves, and what it leaves of blocks that it has not seen; then numbers with errors."""
-    known = ranges(cells)
+def table(known: Mapping[str, Points]) -> str:
+    """Markdown: what each law leaves of cells, and what it leaves of blocks that it has not seen."""
     rows = []
     for candidate in CANDIDATES:
         row = [candidate.name, str(candidate.numbers)]
         for points in known.values():
             left = [residual(points, candidate), *(left_out(points, candidate, block) for block in BLOCKS)]
-            row.append(" / ".join(f"{laws.root_mean_square(each):.1f}" for each in left))
+            row.append("/".join(f"{laws.root_mean_square(each):.1f}" for each in left))
         rows.append(row)
     heads = (f"{name} ({len(points.links)} cells)" for name, points in known.items())
+    return markdown(("law of Δx", "numbers", *heads), rows)
+
+
+def details(known: Mapping[str, Points]) -> dict[str, str]:
+    """What is printed only: laws of the ranges that are not `SHOWN`, places on curves, and numbers with errors."""
     curves = "\n".join(f"- {name}: {laws.slopes(points)}" for name, points in known.items())
-    lines = [markdown(("law of Δx", "numbers", *heads), rows), curves, errors(known)]
-    return "\n\n".join(lines)
+    others = {name: points for name, points in known.items() if name not in SHOWN}
+    return {"laws of other ranges": table(others), "curves": curves, "numbers of laws": errors(known)}
 
 
 def errors(known: Mapping[str, Points]) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 import typer
 
 import warpchain
-from studies.common import Columns, publish, read_columns, run_study, table, write_rows
+from studies.common import Columns, publish, read_columns, run_study, show, table, write_rows
 from studies.phase_diagram import candidates, cells, drawing, laws, scales, strands
 from studies.phase_diagram.cells import FAILURES, WAYS
 from studies.phase_diagram.endings import Ending
@@ -20,7 +20,7 @@ FOLDER = Path(__file__).parent
 
 
 def table_of_cells(cells: Columns) -> str:
-    """Markdown: Δx ± s.d. for about six links and frequencies, evenly spread, and the share that failed if any did."""
+    """Markdown: mean Δx for about six links and frequencies, evenly spread, and the share that failed if any did."""
     shown_links, shown_frequencies = (
         known[np.unique(np.linspace(0, len(known) - 1, 6).round().astype(int))]
         for known in (np.unique(cells[name]) for name in ("links", "frequency"))
@@ -30,9 +30,9 @@ def table_of_cells(cells: Columns) -> str:
         texts = []
         for frequency in shown_frequencies:
             here = (cells["links"] == number) & (cells["frequency"] == frequency)
-            mean, sd, rest, walks = (cells[name][here][0] for name in ("dx_mean", "dx_sd", "at_rest", "walks"))
-            text = "–" if np.isnan(mean) else f"{mean:.3g} ± {sd:.2g}"
-            texts.append(text if rest == walks else f"{text} ({100 * (1 - rest / walks):.3g} % failed)")
+            mean, rest, walks = (cells[name][here][0] for name in ("dx_mean", "at_rest", "walks"))
+            text = "–" if np.isnan(mean) else f"{mean:#.3g}"
+            texts.append(text if rest == walks else f"{text} ({100 * (1 - rest / walks):.3g} %)")
         rows.append([f"{number:g}", *texts])
     return table(("links", *(f"{frequency:g} Hz" for frequency in shown_frequencies)), rows)
 
@@ -76,16 +76,15 @@ def make(
         write_rows(strands.CSV, strands.reduced([warpchain.load(path) for path in meetings]))
     found, met, varied = read_columns(cells.CSV), read_columns(strands.CSV), scales.Cells()
     points = laws.points_of(found)
+    ranges = candidates.ranges(found)
     tables = {
         "cells": table_of_cells(found),
-        "failures": table_of_failures(found),
-        "endings": table_of_endings(found),
         "scales": scales.table(varied, points),
-        "candidates": candidates.table(found),
-        "strands": strands.shares(met),
-        "by bounces": strands.by_bounces(met),
-        "ways with strands": strands.ways(met),
+        "candidates": candidates.table({name: ranges[name] for name in candidates.SHOWN}),
+        "meetings": strands.meetings(met),
     }
+    show({"failures": table_of_failures(found), "endings": table_of_endings(found), **candidates.details(ranges)})
+    show({"strands": strands.shares(met), "endings with strands": strands.ways(met)})
     figures = {"maps": drawing.draw_maps(found), "laws": drawing.draw_laws(points)}
     publish(FOLDER, tables, figures | {"scales": scales.draw(varied, points)})
 

@@ -23,7 +23,6 @@ TIMES = {"a constant": (0, 0, 0), "∝ g^-½": (-0.5, 0, 0), "(ℓ/g)^½": (-0.5
 """Times that are tried, by name: exponents of gravity, of the radius at which joints ride, of the length of a link."""
 NORMAL = (laws.GRAVITY, laws.RADIUS, laws.LINK_LENGTH)  # The three quantities in the phase diagram [SI units]
 NORMAL_TIME = (laws.RADIUS / laws.GRAVITY) ** 0.5  # (R/g)^½ there [s]
-PLACES = (0.1, 0.3, 1.0, 3.0)  # Turns in this time at which the curve is described
 ROUNDS = 100  # Samples of the bootstrap over cells
 BLOCKS = {"sprocket_radius": "radius of the sprocket", "gravity": "gravity", "links": "length of links"}
 """What is varied: first word of the names of the blocks → name."""
@@ -103,15 +102,13 @@ def table(cells: Cells, points: laws.Points) -> str:
     residual = laws.root_mean_square(left_of(cells, curve, best), 3)
     left = left_of(cells, curve, TIMES["(R/g)^½"])
     order = np.argsort(-np.abs(left))[:4]
-    farthest = ", ".join(f"{_cell(cells, i)} {100 * np.expm1(left[i]):+.0f} %" for i in order)
+    farthest = "; ".join(f"{_cell(cells, i)} {100 * np.expm1(left[i]):+.0f} %" for i in order)
     g, r, link, lengths = (f"{each.min():.2g} to {each.max():.2g}" for each in (*cells.scales, cells.lengths))
-    described = [f"{np.exp(curve(np.array([place / NORMAL_TIME])))[0]:.2g} at {place:g}" for place in PLACES]
-    return (
+    return common.minus(
         f"{common.table(('time τ', *groups), rows)}\n\n"
-        f"{count} cells; g, R and ℓ are {g}, {r} and {link} times those of the phase diagram, Δx "
-        f"is {lengths} lengths of the chain. The best exponents of g, R and ℓ are {', '.join(shares)} "
-        f"and leave {residual:.0f} %. With (R/g)^½ the farthest cells are {farthest}.\n\n"
-        f"Δx/(nℓ) is {', '.join(described)} turns in the time (R/g)^½."
+        f"In these {count} cells g, R and ℓ are {g}, {r} and {link} times those of the phase diagram, and Δx "
+        f"is {lengths} chain lengths. The best exponents of g, R and ℓ are {', '.join(shares)} "
+        f"(RMS {residual:.0f} %). With (R/g)^½ the largest deviations are {farthest}."
     )
 
 

@@ -103,17 +103,21 @@ def shares(cells: Columns) -> str:
     return minus(markdown(head, rows))
 
 
-def by_bounces(cells: Columns) -> str:
-    """Markdown: the difference from 5 to 30 Hz, with what is drawn held, for other bounds of what is early."""
+def meetings(cells: Columns) -> str:
+    """Markdown, from 5 to 30 Hz: when strands meet; Δx of early walks against late ones, for three bounds of early."""
     rows = []
     for links, chosen, _ in _groups(cells):
-        texts = []
+        counts = np.array([cells[f"strands_{key}"][chosen].sum() for key in BEGUN])
+        when = counts[:2].sum(), counts[2], counts[3:5].sum(), counts[5]
+        texts = [f"{100 * count / counts.sum():.0f}" for count in when]
         for end in ("_1", "", "_3"):
             values = cells[f"held{end}"][chosen]
             mean, _, _, ends = _over_cells(values, cells[f"held_se{end}"][chosen])
             texts.append(f"{mean} ({np.isfinite(values).sum()}: {ends})")
         rows.append((links, *texts))
-    return minus(markdown("links | met by the first bounce | by the second | by the third", rows))
+    head = "links | met in bounce 1 / % | 2 / % | later / % | never / %"
+    head += " | Δx, if met by the first | by the second | by the third"
+    return minus(markdown(head, rows))
 
 
 def ways(cells: Columns) -> str:

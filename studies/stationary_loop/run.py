@@ -1,6 +1,6 @@
 """Makes the tables of README.md but those of starts, and its figures, in minutes; that of kinks from a folder."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,7 +9,7 @@ import typer
 from matplotlib.figure import Figure
 
 import warpchain
-from studies.common import DASHES, FREQUENCY, GREEN, LINE_COLORS, RED, minus, publish, run_study, table, tidy
+from studies.common import DASHES, FREQUENCY, GREEN, LINE_COLORS, RED, minus, publish, run_study, show, table, tidy
 from studies.stationary_loop import theory
 
 FOLDER = Path(__file__).parent
@@ -32,24 +32,23 @@ def held(links: int, frequency: float, values: Mapping[str, float]) -> warpchain
     return warpchain.walk(links=links, frequency=frequency, preset="soft", start="spinning", **settings)
 
 
-def shape_rows(title: str, loop: Any) -> Iterator[tuple[str, ...]]:
-    """Curvature of a loop [1/m] in simulation, theory and as a catenary; how far apart shapes [mm] and tensions are."""
-
-    def at(value: float, place: float) -> str:
-        return f"{value:.1f} at {100 * place:.1f}"
-
-    kink = loop.kink()
-    bends = at(kink.peak, kink.peak_at), at(kink.dip, kink.dip_at)
-    yield title, "simulation", f"{loop.bottom_curvature:.1f}", *bends, "", ""
-    curve = theory.places(loop, np.linspace(loop.s[0], loop.s[-1], 20_000))
-    for name, found in (("theory", theory.predict(loop)), ("catenary", theory.catenary_of(loop))):
-        near = np.abs(found.s) < 0.35 * (loop.free[1] - loop.free[0])
-        s, curvature = found.s[near], found.curvature[near]
-        bends = tuple(at(curvature[place], s[place]) for place in (np.argmax(curvature), np.argmin(curvature)))
-        apart = 1e3 * np.array([np.hypot(*(curve - point).T).min() for point in found.position])
-        tension = found.effective_tension - np.interp(found.s, loop.s, loop.effective_tension)
-        distances = f"{theory.rms(apart):.2f} ({apart.max():.2f})", f"{theory.rms(tension):.3f}"
-        yield "", name, f"{np.interp(0, found.s, found.curvature):.1f}", *bends, *distances
+def shape_row(title: str, loop: Any) -> tuple[str, ...]:
+    """Curvature at the bottom and in the kink [1/m] in simulation and theory; how far theory and a catenary are off."""
+    kink, curve = loop.kink(), theory.places(loop, np.linspace(loop.s[0], loop.s[-1], 20_000))
+    predicted, catenary = theory.predict(loop), theory.catenary_of(loop)
+    near = np.abs(predicted.s) < 0.35 * (loop.free[1] - loop.free[0])
+    s, curvature = predicted.s[near], predicted.curvature[near]
+    dip = int(np.argmin(curvature))
+    apart = [
+        1e3 * np.array([np.hypot(*(curve - point).T).min() for point in found.position])
+        for found in (predicted, catenary)
+    ]
+    bottoms = [loop.bottom_curvature, *(np.interp(0, found.s, found.curvature) for found in (predicted, catenary))]
+    kinks = [
+        f"{value:.1f} at {100 * place:.1f}" for value, place in ((kink.dip, kink.dip_at), (curvature[dip], s[dip]))
+    ]
+    off = ", ".join(f"{theory.rms(each):.2f}" for each in apart)
+    return title, ", ".join(f"{value:.1f}" for value in bottoms), *kinks, off
 
 
 def same_row(title: str, ours: Any, theirs: Any) -> tuple[str, ...]:
@@ -61,9 +60,9 @@ def same_row(title: str, ours: Any, theirs: Any) -> tuple[str, ...]:
         np.interp(s, ours.s, getattr(ours, name)) - np.interp(s, theirs.s, getattr(theirs, name))
         for name in ("effective_tension", "curvature")
     )
-    bend = f"{theory.rms(curvature):.2f} 1/m ({theirs.curvature.max():.1f})"
-    pull = f"{theory.rms(tension):.3f} N ({theirs.effective_tension.max():.1f})"
-    return title, f"{height:.2f} %", f"{width:.2f} %", f"{theory.rms(apart):.2f} mm", bend, pull
+    bend = f"{theory.rms(curvature):.2f} ({theirs.curvature.max():.1f})"
+    pull = f"{theory.rms(tension):.3f} ({theirs.effective_tension.max():.1f})"
+    return title, f"{height:.2f}", f"{width:.2f}", f"{theory.rms(apart):.2f}", bend, pull
 
 
 def draw(walk: warpchain.WalkResult) -> Figure:
@@ -117,19 +116,19 @@ def main(kinks: Annotated[str | None, typer.Argument()] = None) -> None:
     for title, (cell, values) in {**chains, **{text: (SHOWN, values) for text, values in OTHERS.items()}}.items():
         walk = held(*cell, values)
         loop = walk.mean_loop()
-        shapes += shape_rows(title, loop)
+        shapes.append(shape_row(title, loop))
         balances.append((title, *(f"{100 * error:.1f} %" for error, _ in theory.imbalances(loop).values())))
         if not values:
             same.append(same_row(title, loop, held(*cell, UNDAMPED).mean_loop()))
             if cell == SHOWN:
                 figure = draw(walk)
-    shape_head = "links, Hz |  | at the lowest point | greatest | least | shape, mm rms (greatest) | tension, N rms"
-    tables = {
-        "shapes": table(shape_head, shapes),
+    shape_head = "links, Hz | bottom: simulation, theory, catenary | kink | kink in theory | off: theory, catenary / mm"
+    printed = {
         "balances": table("links, Hz | force | normal force | moment | friction", balances),
-        "same loop": table("links, Hz | height | width | place | curvature | tension less ρv²", same),
+        "same loop": table("links, Hz | height / % | width / % | position / mm | curvature / (1/m) | T_e / N", same),
     }
-    publish(FOLDER, {name: minus(text) for name, text in tables.items()}, {"loop": figure}, dpi=100)
+    show({name: minus(text) for name, text in printed.items()})
+    publish(FOLDER, {"shapes": minus(table(shape_head, shapes))}, {"loop": figure}, dpi=100)
 
 
 if __name__ == "__main__":

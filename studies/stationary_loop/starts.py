@@ -1,4 +1,4 @@
-"""Does Δx depend on how the loop came to spin, and how long it was held? Tables of README.md."""
+"""Does Δx depend on how the loop came to spin, and how long it was held? A table of README.md, and further ones."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -23,7 +23,7 @@ LOOPS = {
     "`rest`": (("rest", 0.0),),
     "`spinning`": (("spinning", 0.0), ("held_on", 0.0)),
     "held 30 s": (("undamped", 0.0), ("swing", 30.0)),
-    "at once": (("rest", 0.0), ("spinning", 0.0), ("held_on", 0.0)),
+    "released at once": (("rest", 0.0), ("spinning", 0.0), ("held_on", 0.0)),
     "held on": tuple(("held_on", time) for time in (5.0, 10.0, 20.0)),
 }
 """Loops of one kind: name → blocks, and times for which they held their loops on, of the same scene."""
@@ -32,7 +32,7 @@ COMPARED = (
     ("`rest`", "`spinning`"),
     ("`spinning`", "held 30 s"),
     ("`rest`", "held 30 s"),
-    ("at once", "held on"),
+    ("released at once", "held on"),
     ("held 30 s", "held on"),
 )
 SLOW = 10.0  # Frequency [Hz] at which loops hardly swing
@@ -126,16 +126,16 @@ def means(cells: Cells) -> str:
     """Means over the cells of the differences between starts, and of these from loops that were held on."""
     every = sorted(key[1:3] for key in cells if key[0] == "rest")
     long = [cell for cell in every if cell[0] >= LONG]
-    columns = every, [cell for cell in every if cell[0] < LONG], long, [cell for cell in long if cell[1] > SLOW]
+    columns = every, [cell for cell in every if cell[0] < LONG], [cell for cell in long if cell[1] > SLOW]
     rows = []
     for one, other in COMPARED:
         texts = []
         for chosen in columns:
             pairs = [(_together(cells, one, cell), _together(cells, other, cell)) for cell in chosen]
             found = common.OverCells(*zip(*(_ratio(*pair) for pair in pairs if all(pair)), strict=True))
-            texts.append(f"{found.text(2)} (χ² {found.chi2:.1f} of {len(found)})")
+            texts.append(f"{found.text(2).removesuffix(' %')} ({found.chi2:.1f}/{len(found)})")
         rows.append((f"{one} over {other}", *texts))
-    head = f"Δx | all cells | below {LONG} links | from {LONG} links on | those at 20 and 30 Hz"
+    head = f"change of Δx / % (χ²/d.o.f.) | all cells | below {LONG} links | {LONG} links or more, 20 and 30 Hz"
     return common.table(head, rows)
 
 
@@ -153,10 +153,14 @@ def over_time(cells: Cells, block: str, quantity: str, scale: float = 1, digits:
 
 
 def tables(cells: Cells) -> dict[str, str]:
-    """The tables of the page by their markers."""
+    """The table of the page by its marker."""
+    return {"means of starts": common.minus(means(cells))}
+
+
+def details(cells: Cells) -> dict[str, str]:
+    """What is printed only: Δx and positions of each cell, by start and by the time for which loops were held on."""
     texts = {
         "starts": starts(cells),
-        "means of starts": means(cells),
         "held on": over_time(cells, "held_on", "held"),
         "place held on": over_time(cells, "held_on", "release_center_x", 1e3, 2),
         "swing": over_time(cells, "swing", "release_center_x", 1e3, 2),
@@ -169,7 +173,9 @@ def make(folders: Annotated[list[str] | None, typer.Argument()] = None) -> None:
     """Reduce the sweeps that are given into the committed file; then write all tables that are in it."""
     if folders:
         common.write_rows(CSV, reduced(folders))
-    common.publish(PAGE.parent, tables(read()))
+    cells = read()
+    common.show(details(cells))
+    common.publish(PAGE.parent, tables(cells))
 
 
 if __name__ == "__main__":

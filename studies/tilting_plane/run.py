@@ -10,8 +10,8 @@ FOLDER = Path(__file__).parent
 
 def table(rows: list[dict[str, str]]) -> str:
     """What a tilt at the release does, in Markdown: means over the cells, ± standard error; r.m.s. drift and yaw."""
-    head = "tilt / rad | fell over | before the loop collapsed | Δx, tilting over fixed | least and greatest cell"
-    shown = "{fell} %", "{early} %", "{ratio} ± {error}", "{least}, {greatest}", "{drift}", "{yaw}"
+    head = "tilt / rad | fell over / % | before collapse / % | Δx, tilting over fixed | minimum, maximum of cells"
+    shown = "{fell}", "{early}", "{ratio} ± {error}", "{least}, {greatest}", "{drift}", "{yaw}"
     lines = ((row["tap"].split()[1], *(text.format(**row) for text in shown)) for row in rows)
     return common.table(f"{head} | drift / m | yaw / °", lines)
 

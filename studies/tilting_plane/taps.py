@@ -64,16 +64,16 @@ def _of_cells(columns: Columns, fixed: Any) -> dict[str, str]:
 
 
 def taps_table(rows: list[dict[str, str]]) -> str:
-    """What each tap does, means over the cells."""
-    head = "tap at the release | fell over | before the loop collapsed | Δx over that of a fixed plane | drift / m"
-    shown = ["{fell} %", "{early} %", "{ratio} ± {error} ({least} to {greatest})", "{drift}"]
-    lines = []
-    for row in rows:
-        straight = (f"{row[f'straight_{bound:g}']} %, {row[f'kept_{bound:g}']}" for bound in STRAIGHT)
-        texts = [text.format(**row) for text in shown] + [text.replace("nan", "—") for text in straight]
-        lines.append((minus(row["tap"]), *texts))
-    heads = (f"straight to {bound:g}: walks, Δx over all" for bound in STRAIGHT)
-    return table(" | ".join([head, *heads]), lines)
+    """What each tap of one kind does, means over the cells."""
+    head = "perturbation | fell over / % | before collapse / % | Δx over fixed plane (cells) | drift / m"
+    shown = "{fell}", "{early}", "{ratio} ({least}–{greatest})", "{drift}"
+    straight = f"straight_{STRAIGHT[-1]:g}"
+    lines = (
+        (minus(row["tap"]), *(text.format(**row) for text in shown), row[straight])
+        for row in rows
+        if "," not in row["tap"]
+    )
+    return table(f"{head} | straight / %", lines)
 
 
 def main(folder: Annotated[str | None, typer.Argument()] = None) -> None:

@@ -137,10 +137,10 @@ def summary() -> str:
     lines = []
     for way, size in VARIANTS[1:]:
         over, rows = change(way, size), rows_of(way, size)
-        ends = f"{over.values.min():+.0f} to {over.values.max():+.0f} %"
-        texts = over.text(), ends, f"{over.typical:.1f} %", f"{over.chi2:.0f} of {len(over)}"
-        lines.append([way, f"{size:g}", *texts, f"{rows['by_phase'].mean():.1f} %", f"{rows['f'].mean():.1f}"])
-    head = "wave | amplitude / rad | Δx, mean of cells | cells | typical | χ² of none | ∝ cos φ | F of that"
+        ends = f"{over.values.min():+.0f} to {over.values.max():+.0f}"
+        texts = over.text().removesuffix(" %"), ends, f"{over.typical:.1f}", f"{over.chi2:.0f}"
+        lines.append([way.replace("none", "control"), f"{size:g}", *texts, f"{rows['f'].mean():.1f}"])
+    head = "wave | amplitude / rad | mean / % | range / % | typical / % | χ² (8 d.o.f.) | F"
     return common.minus(common.table(head, lines))
 
 

@@ -9,10 +9,11 @@ import typer
 
 from studies import common
 from studies.common import Array
-from studies.waves.drag import CELLS, RATES, SAMPLES, SEEDS, VARIANTS
+from studies.waves.drag import CELLS, HALVES, SAMPLES, SEEDS, VARIANTS
 
 FOLDER = Path(__file__).parent
 RESULTS = FOLDER / "results" / "doses.csv"
+SHOWN = (1e-9, *HALVES)  # Rates of the table [1/s]
 
 
 def reduced(files: Sequence[Path]) -> Iterator[dict[str, object]]:
@@ -54,30 +55,36 @@ def changes_table(drags: Sequence[tuple[str, float]]) -> str:
 
 
 def summary_table() -> str:
-    """Each drag over the cells: mean, root mean square less errors, significant cells, agreement of the two seeds."""
+    """Each drag over the cells: mean, root mean square less errors, range, significant cells."""
     lines = []
-    for when, rate in VARIANTS[1:]:
+    for when, rate in (each for each in VARIANTS[1:] if each[1] in SHOWN):
         values, errors = changes(when, rate)
+        over, ends = common.OverCells(values, errors), f"{values.min():+.0f} to {values.max():+.0f}"
+        texts = over.text().removesuffix(" %"), f"{over.typical:.1f}", ends, f"{over.rises}, {over.falls}"
+        lines.append([f"{rate:g}/s", when, *texts])
+    return common.minus(common.table("drag | acts | mean / % | typical / % | range / % | longer, shorter", lines))
+
+
+def between_seeds() -> str:
+    """χ² of each drag between the two sets of seeds, over the cells."""
+    texts = []
+    for when, rate in VARIANTS[1:]:
         (one, one_error), (two, two_error) = (changes(when, rate, str(seed)) for seed in SEEDS)
-        chi2 = common.OverCells(one - two, np.hypot(one_error, two_error)).chi2
-        over, ends = common.OverCells(values, errors), f"{values.min():+.0f} to {values.max():+.0f} %"
-        texts = over.text(), f"{over.typical:.1f} %", ends, f"{over.rises}, {over.falls}"
-        lines.append([f"{rate:g}/s", when, *texts, f"{chi2:.0f} of {len(over)}"])
-    return common.minus(
-        common.table("drag | acts | mean of cells | typical | least to greatest | rise, fall | χ² between seeds", lines)
-    )
+        over = common.OverCells(one - two, np.hypot(one_error, two_error))
+        texts.append(f"{rate:g}/s {when} {over.chi2:.0f} of {len(over)}")
+    return ", ".join(texts)
 
 
 def tables() -> dict[str, str]:
-    """The tables of the page by their markers."""
-    always, partly = VARIANTS[2 : 2 + len(RATES)], VARIANTS[2 + len(RATES) :]
-    return {"doses": changes_table(always), "halves": changes_table(partly), "all doses": summary_table()}
+    """The table of the page by its marker."""
+    return {"all doses": summary_table()}
 
 
 def main(files: Annotated[list[Path] | None, typer.Argument()] = None) -> None:
     """Reduce files that are given, and write the tables."""
     if files:
         common.write_rows(RESULTS, reduced(files))
+    common.show({"doses": changes_table(VARIANTS[2:]), "χ² between seeds": between_seeds()})
     common.publish(FOLDER, tables())
 
 

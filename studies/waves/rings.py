@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from scipy.signal import hilbert
 
 import warpchain
-from studies.common import BLUE, GREEN, INK, RED, Array, minus, table, tidy
+from studies.common import BLUE, GREEN, INK, RED, Array, minus, show, table, tidy
 from studies.waves import dispersion
 from studies.waves.dispersion import LOWER_BACKWARD, LOWER_FORWARD, Waves
 from warpchain import Parameters, preset
@@ -124,36 +124,39 @@ def measured(angles: Array, waves: Waves) -> Array:
 
 
 def reach_table() -> str:
-    """How far waves of the straight chain under T = ρv² run [links], how fast they are in the room [m/s]; damping."""
+    """How far waves of the straight chain under T = ρv² run [links]; speeds of those of 12 links in the room [m/s]."""
     rows = []
     for frequency in FREQUENCIES:
         speed = speed_at(frequency)
         waves = dispersion.straight_waves(CHAIN, DENSITY * speed**2, 2 * np.pi / WAVELENGTHS)
-        room = speed + LENGTH * waves.group_speed[1:, BOTH]
-        c = dispersion.long_wave_speed(CHAIN, DENSITY * speed**2 + 1)
-        rows.append((frequency, speed, *waves.reach[:, LOWER_FORWARD], *room.T.ravel(), speed - c, speed + c))
-    head = "Hz | v | reach of 6 links | of 12 | of 24 | slow, 12 links | slow, 24 | fast, 12 | fast, 24"
-    damping = ", ".join(f"{each:.3g}" for each in waves.damping[:, LOWER_FORWARD])
-    text = table(f"{head} | slow, long, T_e = 1 N | fast, long", rows, "g .2f .1f .0f .0f" + 6 * " .2f")
-    return minus(f"{text}\n\nγ of waves of 6, 12 and 24 links: {damping} 1/s ({FREQUENCIES[-1]:g} Hz).")
+        room = speed + LENGTH * waves.group_speed[1, BOTH]
+        rows.append((frequency, speed, *waves.reach[:, LOWER_FORWARD], *room))
+    head = "Hz | v | reach of 6 links | of 12 | of 24 | slow | fast"
+    return table(head, rows, "g .2f .1f .0f .0f .2f .2f")
 
 
 def ring_table(speed: float, waves: Waves, found: Array) -> str:
     """Modes of the ring: exact, in simulation, and of the straight chain."""
-    spin, exact = dispersion.ring_spin(CHAIN, LINKS, speed), waves.rate[:, BOTH]
+    exact = waves.rate[:, BOTH]
     straight = dispersion.straight_waves(CHAIN, DENSITY * speed**2, waves.phase).rate[:, LOWER_FORWARD]
     both = np.stack([exact, found], axis=2).reshape(len(exact), 4)  # slow and fast, exact and simulated
     columns = *(-both.imag).T, -straight.imag, *(-both.real).T, -straight.real
     head = "n | links a wave | slow ω: exact | simulated | fast ω: exact | simulated | both, straight chain"
     head += " | slow γ: exact | simulated | fast γ: exact | simulated | straight chain"
     rows = zip(NUMBERS, LINKS / NUMBERS, *columns, strict=True)
+    return minus(table(head, rows, "d .1f" + 5 * " .2f" + 5 * " .3f"))
+
+
+def ring_text(speed: float, waves: Waves, found: Array) -> str:
+    """How far simulated modes of the ring are from theory, and how fast crests are in the room."""
+    spin, exact = dispersion.ring_spin(CHAIN, LINKS, speed), waves.rate[:, BOTH]
     off = [100 * np.abs(part(found) / part(exact) - 1).max() for part in (np.imag, np.real)]
     crests = 1 + waves.frequency[:, BOTH] / NUMBERS[:, None] / spin
     slow, fast = (f"{each.min():.2g} to {each.max():.2g} v" for each in crests.T)
-    text = (
-        f"Simulated and exact ω differ by {off[0]:.3f} % at most, γ by {off[1]:.2f} %. In the room slow crests move at "
+    return (
+        f"Simulated and exact frequencies differ by at most {off[0]:.3f} %, damping rates by at most {off[1]:.2f} %. "
+        f"In the laboratory frame slow crests move at {slow}, fast ones at {fast}."
     )
-    return f"{minus(table(head, rows, 'd .1f' + 5 * ' .2f' + 5 * ' .3f'))}\n\n{text}{slow}, fast ones at {fast}."
 
 
 def packets(links: int, number: int, width: float, speed: float) -> list[tuple[object, ...]]:
@@ -209,7 +212,8 @@ def tables_and_figure() -> tuple[dict[str, str], Figure]:
     angles = tapped(LINKS, speed, 0.1 * offset * np.exp(-(offset**2) / 4.5), INTERVAL * np.arange(400))
     waves = dispersion.ring_waves(CHAIN, LINKS, speed, NUMBERS)
     found, rows = measured(angles, waves), [row for packet in PACKETS for row in packets(*packet, speed)]
-    head = "links | links a wave |  | along the chain, m/s | theory | in the room, m/s | γ, 1/s | theory"
+    head = "links | links per wave |  | along the chain, m/s | theory | laboratory frame, m/s | γ, 1/s | theory"
     texts = minus(table(head, (row[:-2] for row in rows), "d .0f s .3f .3f .2f .3g .3g"))
-    tables = {"reach": reach_table(), "ring": ring_table(speed, waves, found), "packets": texts}
+    show({"modes of the ring": ring_table(speed, waves, found), "packets": texts})
+    tables = {"reach": reach_table(), "ring": ring_text(speed, waves, found)}
     return tables, draw(speed, waves, found, np.array([row[-2:] for row in rows]))

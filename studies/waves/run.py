@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 import warpchain
-from studies.common import minus, publish, table
+from studies.common import minus, publish, show, table
 from studies.waves import fields, rings
 from studies.waves.picture import waves_figure
 from studies.waves.wave_drag import inertia_of
@@ -44,7 +44,8 @@ def main() -> None:
     tables, dispersion = rings.tables_and_figure()
     scene = {"links": LINKS, "frequency": FREQUENCY, "start": "spinning", "walk_limit": 0.35}
     walk = warpchain.walk(preset="soft", **scene, record_loads=True, record_before=0.0, frame_interval=1e-4)
-    publish(FOLDER, tables | {"speeds": speeds_table(walk)}, {"dispersion": dispersion})
+    show({"speeds": speeds_table(walk)})
+    publish(FOLDER, tables, {"dispersion": dispersion})
     publish(FOLDER, {}, {"picture": waves_figure(walk, window=(0.0, 0.25))}, dpi=90)
 
 

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 import tarfile
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -26,42 +27,88 @@ def run(*command: str | Path, cwd: Path) -> str:
     return done.stdout
 
 
-@pytest.fixture(scope="module")
-def sdist(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The source distribution, made from the files under version control."""
+@pytest.fixture
+def tree(tmp_path: Path) -> Path:
+    """The files under version control, as a ZIP download gives them: a symbolic link is a file that holds its text."""
     pytest.importorskip("setuptools", minversion="77", reason="the extra `test` has it")
-    folder = tmp_path_factory.mktemp("sdist")
-    for name in tracked():
-        target = folder / "source" / name
-        target.parent.mkdir(parents=True, exist_ok=True)
-        if (ROOT / name).exists():
-            shutil.copy2(ROOT / name, target, follow_symlinks=False)
-    name = run(sys.executable, "-c", BUILD.format("sdist", str(folder)), cwd=folder / "source").split()[-1]
-    return folder / name
+    with zipfile.ZipFile(tmp_path / "tree.zip", "w") as archive:
+        for name in tracked():
+            if (path := ROOT / name).is_symlink():
+                archive.writestr(name, os.readlink(path))
+            elif path.exists():
+                archive.write(path, name)
+    shutil.unpack_archive(tmp_path / "tree.zip", tmp_path / "tree")
+    return tmp_path / "tree"
 
 
-@pytest.mark.slow
-def test_wheel_walks_outside_the_repository(sdist: Path, tmp_path: Path) -> None:
-    """A wheel made of the source distribution, alone in a fresh environment, shows its help and lets a chain walk."""
-    with tarfile.open(sdist) as archive:
-        archive.extractall(tmp_path, filter="data")
-    source = tmp_path / sdist.name.removesuffix(".tar.gz")
-    wheel = tmp_path / run(sys.executable, "-c", BUILD.format("wheel", str(tmp_path)), cwd=source).split()[-1]
-    environment = tmp_path / "environment"
-    run(sys.executable, "-m", "venv", "--without-pip", environment, cwd=tmp_path)
+def build(kind: str, source: Path) -> Path:
+    """Path of the distribution that the build back end makes of a source tree: of a "wheel", "editable" or "sdist"."""
+    folder = source.parent
+    return folder / run(sys.executable, "-c", BUILD.format(kind, str(folder)), cwd=source).split()[-1]
+
+
+def installed(wheel: Path, folder: Path) -> tuple[Path, Path]:
+    """Python and folder of packages of a fresh environment with this wheel in it."""
+    environment = folder / "environment"
+    run(sys.executable, "-m", "venv", "--without-pip", environment, cwd=folder)
     python = environment / "bin/python"
-    run(
-        sys.executable, "-m", "pip", "--python", python, "install", "-q", "--no-deps", "--no-index", wheel, cwd=tmp_path
-    )
+    words = ("install", "-q", "--no-deps", "--no-index", wheel)
+    run(sys.executable, "-m", "pip", "--python", python, *words, cwd=folder)
     packages = environment / "lib" / f"python{sys.version_info.major}.{sys.version_info.minor}" / "site-packages"
     # Dependencies come from the running environment. Its own links to the repository are no packages and stay behind.
     others = [path for path in sys.path if Path(path).name in ("site-packages", "dist-packages")]
     (packages / "dependencies.pth").write_text("\n".join(others) + "\n", encoding="utf-8")
+    return python, packages
+
+
+WALK = """
+import warpchain, warpchain.kernels as kernels
+from warpchain.sweeps.sweep_file import shipped_sweeps
+walk = warpchain.walk(links=30, frequency=5.0, preset="soft", start="ellipse", walk_limit=0.01)
+print(warpchain.__file__, kernels.__file__, walk.simulated_time, *shipped_sweeps())
+"""
+
+
+def has_everything(words: list[str], root: Path, kernels: Path) -> bool:
+    """Whether the output of `WALK` says that package and kernels come from these folders, and names all sweeps."""
+    package, of_kernels, time, *sweeps = words
+    expected = sorted(path.stem for path in (ROOT / "sweeps").iterdir())
+    homes = (Path(package), Path(of_kernels)) == (root / "warpchain/__init__.py", kernels / "__init__.py")
+    return homes and float(time) > 0 and sweeps == expected
+
+
+@pytest.mark.slow
+def test_a_zip_of_the_repository_installs_with_kernels_and_sweeps(tree: Path, tmp_path: Path) -> None:
+    """Editable, the package is the tree; as a wheel, it has the very files that a wheel of the sdist has."""
+    python, _ = installed(build("editable", tree), tmp_path)
+    assert has_everything(run(python, "-c", WALK, cwd=tmp_path).split(), tree, tree / "kernels")
+    with tarfile.open(sdist := build("sdist", tree)) as archive:
+        archive.extractall(tmp_path / "unpacked", filter="data")
+    again = build("wheel", tmp_path / "unpacked" / sdist.name.removesuffix(".tar.gz"))
+    names = [zipfile.ZipFile(wheel).namelist() for wheel in (build("wheel", tree), again)]
+    assert names[0] == names[1] and {"warpchain/shipped_sweeps/tilt.yaml", "warpchain/kernels/codes.py"} <= {*names[0]}
+
+
+def test_a_zip_of_the_repository_runs_without_an_installation(tree: Path, tmp_path: Path) -> None:
+    """Its folder on PYTHONPATH is enough, and no kernel is imported under a second name."""
+    others = [path for path in sys.path if Path(path).name in ("site-packages", "dist-packages")]
+    program = f"import sys\nsys.path[:0] = [{str(tree)!r}]\nsys.path += {others!r}\n{WALK}"
+    assert has_everything(run(sys.executable, "-I", "-S", "-c", program, cwd=tmp_path).split(), tree, tree / "kernels")
+    second = subprocess.run([sys.executable, "-c", "import kernels"], cwd=tree, capture_output=True, encoding="utf-8")
+    assert "import warpchain.kernels, not kernels" in second.stderr
+
+
+@pytest.mark.slow
+def test_wheel_walks_outside_the_repository(tree: Path, tmp_path: Path) -> None:
+    """A wheel made of the source distribution, alone in a fresh environment, shows its help and lets a chain walk."""
+    with tarfile.open(sdist := build("sdist", tree)) as archive:
+        archive.extractall(tmp_path, filter="data")
+    python, packages = installed(build("wheel", tmp_path / sdist.name.removesuffix(".tar.gz")), tmp_path)
     home = run(
         python, "-c", "import warpchain, warpchain.kernels as k; print(warpchain.__file__, k.__file__)", cwd=tmp_path
     )
     assert all(Path(path).is_relative_to(packages) for path in home.split())
-    command = environment / "bin/warpchain"
+    command = python.with_name("warpchain")
     assert "Usage" in run(command, "--help", cwd=tmp_path)
     words = "walk --start ellipse --links 10 --frequency 3 --preset soft --json"
     walk = json.loads(run(command, *words.split(), cwd=tmp_path))

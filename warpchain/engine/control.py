@@ -32,7 +32,7 @@ def control_of(options: Options) -> Control:
     control = Control()
     tolerance = options.tolerance if options.soft_tolerance is None else options.soft_tolerance
     for name, value in {**vars(options), "soft_tolerance": tolerance}.items():
-        if name in Control.vars:  # type: ignore[attr-defined]
+        if name in Control.vars:  # type: ignore[attr-defined, unused-ignore]
             setattr(control, name, value)
     control.proportional = int(options.controller == "pi")
     control.sample_interval = options.record_interval

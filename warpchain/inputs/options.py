@@ -1,4 +1,4 @@
-"""How a walk is computed: method, tolerances, limits, device."""
+"""The options of a walk: integrator, tolerances, softening, limits and device."""
 
 import re
 from collections.abc import Mapping
@@ -66,43 +66,43 @@ class Options(Section):
         + "; ".join(f"{name}: {title}" for name, title in METHODS.items()),
     )
     tolerance: float = number_field(1e-6, "1", **TOLERANCES)
-    """error allowed in a step, absolute (SI units) and relative; default of hybrid: 1e-4"""
+    """local error allowed in a step, absolute (SI units) and relative; the default of hybrid is 1e-4"""
     soft_tolerance: float | None = number_field(None, "1", **TOLERANCES)
-    """tolerance while soften_drive or soften_pile softens joints; null: as tolerance"""
+    """tolerance while soften_drive or soften_pile softens the joints; null: the same as tolerance"""
     flight_tolerance: float = number_field(1e-3, "1", **TOLERANCES)
-    """tolerance of hybrid between impulses, while joints are rigid"""
+    """tolerance of hybrid between impulses, while the joints are rigid"""
     controller: Literal["standard", "pi"] = "standard"
-    """rule for the next step: standard takes the error of the last step, pi those of the last two; hybrid takes one
-    while joints are rigid"""
+    """step-size controller: standard uses the last error (integral control), pi the last two (proportional–integral);
+    hybrid always uses integral control while the joints are rigid"""
     contact_step: float = number_field(2e-5, "s", gt=0)
-    """longest step near a contact; bounds how deep circles sink in before the contact is found"""
+    """longest step near a contact; it bounds the penetration before a contact is detected"""
     soft_contact_step: float = number_field(5e-5, "s", gt=0)
-    """longest step near a contact while joints are softened on the sprocket (soften_drive) or softest in the pile
-    (soften_pile); without effect if contact_step is longer"""
+    """longest step near a contact while joints are softened on the sprocket (soften_drive) or have their softest values
+    in the pile (soften_pile); it has no effect if contact_step is longer"""
     skin: float = number_field(2e-3, "m", gt=0)
-    """margin of the neighbour list, which is built anew when a joint has moved half of it"""
+    """margin of the neighbour list, which is rebuilt before a pair of links that it lacks can touch"""
     step_limit: Whole = number_field(2_000_000_000, "1", ge=1, le=10**15)
-    """most steps attempted in one walk"""
+    """largest number of attempted steps in one walk"""
     smallest_step: float = number_field(1e-12, "s", gt=0)
-    """the walk ends if a step must be shorter than this"""
+    """step size below which the walk ends as step_too_small"""
     self_contact: bool = True
-    """whether links of the chain can touch one another"""
+    """whether links of the chain collide with one another"""
     rest_speed: float = number_field(0.02, "m/s", gt=0)
-    """a chain is slow while its centre of mass and its links (rms) are both below this speed"""
+    """speed below which the centre of mass and the links (RMS) must both stay for the chain to count as slow"""
     rest_time: float = number_field(0.05, "s", gt=0)
-    """a chain that has been slow for this long is at rest"""
+    """time for which a chain must be slow to count as at rest"""
     record_interval: float = number_field(1e-3, "s", ge=1e-6)
-    """time between two samples of a walk"""
+    """time between two points of a walk's time series"""
     soften_pile: bool = False
-    """whether joints become soft when the walking loop has collapsed, and softest when it encloses less than half of
-    soften_area"""
+    """whether joints are softened once the walking loop encloses less than soften_area of its area at the release, and
+    get their softest values below half of that threshold"""
     soften_area: float = number_field(0.9, "1", gt=0, lt=1)
-    """a loop has collapsed when it encloses less than this fraction of its area at the release"""
+    """softening threshold of soften_pile: fraction of the loop's area at the release"""
     soften_drive: bool = False
-    """whether joints are softened on the sprocket: softest until it has spun up, then at least soft; within 0.03 s
-    after the release they return to their own values"""
+    """whether joints are softened on the sprocket: softest until it has spun up, then as soft as the loop's tension
+    allows; within 0.03 s after the release they regain their own values"""
     device: Annotated[str, AfterValidator(_supported_device)] = "cpu"
-    """where walks run: cpu, cuda (the first GPU) or cuda:N"""
+    """device that runs the walks: cpu, cuda (the first GPU) or cuda:N"""
 
     @model_validator(mode="before")
     @classmethod

@@ -78,13 +78,15 @@ class Parameters(Section):
     """
 
     link_length: float = _row("ℓ", "m", 1.268e-2, 1e-5, LENGTH, "distance between the two joints of a link")
-    sprocket_radius: float = _row("R", "m", 5.56e-2, 5e-4, LENGTH, "sprocket radius, see sprocket_radius_is")
+    sprocket_radius: float = _row(
+        "R", "m", 5.56e-2, 5e-4, LENGTH, "radius of the sprocket; sprocket_radius_is says which"
+    )
     inner_mass: float = _row("m_inner", "kg", 3.700e-3, 2e-6, MASS, "mass of an inner link")
     outer_mass: float = _row("m_outer", "kg", 3.147e-3, 2e-6, MASS, "mass of an outer link")
     inner_inertia: float = _row("I_inner", "kg m²", 1.69e-7, 1e-9, INERTIA, "moment of inertia of an inner link")
     outer_inertia: float = _row("I_outer", "kg m²", 1.292e-7, 9e-10, INERTIA, "moment of inertia of an outer link")
     viscous_friction: float = _row("β", "N m s", 9e-5, 1e-5, TORQUE, "joint torque per angular velocity")
-    coulomb_friction: float = _row("τ_c", "N m", 1.10e-4, 9e-6, TORQUE, "joint torque at speeds above ω_c")
+    coulomb_friction: float = _row("τ_c", "N m", 1.10e-4, 9e-6, TORQUE, "joint torque at angular velocities above ω_c")
     floor_restitution: float = _row("e_fc", "1", 0.018, 0.004, FRACTION, "normal restitution, floor and chain")
     floor_friction: float = _row("μ_fc", "1", 0.27, 0.02, FRICTION, "friction coefficient, floor and chain")
     gravity: float = _row("g", "m/s²", 9.809, 0.0, GRAVITY, "gravitational acceleration, along −y", "looked up")
@@ -104,9 +106,11 @@ class Parameters(Section):
     tangential_restitution: float = _row(
         "e_t", "1", 0.0, 0.0, SIGNED_FRACTION, "tangential restitution, all pairs", "adjusted"
     )
-    circle_radius: float = _row("r", "m", 4.2e-3, 0.0, LENGTH, "radius of the circle at a link end", "chosen here")
+    circle_radius: float = _row(
+        "r", "m", 4.2e-3, 0.0, LENGTH, "radius of the contact circle at a link end", "chosen here"
+    )
     """Not in the paper: between the roller (3.9 mm) and the plates (about 5 mm) of a half-inch chain."""
-    half_width: float = _row("h", "m", 4e-3, 0.0, WIDTH, "half width of a link, of a plane that tilts", "chosen here")
+    half_width: float = _row("h", "m", 4e-3, 0.0, WIDTH, "half width of a link (tilting plane only)", "chosen here")
     """Not in the paper: a half-inch chain is about 8 mm wide over its pins."""
 
     @model_validator(mode="after")

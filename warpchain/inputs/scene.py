@@ -1,4 +1,4 @@
-"""What happens in a walk: how long the chain is, how fast it is spun, from which height it is released."""
+"""The fields of a scene: the chain's length, how it is spun and released, the floor, and when a walk ends."""
 
 import math
 from typing import Annotated, Final, Literal, Self
@@ -44,86 +44,90 @@ class Scene(Section):
     """What happens in one walk, from hanging on the sprocket to the end."""
 
     links: Whole = number_field(60, "1", symbol="n", ge=4, le=MOST_LINKS)
-    """number of links around the loop, even where inner and outer links alternate"""
+    """number of links of the closed chain; must be even if inner and outer links alternate"""
     frequency: float = number_field(15.0, "Hz", symbol="ν", ge=0, le=300.0)  # more is in turns a minute
-    """turns of the sprocket per second at the release"""
+    """frequency of the sprocket at the release, in revolutions per second"""
     start: Literal["rest", "spinning", "ellipse"] = "rest"
-    """at rest on the sprocket, circulating on it, or a circulating ellipse without sprocket"""
+    """initial state: at rest on the sprocket, already circulating on it, or a circulating ellipse without a sprocket"""
     phase: float = number_field(0.0, "1", ge=0, lt=1)
-    """moment of the release as a fraction of a loop period"""
+    """moment of the release, as a fraction of a loop period"""
     clearance: float = number_field(0.01, "m", ge=0, le=HIGHEST)
-    """height of the lowest circle above the floor, of the chain that clearance_of names"""
+    """height of the lowest contact circle above the floor; clearance_of says of which chain"""
     clearance_of: Literal["spinning", "hanging"] = "spinning"
-    """the chain that clearance is measured at: spinning at the release, or hanging at rest; neither starts in a wall"""
+    """whether clearance refers to the spinning chain at the release, or to the chain that hangs at rest"""
     sprocket_radius_is: Literal["contact", "pitch"] = "contact"
-    """what sprocket_radius measures: where circles touch (contact) or joints ride (pitch)"""
+    """whether sprocket_radius is that of the contact surface, or that of the pitch circle on which the joints ride"""
     ellipse_aspect: float = number_field(1.5, "1", ge=0.05, le=20)
-    """height over width of the starting ellipse"""
+    """aspect ratio of the initial ellipse: its height divided by its width"""
     settle_time: float | None = number_field(None, "s", ge=0, le=LONGEST)
-    """time for the chain to settle on the sprocket at rest; null: 0.1, or 2 if the clearance is that of the hanging
+    """time for which the chain settles on the sprocket at rest; null: 0.1, or 2 if the clearance is that of the hanging
     chain"""
     spin_up_time: float = number_field(0.3, "s", gt=0, le=LONGEST)
-    """time in which the sprocket reaches its frequency"""
+    """time in which the sprocket accelerates smoothly to its frequency"""
     load_factor: float | None = number_field(None, "1", ge=1, le=1e4)  # some hundred make joints stretch
-    """by which gravity, joint friction and rotary inertia are multiplied while the loop becomes stationary; null: as
-    many times as suits the chain, at most 50; 1: not at all"""
+    """factor by which gravity, joint friction and rotary inertia are scaled up while the loop settles; null: automatic,
+    at most 50; 1: no scaling"""
     steady_time: float | None = number_field(None, "s", ge=0, le=LONGEST)
-    """the loop is steady once it has kept shape and speed under its own loads for this long; null: a loop period or, if
-    its loads were never multiplied, as long as slow waves need to cross it"""
+    """time for which the loop must keep its shape and speed, under unscaled loads, to count as steady; null: one loop
+    period or, if the loads were never scaled, the time that slow waves need to cross the loop"""
     steady_tolerance: float = number_field(0.01, "1", gt=0, le=1)
-    """change of the loop's height, width and place, relative to height or width, that counts as kept"""
+    """largest relative change of the loop's height, width and horizontal position that counts as steady"""
     further_hold: float = number_field(0.0, "s", ge=0, le=LONGEST)
-    """time for which a loop that is steady is held on before its release"""
+    """time for which a steady loop is held longer before its release"""
     hold_limit: float = number_field(30.0, "s", gt=0, le=LONGEST)
-    """longest time at full frequency to become steady; then the walk ends as not_steady"""
+    """longest hold at full frequency; a loop that is not steady by then ends the walk as not_steady"""
     walk_limit: float = number_field(20.0, "s", gt=0, le=LONGEST)
-    """longest time from the release to rest; then the walk ends as time_limit"""
+    """longest time from the release to rest; a chain that still moves then ends the walk as time_limit"""
     release: Annotated[Rows | None, _COMPOUND] = None
-    """motion of the sprocket after the release: rows [time in s, x and y in m from its place, frequency in Hz]; it
-    vanishes after the last, or at once (null); what sinks too deep presses the chain into the floor"""
+    """motion of the sprocket after the release, as rows [time in s, x and y in m from its first position, frequency in
+    Hz]; the sprocket is removed after the last row, or at the release if null"""
     floor: Annotated[FloorField, _COMPOUND] = "flat"
-    """flat, or a profile [[x, y], …] in m, whose ends go on straight; [x, y, e, μ] gives the line from there its own e
-    and μ"""
+    """flat, or a profile of points [[x, y], …] in m whose first and last segments extend to infinity; a point
+    [x, y, e, μ] gives the segment that starts there its own restitution and friction"""
     slope: float = number_field(0.0, "°", ge=-STEEPEST, le=STEEPEST)
-    """of an endless floor; positive: it falls the way the chain walks"""
+    """inclination of the infinite floor; positive slopes descend in the walking direction"""
     distance_limit: float | None = number_field(None, "m", gt=0, le=HIGHEST)
-    """distance along the floor, from x = 0 on, at which a walk ends as distance_limit; null: none"""
+    """distance along the floor from x = 0 at which a walk ends as distance_limit; null: no limit"""
     walk_until: float | None = number_field(None, "s", gt=0, le=LONGEST)
-    """time from the release after which a walk that is not at rest is finished, as planned, without Δx; null: none"""
+    """time after the release at which a walk that is not at rest ends, as planned, as finished and without Δx; null:
+    no such time"""
     plane: Literal["fixed", "tilting"] = "fixed"
-    """whether the chain stays in an upright plane, or walks in one that moves, turns and may fall over"""
+    """whether the plane of the chain stays upright, or can move sideways, turn and fall over"""
     lateral_speed: float = number_field(0.0, "m/s", ge=-FASTEST_TAP, le=FASTEST_TAP)
-    """of the centre of mass at the release, across a plane that tilts; positive to the right of the way it walks"""
+    """sideways speed of the centre of mass at the release (tilting plane only); positive to the right of the walking
+    direction"""
     tilt: float = number_field(0.0, "rad", ge=-RIGHT_ANGLE, le=RIGHT_ANGLE)
-    """of a tilting plane at the release, about the way it walks; positive: its top leans to the left"""
+    """tilt angle of the plane at the release, about the walking direction (tilting plane only); positive: the top leans
+    to the left"""
     tilt_rate: float = number_field(0.0, "rad/s", ge=-FASTEST_TAP, le=FASTEST_TAP)
-    """rate of tilt of a tilting plane at the release"""
+    """rate of change of the tilt angle at the release (tilting plane only)"""
     yaw_rate: float = number_field(0.0, "rad/s", ge=-FASTEST_TAP, le=FASTEST_TAP)
-    """rate at which a tilting plane turns about its upright axis at the release, anticlockwise from above"""
+    """rate at which the plane turns about its upright axis at the release (tilting plane only); positive: anticlockwise
+    from above"""
     charm_link: Whole = number_field(0, "1", ge=0, le=MOST_LINKS - 1)
-    """link that carries a charm"""
+    """index of the link that carries an added point mass, a charm"""
     charm_mass: float = number_field(0.0, "kg", ge=0, le=1e6)
-    """mass at the centre of charm_link, added to its own"""
+    """mass of the charm, added at the centre of charm_link"""
     charm_inertia: float = number_field(0.0, "kg m²", ge=0, le=1e12)
-    """moment of inertia of the charm about that centre, added likewise"""
+    """moment of inertia of the charm about that centre"""
     charm_radius: float | None = number_field(None, "m", gt=0, le=1e3)
-    """radius of circles of charm_link; null: its own"""
+    """radius of the contact circles of charm_link; null: unchanged"""
     stiff_joint: Whole = number_field(0, "1", ge=0, le=MOST_LINKS - 1)
-    """joint that is stiff: the one at the end of this link"""
+    """index of the link at whose end the joint with changed friction is"""
     stiff_joint_factor: float = number_field(1.0, "1", ge=0, le=1e6)
-    """by which viscous and Coulomb friction of stiff_joint are multiplied"""
+    """factor applied to the viscous and Coulomb friction of stiff_joint; its stiffness does not change"""
     mass_gradient: float = number_field(0.0, "1", gt=-1, lt=1)
-    """mass and inertia of links grow evenly along the chain, from 1 − this times their own to 1 + this times"""
+    """relative change of mass and inertia along the chain, linear from 1 − this to 1 + this times their own values"""
     link_masses: _Numbers = number_field(None, "kg")
-    """mass of each link; null: of its kind"""
+    """mass of each link; null: that of inner and outer links"""
     link_inertias: _Numbers = number_field(None, "kg m²")
-    """moment of inertia of each link; null: of its kind"""
+    """moment of inertia of each link; null: that of inner and outer links"""
     viscous_frictions: _Numbers = number_field(None, "N m s")
-    """viscous_friction of each joint; null: the same for all"""
+    """viscous friction of each joint; null: viscous_friction for all"""
     coulomb_frictions: _Numbers = number_field(None, "N m")
-    """coulomb_friction of each joint; null: the same for all"""
+    """Coulomb friction of each joint; null: coulomb_friction for all"""
     link_radii: _Numbers = number_field(None, "m")
-    """radius of circles of each link; null: circle_radius"""
+    """radius of the contact circles of each link; null: circle_radius for all"""
 
     @property
     def is_level(self) -> bool:

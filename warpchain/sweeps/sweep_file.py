@@ -41,8 +41,9 @@ _Preset = Literal[*PRESETS]  # type: ignore[valid-type]
 _Sampler = Literal[*SAMPLERS]  # type: ignore[valid-type]
 
 _PACKAGE: Final = Path(__file__).parents[1]
-_SHIPPED: Final = _PACKAGE / "shipped_sweeps"
-"""In a checkout a link to sweeps/."""
+_INSTALLED: Final = _PACKAGE / "shipped_sweeps"
+_SHIPPED: Final = _INSTALLED if _INSTALLED.is_dir() else _PACKAGE.parent / "sweeps"
+"""Folder of the shipped sweeps: in the package where it is installed, beside the package in a checkout."""
 
 # Fields by name or symbol
 
