@@ -123,7 +123,7 @@ class Walker:
             watch(progress)
             if film.size > MOST_NUMBERS:
                 raise InputError("scene.walk_limit: the walk is too long for a live page; give less, such as 10")
-            send({"phase": progress.phase, "time": progress.time, **film.message(progress)})
+            send({"phase": progress.phase, **film.message(progress)})
 
         walk = self.walk(asked, show, {"frame_interval": INTERVAL, "record_before": 0.0})
         kicks = [change_of_velocity(setup, link, impulse) for _, link, *impulse in asked.get("push", [])]

@@ -37,9 +37,7 @@ let arrow = null, stroke = null; // what the mouse draws: a push, or a floor
 let asking = null, sampling = null; // what can be aborted
 
 // Texts
-
 const unitOf = name => about.fields[name]?.unit ?? "";
-const number = (value, digits = 3) => (value === null ? "unknown" : String(Number(value.toPrecision(digits))));
 const written = value => (typeof value === "string" ? value : JSON.stringify(value));
 const read = text => { try { return JSON.parse(text); } catch { return text; } };
 const isStairs = floor => written(floor) === written(about.stairs);
@@ -48,7 +46,6 @@ const described = given => Object.entries(given)
   .map(([name, value]) => `${name} = ${name === "floor" ? shapeOf(value) : written(value)}`).join(", ");
 
 // The address
-
 function readAddress() {
   const parts = [...new URLSearchParams(location.hash.slice(1))].map(([name, text]) => [name, read(text)]);
   const { A = null, ...given } = Object.fromEntries(parts);
@@ -62,7 +59,6 @@ function writeAddress() {
 }
 
 // The server
-
 // Ask for something, and take each message, one a line; a refusal is an error, and so is an end before the end.
 async function ask(path, content, { signal }, take) {
   const headers = { "Content-Type": "application/json", "X-Token": token };
@@ -98,23 +94,19 @@ function refuse(error) {
 function shownBy(stage, tell, note) {
   const asked = performance.now();
   let hasBegun = false;
-  return ({ phase, time, first, more, whole, end }) => {
-    if (first) {
+  return ({ phase, first, more, whole, end }) => {
+    const begun = first ? { ...first, isWhole: false } : hasBegun ? null : whole;
+    if (begun) {
       hasBegun = true;
-      stage.load({ ...first, isWhole: false });
-      stage.delay = performance.now() - asked;
-    }
-    if (more) stage.append(more);
-    if (phase) note(phase, time);
-    if (!end) return;
-    if (whole && !hasBegun) {
-      stage.load(whole);
+      stage.load(begun);
       stage.delay = performance.now() - asked;
     } else if (whole) {
       const { time: _, joints: __, center: ___, ...scenery } = whole;
       stage.append({ ...scenery, isWhole: true });
     }
-    tell(end);
+    if (more) stage.append(more);
+    if (phase) note(phase);
+    if (end) tell(end);
   };
 }
 
@@ -127,9 +119,10 @@ function start(kept = null) {
   if (player.walk) player.walk.isWhole = true; // it gets no more frames
   writeAddress();
   showSamples();
-  const note = (phase, time) => {
+  const note = phase => {
     const loading = "Kernels are being loaded; the first time they are compiled, which takes up to a minute.";
-    $("said").textContent = phase === "compile" ? loading : `Computing: ${phase}, ${number(time)} s`;
+    const text = phase === "compile" ? loading : `Computing: ${phase} …`;
+    if ($("said").textContent !== text) $("said").textContent = text; // it is read aloud
   };
   ask("/walk", setup, asking, shownBy(player, tell, note)).catch(refuse);
 }
@@ -165,7 +158,6 @@ function tell(end) {
 }
 
 // Controls
-
 function change(name, value) {
   if (value === null || value === "") delete setup[name];
   else setup[name] = value;
@@ -222,17 +214,16 @@ function shapes() {
     $("stage").classList.add("grab");
     $("said").textContent = "Drag over the picture: the line becomes the floor.";
   };
-  const options = ["flat", "stairs", "drawn"].map(word => new Option(word));
-  const shape = make("select", { id: "shape", ariaLabel: "shape of the floor" }, ...options);
-  shape.onchange = () => {
-    if (shape.value === "drawn") draw.onclick();
-    else change("floor", shape.value === "flat" ? null : about.stairs);
+  const onchange = ({ target: { value } }) => {
+    if (value === "drawn") draw.onclick();
+    else change("floor", value === "flat" ? null : about.stairs);
   };
+  const options = ["flat", "stairs", "drawn"].map(word => new Option(word));
+  const shape = make("select", { id: "shape", ariaLabel: "shape of the floor", onchange }, ...options);
   return [shape, draw];
 }
 
 // The mouse on the picture: it pushes a link of a paused walk, or draws a floor
-
 function middle(joints, link) {
   const one = 2 * link, before = (one + joints.length - 2) % joints.length;
   return [(joints[one] + joints[before]) / 2, (joints[one + 1] + joints[before + 1]) / 2];
@@ -240,7 +231,8 @@ function middle(joints, link) {
 
 function linkAt([x, y]) {
   const joints = player.walk.joints[player.frame];
-  const apart = ([u, v]) => Math.hypot(u - x, v - y), far = player.walk.radii.map((_, link) => apart(middle(joints, link)));
+  const apart = ([u, v]) => Math.hypot(u - x, v - y);
+  const far = player.walk.radii.map((_, link) => apart(middle(joints, link)));
   const link = far.indexOf(Math.min(...far));
   return far[link] < NEAR ? { link, from: middle(joints, link), to: [x, y] } : null;
 }
@@ -267,8 +259,8 @@ function useMouse(canvas) {
     if (stroke) stroke.push(player.place(event));
     else if (player.playing) player.toggle(false);
     else arrow = linkAt(player.place(event));
-    if (arrow) $("push-link").value = arrow.link;
     if (!stroke && !arrow) return;
+    if (arrow) $("push-link").value = arrow.link;
     canvas.setPointerCapture(event.pointerId);
     event.preventDefault();
   };
@@ -321,7 +313,6 @@ player.shown = moment => {
 };
 
 // Samples: walks of the same seeds for each side
-
 async function more() {
   const sides = [setup, ...(sideA ? [sideA] : [])].map(({ seed: _, push: __, ...given }) => given);
   const first = Math.max(-1, ...samples.map(each => each.seed)) + 1, count = 12, mine = new AbortController();
@@ -337,11 +328,6 @@ async function more() {
   }).catch(refuse);
   if (sampling === mine) isBusy(false);
 }
-
-const mean = list => list.reduce((sum, each) => sum + each, 0) / list.length;
-const spread = list => Math.sqrt(list.reduce((sum, each) => sum + (each - mean(list)) ** 2, 0) / (list.length - 1));
-const errorOf = list => (list.length < 2 ? 0 : spread(list) / Math.sqrt(list.length));
-const average = list => (list.length < 2 ? "…" : `${number(mean(list), 4)} ± ${number(errorOf(list), 2)} m`);
 
 function showSamples() {
   const sides = (sideA ? [1, 0] : [0]).map(side => samples.filter(each => each.side === side));
@@ -360,70 +346,7 @@ function showSamples() {
   player.draw();
 }
 
-const node = (tag, attributes, ...children) => {
-  const element = document.createElementNS("http://www.w3.org/2000/svg", tag);
-  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
-  element.append(...children);
-  return element;
-};
-const label = (x, y, anchor, text) => node("text", { x, y, "text-anchor": anchor }, text);
-
-// Histograms of several lists of numbers, and above them their means with standard errors.
-function bars(lists) {
-  const low = Math.min(...lists.flat()), wide = (Math.max(...lists.flat()) - low || 1e-3) / 15;
-  const counts = lists.map(() => Array(16).fill(0)), width = 36 / lists.length, parts = [];
-  lists.forEach((list, side) => list.forEach(dx => counts[side][Math.floor((dx - low) / wide)]++));
-  const most = Math.max(...counts.flat()), at = dx => 40 * (dx - low) / wide;
-  lists.forEach((list, side) => {
-    const fill = `var(--${lists.length > 1 && side === 0 ? "red" : "blue"})`;
-    counts[side].forEach((count, i) => {
-      const height = 70 * count / most;
-      parts.push(node("rect", { x: 40 * i + width * side, y: 80 - height, width, height, fill }));
-    });
-    const error = Math.max(errorOf(list), wide / 20), x = at(mean(list) - error);
-    if (list.length) parts.push(node("rect", { x, y: 3, width: 80 * error / wide, height: 4, fill }));
-  });
-  const marks = [label(0, 96, "start", number(low) + " m"), label(640, 96, "end", number(low + 16 * wide) + " m")];
-  const about = { viewBox: "0 0 640 100", role: "img", "aria-label": "Histogram of the distance walked" };
-  return [node("svg", about, ...parts, ...marks)];
-}
-
-// A block of a sweep: a point for each cell, along the axis with the most values
-
-function sweepFigure({ name, axes, units, cells }) {
-  const sizes = axes.map((_, i) => new Set(cells.map(cell => cell.at[i])).size), lines = new Map();
-  const along = sizes.indexOf(Math.max(...sizes)), xOf = cell => Number(cell.at[along]) || 0;
-  const [left, right] = [Math.min, Math.max].map(end => end(...cells.map(xOf)));
-  const top = Math.max(...cells.map(cell => cell.mean));
-  const place = cell => [50 + 560 * (xOf(cell) - left) / (right - left || 1), 280 - 250 * cell.mean / (top || 1)];
-  const said = cell => axes.map((axis, i) => `${axis} = ${cell.at[i]} ${units[i]}`.trim());
-  for (const cell of cells) {
-    const key = said(cell).filter((_, i) => i !== along).join(", ");
-    lines.set(key, [...(lines.get(key) ?? []), cell]);
-  }
-  const point = cell => {
-    const text = `${said(cell).join(", ")}: Δx = ${number(cell.mean)} ± ${number(cell.error, 2)} m`;
-    const [cx, cy] = place(cell), named = { tabindex: 0, role: "button", "aria-label": text };
-    const title = node("title", {}, text + "; each click walks the next sample");
-    const circle = node("circle", { cx, cy, r: 6, fill: "var(--blue)", ...named }, title);
-    let next = 0;
-    circle.onclick = () => { setup = { index: cell.walks[next++ % cell.walks.length] }; start(); };
-    circle.onkeydown = event => { if (event.key === "Enter") circle.onclick(); };
-    return circle;
-  };
-  const parts = [...lines].flatMap(([key, list]) => [
-    node("polyline", { points: list.map(place).join(" "), fill: "none", stroke: "var(--faint)" }),
-    label(place(list.at(-1))[0], place(list.at(-1))[1] - 9, "end", key),
-    ...list.map(point),
-  ]);
-  const unit = units[along] ?? "", title = label(330, 314, "middle", axes[along] ?? "");
-  const marks = [label(50, 298, "start", `${left} ${unit}`), label(610, 298, "end", `${right} ${unit}`), title];
-  const about = { viewBox: "0 0 640 320", role: "group", "aria-label": `${name}: mean distance` };
-  return node("svg", about, ...parts, ...marks, label(50, 14, "start", `mean Δx, up to ${number(top)} m`));
-}
-
 // A page without a server: walks that it brings along
-
 async function unpacked(id) {
   const bytes = Uint8Array.from(atob($(id).textContent), letter => letter.charCodeAt(0));
   const walk = await new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).json();
@@ -462,7 +385,8 @@ function buildLive() {
   };
   $("push-undo").onclick = () => { if (setup.push?.pop() && !setup.push.length) delete setup.push; start(); };
   window.onhashchange = () => { readAddress(); startA(); start(); };
-  $("sweep").append(...(about.sweep ?? []).map(sweepFigure));
+  const choose = index => { setup = { index }; start(); };
+  $("sweep").append(...(about.sweep ?? []).map(block => sweepFigure(block, choose)));
   useMouse($("stage"));
   buildControls();
   readAddress();

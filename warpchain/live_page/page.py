@@ -11,6 +11,7 @@ from warpchain.inputs.parameters import preset
 from warpchain.inputs.scene import Scene
 from warpchain.inputs.validation import FIELDS, json_value
 from warpchain.pictures.labels import unit_text
+from warpchain.pictures.player import PLAYER
 
 if TYPE_CHECKING:
     from warpchain.store.sweep_result import SweepResult
@@ -23,7 +24,6 @@ STAIRS: Final = [[-1.0, 0.0], *([x, round(y, 2)] for edge in _EDGES for x, y in 
 MOST_CELLS: Final = 2000
 """Most cells of a block of a sweep on the page."""
 _HERE: Final = Path(__file__).parent
-_PLAYER: Final = _HERE.parent / "pictures/player.js"
 
 
 def live_page(sweep: "SweepResult | None" = None, walks: dict[str, Any] | None = None, data: str = "") -> str:
@@ -35,8 +35,8 @@ def live_page(sweep: "SweepResult | None" = None, walks: dict[str, Any] | None =
     }
     about = {"fields": fields, "first": FIRST, "stairs": STAIRS, "walks": walks}
     about |= {"sweep": None if sweep is None else sweep_points(sweep)}
-    parts = {name: (_HERE / f"live.{name}").read_text(encoding="utf-8") for name in ("css", "js")}
-    parts["player"] = _PLAYER.read_text(encoding="utf-8")
+    files = {"css": _HERE / "live.css", "js": _HERE / "live.js", "figures": _HERE / "live_figures.js", "player": PLAYER}
+    parts = {name: path.read_text(encoding="utf-8") for name, path in files.items()}
     parts["about"] = json.dumps(json_value(about), allow_nan=False, ensure_ascii=False).replace("<", "\\u003c")
     parts["data"] = data
     template = (_HERE / "live.html").read_text(encoding="utf-8")
