@@ -9,6 +9,7 @@ import hmac
 import json
 import secrets
 import select
+import socket
 import threading
 from collections.abc import Callable
 from contextlib import suppress
@@ -211,7 +212,7 @@ class _Handler(BaseHTTPRequestHandler):
         """Whether the client has closed the connection, or the server is being closed."""
         readable, _, _ = select.select([self.connection], [], [], 0)
         with suppress(OSError):
-            return self.server.closing.is_set() or bool(readable and not self.connection.recv(1, 2))  # 2: MSG_PEEK
+            return self.server.closing.is_set() or bool(readable and not self.connection.recv(1, socket.MSG_PEEK))
         return True
 
 
