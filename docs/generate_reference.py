@@ -25,7 +25,7 @@ from warpchain.sweeps.designs import SAMPLERS
 from warpchain.sweeps.recording import FRAME_INTERVAL, SERIES_INTERVAL, Frames
 from warpchain.sweeps.sweep_file import BlockKeys, BlockOfFile, SweepFile
 from warpchain.walks.rows import COLUMNS
-from warpchain.walks.walk_result import STORED
+from warpchain.walks.walk_numbers import STORED
 
 FOLDER = Path(__file__).parent / "reference"
 NOTE = "<!-- Written by docs/generate_reference.py; change the code, then run that script. -->\n"
@@ -33,8 +33,8 @@ JSON = "--json"  # An option of most commands, which is explained once
 
 SAMPLER_MEANINGS = {
     "random": "independent samples",
-    "sobol": "scrambled Sobol' sequence; a power of two of samples",
-    "latin_hypercube": "latin hypercube",
+    "sobol": "scrambled Sobol' sequences; a power of two of samples",
+    "latin_hypercube": "latin hypercubes",
     "saltelli": "points for Sobol indices: each sample of d drawn quantities takes d + 2 walks; a power of two of "
     "samples",
 }

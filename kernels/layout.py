@@ -12,23 +12,18 @@ COSINE, SINE = 6, 7
 # Constants of the links, under their present loads; friction of the joints, β [N m s] and τ_c [N m]; radius of the
 # links' circles [m].
 MASS, INERTIA, INVERSE_MASS, INVERSE_INERTIA, VISCOUS, COULOMB, RADIUS = range(8, 15)
-# A stage: link ends, arm, spin. Rows of left ends and of the spin are padded: column n repeats column 0.
+# Link ends. Rows of left ends are padded: column n repeats column 0.
 LEFT_X, LEFT_Y, RIGHT_X, RIGHT_Y = range(15, 19)
-LEFT_U, LEFT_V, RIGHT_U, RIGHT_V = range(19, 23)
-STAGE_ARM_X, STAGE_ARM_Y, STAGE_SPIN = 23, 24, 25
-# A finished attempt: candidate state and its error ratio.
-NEW_X, NEW_Y, NEW_THETA, NEW_U, NEW_V, NEW_OMEGA = range(26, 32)
-ERROR = 32
-# Joint forces and torques, shifted by one: column i + 1 is joint i, column 0 repeats column n. They lie at least three
-# rows from the stage rows they are computed from. Closer, clang allows for a load that waits for the store of an
-# earlier column, and vectorises by 2 instead of 8.
-FORCE_X, FORCE_Y, TORQUE = 33, 34, 35
 # Energy [J] lost so far: per joint to friction and damping, per link to floor or sprocket.
-LOST_FRICTION, LOST_DAMPING, LOST_FIXED = 36, 37, 38
+LOST_FRICTION, LOST_DAMPING, LOST_FIXED = range(19, 22)
 # Joint positions when the neighbour list was built.
-LISTED_X, LISTED_Y = 39, 40
-# Per stage, in this order: accelerations of x, y, θ, and the power [W] lost in each joint to friction and damping.
-STAGES = 41
+LISTED_X, LISTED_Y = 22, 23
+# Of links: gap to the floor or sprocket [m]; terms of sums, if the plane of the chain tilts.
+GAP, SUMS = 24, 25
+SCRATCH_ROWS = 30
+"""Rows of a chain's scratch on a CPU, without those of stages, see :mod:`cpu.stage_rows`, and of flights."""
+
+# Of a stage on a GPU: accelerations of x, y, θ, and the power [W] lost in each joint to friction and damping.
 STAGE_ROWS = 5
 
 # Model.links: what links and joints have of their own, one after the other as in a chain's parameters.
@@ -40,7 +35,7 @@ LINK_ROWS = 5
 # more cache for register spills.
 BOARD_LOST_SELF, BOARD_LOST_FRICTION, BOARD_LOST_DAMPING, BOARD_LOST_FIXED = range(19, 23)
 BOARD_LISTED_X, BOARD_LISTED_Y = 23, 24
-# First stage of the next step: accelerations, then the two powers (see STAGES).
+# First stage of the next step, see STAGE_ROWS.
 BOARD_FIRST = 25
 # Values of the whole chain, in the first columns of one more row; behind them its constants, see gpu.stage.constants.
 BOARD_VALUES = 30
@@ -139,16 +134,11 @@ def consecutive_offsets(start: int = 0, /, **sizes: int) -> dict[str, int]:
     return offsets | {"size": start + sum(sizes.values())}
 
 
-def scratch_rows(stages: int) -> int:
-    """Rows of a chain's scratch on a CPU, for an explicit method with this many stages.
-
-    At least those of four stages: between attempts their rows hold terms of sums, if the plane of the chain tilts.
-    """
-    return STAGES + STAGE_ROWS * max(stages, 4)
-
-
 LANES = 8
-"""Columns that a CPU's vector holds. Loops over links go to the end of the last vector, and read a column beyond it."""
+"""Doubles that a CPU's vector holds, and half as many as of its single-precision numbers.
+
+Loops over links go to the end of the last vector, and read a column beyond it.
+"""
 
 
 def padded_width(link_count: int) -> int:

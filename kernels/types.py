@@ -113,7 +113,8 @@ class State:
     stop_time: wp.array(dtype=wp.float64)  # the run ends at exactly this time [s]
     stop_status: wp.array(dtype=wp.int32)  # status of a run that ends there
     is_fresh: wp.array(dtype=wp.int32)  # 1: the host has set the links, and the scratch is void
-    has_first_stage: wp.array(dtype=wp.int32)  # 1: the scratch holds the first stage of the next step
+    # 1: the scratch holds the first stage of the next step; on a CPU 2: and its rounded state, see :mod:`cpu.joints`
+    has_first_stage: wp.array(dtype=wp.int32)
     gap: wp.array(dtype=wp.float64)  # CPU: least distance to floor or sprocket [m]
     time_to_contact: wp.array(dtype=wp.float64)  # GPU: longest step that cannot miss a contact [s]
     slack: wp.array(dtype=wp.float64)  # CPU: how far joints may move before the neighbour list is stale [m]

@@ -143,9 +143,16 @@ def tidy(axes: Axes, title: str = "", grid: Literal["x", "y", "both"] | None = N
 
 
 def error_line(axes: Axes, x: Any, cells: Any, place: tuple[Any, ...], **style: Any) -> None:
-    """Mean Δx with its standard error of some cells of a block's `statistics()`, as a thin line with dots."""
+    """Mean Δx with its standard error of some cells of a block's `statistics()`, as a thin line with dots.
+
+    Means of survivors have open dots, and triangles stand at lower bounds of the means of all walks.
+    """
     style = {"linewidth": 1.2, "marker": "o", "markersize": 3} | style
-    axes.errorbar(x, cells.mean[place], cells.standard_error[place], **style)
+    line = axes.errorbar(x, cells.mean[place], cells.standard_error[place], **style).lines[0]
+    look: dict[str, Any] = {"linestyle": "", "color": line.get_color(), "markerfacecolor": "white", "zorder": 3}
+    bounds = cells.at_least[place]
+    for marker, y, chosen in (("o", cells.mean[place], cells.of_survivors[place]), ("^", bounds, np.isfinite(bounds))):
+        axes.plot(np.asarray(x)[chosen], y[chosen], marker=marker, markersize=4, **look)
 
 
 def read_columns(path: Path) -> dict[str, Array]:

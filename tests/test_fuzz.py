@@ -18,14 +18,14 @@ from hypothesis import strategies as st
 
 from tests.support.setups import setup_walk
 from tests.support.sweep_content import blocks, content
+from warpchain.chain.resolution import resolve
 from warpchain.cli.main import main
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
 from warpchain.inputs.scene import Scene
-from warpchain.inputs.setup import resolve
 from warpchain.inputs.validation import FIELDS, LONGEST_LINE, NAME_OF_SYMBOL, InputError
+from warpchain.results import one_walk
 from warpchain.sweeps.plan import load_sweep
-from warpchain.walks import one_walk
 
 SECONDS = 5.0
 """Most processor time of an input."""

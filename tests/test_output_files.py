@@ -11,7 +11,7 @@ import pytest
 from tests.support.made_walks import make_walk
 from tests.support.synthetic_sweep import run
 from warpchain.files import NotReplaceable, given_path, replacing, write_whole
-from warpchain.store.sweep_result import merge
+from warpchain.results.sweep_result import merge
 
 
 def parts(folder: Path) -> list[str]:

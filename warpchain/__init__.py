@@ -42,21 +42,21 @@ from warpchain import version as _version
 
 if TYPE_CHECKING:
     from warpchain import films as films
+    from warpchain.chain.setup import State as State
     from warpchain.inputs.parameters import Parameters as Parameters
     from warpchain.inputs.parameters import preset as preset
-    from warpchain.inputs.state import State as State
     from warpchain.inputs.validation import InputError as InputError
     from warpchain.live_page.server import live as live
+    from warpchain.results.sweep_result import SweepResult as SweepResult
+    from warpchain.results.sweep_result import load as load
+    from warpchain.results.walk_result import WalkResult as WalkResult
+    from warpchain.results.walk_result import load_walk as load_walk
     from warpchain.run.simulation import Chains as Chains
     from warpchain.run.simulation import Trajectory as Trajectory
     from warpchain.run.simulation import simulate as simulate
     from warpchain.run.single_walk import walk as walk
     from warpchain.run.sweep_run import sweep as sweep
     from warpchain.status import Status as Status
-    from warpchain.store.sweep_result import SweepResult as SweepResult
-    from warpchain.store.sweep_result import load as load
-    from warpchain.walks.walk_result import WalkResult as WalkResult
-    from warpchain.walks.walk_result import load_walk as load_walk
 
 __version__ = _version.VERSION
 
@@ -68,15 +68,15 @@ if not (_HOME / "kernels").is_dir():
 _NAMES = {
     "films": "films",
     "inputs.parameters": "Parameters preset",
-    "inputs.state": "State",
+    "chain.setup": "State",
     "inputs.validation": "InputError",
     "live_page.server": "live",
     "run.simulation": "Chains Trajectory simulate",
     "run.single_walk": "walk",
     "run.sweep_run": "sweep",
     "status": "Status",
-    "store.sweep_result": "SweepResult load",
-    "walks.walk_result": "WalkResult load_walk",
+    "results.sweep_result": "SweepResult load",
+    "results.walk_result": "WalkResult load_walk",
 }
 _HOMES = {name: home for home, names in _NAMES.items() for name in names.split()}
 

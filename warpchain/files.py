@@ -12,6 +12,7 @@ import os
 import re
 import secrets
 import stat
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -20,6 +21,8 @@ from typing import Final, Literal, NamedTuple
 AnyPath = str | os.PathLike[str]
 DISK_FAILURES: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
 """Numbers (errno) of an `OSError` that no other path or permission would have avoided."""
+UNLOCKED_FOR: Final = 1.0
+"""Time [s] after its last change from which a part that nobody has locked is taken for that of a killed process."""
 
 
 class NotReplaceable(OSError):  # noqa: N818 - the path is refused, nothing went wrong
@@ -79,6 +82,7 @@ def replacing(path: AnyPath, only: Kind | None = None) -> Iterator[Path]:
     with naming(target):
         descriptor = os.open(part, os.O_CREAT | os.O_EXCL | os.O_RDWR, 0o666)
     try:
+        _lock(descriptor)
         with naming(target):
             yield part
             os.fsync(descriptor)
@@ -95,6 +99,30 @@ def replacing(path: AnyPath, only: Kind | None = None) -> Iterator[Path]:
         with suppress(OSError):
             part.unlink(missing_ok=True)
         os.close(descriptor)
+
+
+def _lock(descriptor: int) -> bool:
+    """Lock an open file against `clear_parts` of other processes; False if one has it, or the system has no locks."""
+    try:
+        import fcntl
+
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except (ImportError, OSError):
+        return False
+    return True
+
+
+def clear_parts(path: AnyPath) -> None:
+    """Delete what killed processes had written of a file; one that is being written is locked, and stays."""
+    target = given_path(path)
+    name = re.compile(rf"\.{re.escape(target.stem)}\.[0-9a-f]{{8}}\.part{re.escape(target.suffix)}")
+    for part in target.parent.iterdir() if target.parent.is_dir() else ():
+        if not name.fullmatch(part.name) or not stat.S_ISREG(part.lstat().st_mode):
+            continue
+        with suppress(OSError):  # it is complete now, or may not be deleted
+            with open(part, "rb") as file:
+                if time.time() - os.fstat(file.fileno()).st_mtime > UNLOCKED_FOR and _lock(file.fileno()):
+                    part.unlink()
 
 
 def write_whole(path: AnyPath, content: bytes | str, only: Kind | None = None) -> None:
@@ -129,6 +157,14 @@ def naming(target: AnyPath, verb: Literal["written", "read"] = "written") -> Ite
         problem = type(error)(f"{target}: cannot be {verb} ({reason}); {remedy}")
         problem.errno = number
         raise problem from error
+
+
+def described(error: OSError) -> str:
+    """The text of an error; one that the system made, not this package, gets the path and what to do."""
+    if not error.strerror or not error.errno:
+        return str(error)
+    where = f"{os.fsdecode(error.filename)}: " if error.filename else ""
+    return f"{where}cannot be read or written ({error.strerror}); {_REMEDIES.get(error.errno, 'see to the disk')}"
 
 
 _REMEDIES: Final = {

@@ -1,11 +1,15 @@
 """HDF5 files of results: equal content gives equal bytes, and a checksum tells of damage.
 
-Behind the HDF5 content, where the HDF5 library does not look, stands a line with its SHA-256:
+The first attribute of a file, `checksum`, holds the length of the file and the SHA-256 of all its bytes but these 64
+digits:
 
-    warpchain SHA-256: HEX
+    warpchain SHA-256 of 0000000000104179 bytes: HEX
 
-It is compared before that library gets a byte, because damage may make it hang or crash. A user block before the
-content was tried instead: xarray then does not know the file by itself.
+The checksum is compared before the HDF5 library gets a byte, because damage may make that library hang or crash. HDF5
+keeps texts of attributes in a heap without checksums of its own, so that the digits can be filled in afterwards. Other
+programs that open a file for writing and change nothing leave it as it is. Two other places were tried: behind the
+content, where such a program cuts the checksum off; and a user block before it, with which xarray does not recognise
+the file.
 
 Fields of a dataclass that a file keeps are annotated with `Stored`; `write_fields` and `read_fields` go by that.
 """
@@ -17,20 +21,22 @@ import stat
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any, BinaryIO, Final, get_args
+from typing import TYPE_CHECKING, Any, BinaryIO, Final, NamedTuple, get_args
 
 import numpy as np
 
 from warpchain.files import AnyPath, naming
-from warpchain.inputs.validation import DamagedFileError, InputError
+from warpchain.inputs.validation import ChangedFileError, DamagedFileError, InputError
 from warpchain.version import FORMAT_VERSION
 
 if TYPE_CHECKING:
     import h5py
 
 _SIGNATURE: Final = b"\x89HDF\r\n\x1a\n"
-_LINE: Final = "\nwarpchain SHA-256: {}\n"
-_LINE_LENGTH: Final = len(_LINE.format("0" * 64))
+_CHECKSUM: Final = "warpchain SHA-256 of {:016d} bytes: {}"
+_PREFIX: Final = b"warpchain SHA-256 of "
+_HEAD: Final = 2**16
+"""Number of bytes at the beginning of a file that hold its checksum and its kind."""
 _FIXED: Final[dict[str, Any]] = {"libver": ("v108", "v108"), "track_order": True}
 """Version bounds without which equal content would not give equal bytes; they also leave out times."""
 
@@ -58,10 +64,31 @@ class Stored:
         shape = f"{self.meaning}, shape ({', '.join(sizes)}{',' * (len(sizes) == 1)})"
         return f"{shape}; none {self.empty}" if self.empty else shape
 
+    @property
+    def digested(self) -> list[object]:
+        """What a file depends on; the wording of meanings it does not."""
+        return [self.unit, self.shape, list(self.keys)]
+
     def path(self, name: str) -> str:
         """Where a file keeps the field of this name."""
         group = {"": "summary", "t": "series", "f": "frames"}[self.shape[:1]]
         return f"{group}/{name.removeprefix('frame_')}"
+
+
+class Format(NamedTuple):
+    """The format of one kind of file: its name, and a digest of the table of its fields.
+
+    A field that is added, renamed or measured otherwise makes another format, also if nobody raised `FORMAT_VERSION`.
+    """
+
+    kind: str
+    digest: str
+
+    @classmethod
+    def of(cls, kind: str, *tables: Mapping[str, Any]) -> "Format":
+        """The format of files with the fields of some tables: name → `Stored`, or what else the content depends on."""
+        named = [[(name, getattr(field, "digested", field)) for name, field in table.items()] for table in tables]
+        return cls(kind, hashlib.sha256(repr(named).encode()).hexdigest()[:16])
 
 
 def stored_fields(kind: type) -> dict[str, Stored]:
@@ -110,58 +137,93 @@ def read_fields(group: "h5py.Group", kept: Mapping[str, Stored], links: int) -> 
     return values
 
 
-def hdf5_image(kind: str, fill: "Callable[[h5py.File], None]") -> bytes:
-    """The bytes of an HDF5 file of some kind that `fill` fills; equal content gives equal bytes.
+def hdf5_image(form: Format, fill: "Callable[[h5py.File], None]") -> bytes:
+    """The bytes of an HDF5 file of some format that `fill` fills; equal content gives equal bytes.
 
     It is made in memory: on a full disk HDF5 neither says what is wrong nor closes the file.
     """
     import h5py
 
-    image = io.BytesIO()
+    image, unset = io.BytesIO(), _CHECKSUM.format(0, "0" * 64)
     with h5py.File(image, "w", **_FIXED) as file:
-        file.attrs["format"], file.attrs["format_version"] = kind, FORMAT_VERSION
+        file.attrs["checksum"] = unset
+        file.attrs["format"], file.attrs["format_version"] = form.kind, FORMAT_VERSION
+        file.attrs["format_digest"] = form.digest
         fill(file)
-    image.seek(0, os.SEEK_END)
-    image.write(_LINE.format(hashlib.sha256(image.getvalue()).hexdigest()).encode())
-    return image.getvalue()
+    content = image.getbuffer()
+    place = bytes(content[:_HEAD]).index(unset.encode())
+    stop = place + len(unset)
+    content[place:stop] = _CHECKSUM.format(len(content), "0" * 64).encode()
+    digest = hashlib.sha256(content[: stop - 64])
+    digest.update(content[stop:])
+    content[stop - 64 : stop] = digest.hexdigest().encode()
+    return bytes(content)
 
 
 @contextmanager
-def reading_hdf5(path: AnyPath, kind: str | None, remedy: str, wanted: str | None = None) -> "Iterator[h5py.File]":
-    """An HDF5 file that `hdf5_image` made, undamaged and of a kind, or of any if that is None.
+def reading_hdf5(path: AnyPath, form: Format | None, remedy: str, wanted: str | None = None) -> "Iterator[h5py.File]":
+    """An HDF5 file that `hdf5_image` made, undamaged and of a format, or of any if that is None.
 
     The remedy says what to do about a damaged or an older file; `wanted`, which file to give instead of one of another
     kind, is None of files that a sweep has in its folder.
 
     Raises:
         OSError: it cannot be read.
-        InputError: it is no regular file, of another kind or of another version.
-        DamagedFileError: it is damaged, cut short or of an earlier warpchain.
+        InputError: it is no regular file, of another kind or of another version, or warpchain did not write it.
+        DamagedFileError: it is damaged or cut short; a `ChangedFileError` if another program
+            has changed it.
     """
     import h5py
 
-    with open_regular(path) as content, naming(path, "read"):
-        head = content.read(len(_SIGNATURE))
-        left = content.seek(0, os.SEEK_END) - _LINE_LENGTH
-        content.seek(max(0, left))
-        end = content.read()
-        content.seek(0)
-        digest = hashlib.sha256()
-        while left > 0 and (piece := content.read(min(left, 2**20))):
+    # HDF5 reads the file through Python: opened by its name, the file could not be open elsewhere in this process with
+    # other flags of locking, as xarray has it.
+    with open_regular(path) as content:
+        _check(content, path, remedy, wanted)
+        with h5py.File(content, "r") as file:
+            _check_format(file, path, form, remedy, wanted)
+            yield file
+
+
+def _check_format(file: "h5py.File", path: AnyPath, form: Format | None, remedy: str, wanted: str | None) -> None:
+    """Check format and version of a file; errors as of `reading_hdf5`."""
+    if form is not None and (found := file.attrs["format"]) != form.kind:
+        raise InputError(f"{path}: a {found}, not a {form.kind}; {wanted or 'move it out of this folder'}")
+    if (version := int(file.attrs["format_version"])) != FORMAT_VERSION:
+        later = f", but this warpchain reads {FORMAT_VERSION}; update warpchain"
+        earlier = f" of an earlier warpchain, which reads it; {remedy}"
+        raise InputError(f"{path}: format version {version}{later if version > FORMAT_VERSION else earlier}")
+    if form is not None and file.attrs.get("format_digest") != form.digest:
+        raise InputError(f"{path}: has other fields than this warpchain reads, of the same version; {remedy}")
+
+
+def _check(content: BinaryIO, path: AnyPath, remedy: str, wanted: str | None) -> None:
+    """Compare a file with its checksum; errors as of `reading_hdf5`."""
+    with naming(path, "read"):
+        head, size = content.read(_HEAD), content.seek(0, os.SEEK_END)
+        place = head.find(_PREFIX)
+        stop = place + len(_CHECKSUM.format(0, "0" * 64))
+        content.seek(stop)
+        digest = hashlib.sha256(head[: stop - 64])
+        while piece := content.read(2**20):
             digest.update(piece)
-            left -= len(piece)
-    if end != _LINE.format(digest.hexdigest()).encode():
-        if wanted and head != _SIGNATURE and b"warpchain SHA-256: " not in end:
-            raise InputError(f"{path}: not an HDF5 file; {wanted}")
-        raise DamagedFileError(f"{path}: damaged, cut short or of an earlier warpchain; {remedy}")
-    with h5py.File(path, "r", locking=False) as file:
-        if kind is not None and (found := file.attrs["format"]) != kind:
-            raise InputError(f"{path}: a {found}, not a {kind}; {wanted or 'move it out of this folder'}")
-        if (version := int(file.attrs["format_version"])) != FORMAT_VERSION:
-            later = f", but this warpchain reads {FORMAT_VERSION}; update warpchain"
-            earlier = f" of an earlier warpchain, which reads it; {remedy}"
-            raise InputError(f"{path}: format version {version}{later if version > FORMAT_VERSION else earlier}")
-        yield file
+        content.seek(0)
+    if place >= 0 and head[place:stop] == _CHECKSUM.format(size, digest.hexdigest()).encode():
+        return
+    if place < 0 and (size or wanted):  # in the folder of a sweep an empty file is torn
+        what = "of an earlier warpchain, or damaged" if b"warpchain " in head else "not an HDF5 file of warpchain"
+        what = what if head.startswith(_SIGNATURE) else "not an HDF5 file"
+        raise InputError(f"{path}: {what}; {wanted or 'move it out of this folder, or give another folder'}")
+    end = int.from_bytes(head[28:36], "little")  # of the content, as the HDF5 library notes it in its head
+    if end == size and not head[place:].startswith(_CHECKSUM.format(size, "").encode()):
+        raise ChangedFileError(f"{path}: another program has changed it; {remedy}")
+    raise DamagedFileError(f"{path}: damaged or cut short; {remedy}")
+
+
+def claims_to_be(path: AnyPath, kind: str) -> bool:
+    """Whether a regular file is of a kind by its beginning, damaged or not, or is empty, as a torn one may be."""
+    with open_regular(path) as content, naming(path, "read"):
+        head = content.read(_HEAD)
+    return not head or (_PREFIX in head and kind.encode() in head)
 
 
 def kind_of_hdf5(path: AnyPath, wanted: str) -> str:
@@ -177,7 +239,8 @@ def open_regular(path: AnyPath) -> BinaryIO:
     """
     try:
         with naming(path, "read"):
-            file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK))
+            at_once = getattr(os, "O_NONBLOCK", 0)  # which Windows does not have
+            file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | at_once))
     except IsADirectoryError:
         raise InputError(f"{path}: is a folder, not a file; give another path") from None
     if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):

@@ -48,19 +48,19 @@ _SENTENCES: Final[dict[Status, str]] = {
         "The walk used up its steps; raise options.step_limit, loosen options.tolerance or soften the joints."
     ),
     Status.STEP_TOO_SMALL: (
-        "The error stayed too large down to options.smallest_step; loosen options.tolerance, "
-        "or lower joint_stiffness and joint_damping or raise friction_smoothing."
+        "The error stayed too large down to options.smallest_step; lower that if you raised it, loosen "
+        "options.tolerance, or bring stiffness, damping and friction of the joints closer to those of a preset."
     ),
     Status.NOT_FINITE: (
-        "A position or velocity stopped being a finite number; tighten options.tolerance, "
+        "A position or velocity stopped being a finite number; start from lower speeds, "
         "or bring extreme parameters closer to those of a preset."
     ),
     Status.NOT_STEADY: (
-        "The chain did not circulate steadily on the sprocket within scene.hold_limit; "
-        "raise that limit or scene.spin_up_time, or lower scene.frequency."
+        "The chain did not circulate steadily on the sprocket within scene.hold_limit; raise that limit if you lowered "
+        "it. A chain that whirls, as with a heavy charm, needs start: ellipse, or a third of the frequency."
     ),
     Status.DISTANCE_LIMIT: "The chain was still moving when it was scene.distance_limit away.",
     Status.LIST_OVERFLOW: (
-        "More links came close to one another than the neighbour list can hold; lower options.skin or circle_radius."
+        "More links came close to one another than the neighbour list can hold; lower options.skin."
     ),
 }

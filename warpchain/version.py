@@ -4,9 +4,12 @@ from typing import Final
 
 VERSION: Final = "0.2.0.dev0"
 
-NUMERICS_VERSION: Final = 17
-"""Raised by every change that changes a number of any walk; shards of two versions never mix."""
-FORMAT_VERSION: Final = 10
+NUMERICS_VERSION: Final = 18
+"""Raised by every change that changes a number of any walk; shards of two versions never mix.
+
+18: stages are increments, by default in single precision; mean Δx as before to within the spread of the walks.
+"""
+FORMAT_VERSION: Final = 11
 """Of all files of results: sweep.h5, shards, merged files and walks."""
 
 

@@ -6,35 +6,49 @@ from typing import Any
 
 import warp as wp
 
-from warpchain.kernels.cpu.explicit import explicit_method
+from warpchain.kernels.cpu.implicit.rigid_layout import first_stage_row
+from warpchain.kernels.cpu.increments import steps_in_increments
+from warpchain.kernels.cpu.stage_rows import rows_of_stages
 from warpchain.kernels.methods.controller import step_controller
 from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.types import Chain, Control, Rows, State
+
+NOTHING_KNOWN, STAGE_KNOWN, ROUNDED = 0, 1, 2
+"""Of the start of a step, in ``State.has_first_stage``: the first stage is known; the state is rounded as well."""
 
 
 @dataclass(frozen=True)
 class Joints:
     """Warp functions of the joints, in the order in which a step calls them."""
 
+    take_constants: Any  # ``(K, chain)`` when those of links and joints have changed
     settle: Any  # ``(K, chain, state, world)`` before a step
     first_stage: Any  # ``(K, chain, state, world)`` evaluates the first stage of a step on springs, if it is not known
+    shift_first_stage: Any  # ``(K, before, now)`` changes it from one plane to another
     attempt: Any  # ``(K, chain, state, control, world, h, tolerance)`` → error ratio as ordered bits
     shrinkage: Any  # ``(state, world, error)`` → factor of the step after rejection, see :mod:`methods.controller`
-    # ``(K, chain, state, control, world, h, error)`` accepts the state that the last attempt found → factor of the
-    # step, whether the joints may stay as they are
+    # ``(K, chain, state, control, world, h, error)`` accepts the state that the last attempt found and places its ends
+    # → factor of the step, whether the joints may stay as they are
     accept: Any
     margins: Any  # ``(state, control, world)`` → skin of the neighbour list [m], least slack with which it is kept [m]
     react: Any  # ``(K, chain, state, world)`` after a step with impulses, or in which the joints may not stay
+    rates_are_finite: Any  # ``(K, chain, state, world)`` whether all accelerations at the start of the step are
 
 
 @functools.cache
-def springs(name: str, acceleration: Any) -> Joints:
-    """A method's steps on springs, under a load, see :attr:`features.Features.acceleration`."""
+def springs(name: str, columns: int, is_mixed: bool, load: Any) -> Joints:
+    """A method's steps on springs under a load, see :func:`cpu.increments.steps_in_increments`."""
     tableau = find_method(name).tableau
-    evaluate, attempt_step, commit = explicit_method(tableau, acceleration)
-    growth, shrink = step_controller(tableau.order, tableau.error_order)
-    reuses_last = tableau.first_same_as_last
+    real = wp.float32 if is_mixed else wp.float64
+    rows = rows_of_stages(tableau, columns, first_stage_row(name, columns), real)
+    steps = steps_in_increments(tableau, real, load)
+    growth, shrink = step_controller(tableau.order, tableau.error_order, real)
+    after_step = STAGE_KNOWN if tableau.first_same_as_last else NOTHING_KNOWN
+
+    @wp.func
+    def take_constants(K: Rows, chain: Chain):
+        steps.take_constants(K, rows(K), chain)
 
     @wp.func
     def nothing(_K: Rows, _chain: Chain, _state: State, _world: int):
@@ -42,28 +56,52 @@ def springs(name: str, acceleration: Any) -> Joints:
 
     @wp.func
     def first_stage(K: Rows, chain: Chain, state: State, world: int):
-        if state.has_first_stage[world] == 0:
-            evaluate(K, chain)
-            state.has_first_stage[world] = 1
+        known = state.has_first_stage[world]
+        if known != wp.static(ROUNDED):
+            S = rows(K)
+            steps.begin(K, S, chain)
+            if known == wp.static(NOTHING_KNOWN):
+                steps.first_stage(K, S, chain)
+            state.has_first_stage[world] = wp.static(ROUNDED)
+
+    @wp.func
+    def shift_first_stage(K: Rows, before: Chain, now: Chain):
+        steps.shift_first_stage(rows(K), before, now)
 
     @wp.func
     def attempt(
         K: Rows, chain: Chain, _state: State, _control: Control, _world: int, h: wp.float64, tolerance: wp.float64
     ):
-        return attempt_step(K, chain, h, tolerance)
+        return steps.attempt(K, rows(K), chain, h, tolerance)
 
     @wp.func
     def shrinkage(_state: State, _world: int, error: wp.float64):
-        return shrink(error)
+        return wp.float64(shrink(real(error)))
 
     @wp.func
     def accept(K: Rows, chain: Chain, state: State, control: Control, world: int, h: wp.float64, error: wp.float64):
-        commit(K, chain, h)
-        state.has_first_stage[world] = wp.static(int(reuses_last))
-        return growth(error, state.last_error[world], control.proportional), bool(True)
+        steps.commit(K, rows(K), chain, h)
+        state.has_first_stage[world] = wp.static(after_step)
+        factor = growth(real(error), real(state.last_error[world]), control.proportional)
+        return wp.float64(factor), bool(True)
 
     @wp.func
     def margins(_state: State, control: Control, _world: int):
         return control.skin, ZERO
 
-    return Joints(nothing, first_stage, attempt, shrinkage, accept, margins, nothing)
+    @wp.func
+    def rates_are_finite(K: Rows, chain: Chain, _state: State, _world: int):
+        return steps.first_stage_is_finite(rows(K), chain.link_count)
+
+    return Joints(
+        take_constants,
+        nothing,
+        first_stage,
+        shift_first_stage,
+        attempt,
+        shrinkage,
+        accept,
+        margins,
+        nothing,
+        rates_are_finite,
+    )

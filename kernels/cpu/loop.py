@@ -16,10 +16,11 @@ from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.cpu.contacts.contact_pass import body_pass, link_pass
 from warpchain.kernels.cpu.contacts.proximity import greatest_opening
 from warpchain.kernels.cpu.contacts.time_to_contact import step_bound
-from warpchain.kernels.cpu.explicit import place_ends
 from warpchain.kernels.cpu.implicit.flights import rigid_in_flight
 from warpchain.kernels.cpu.implicit.rigid_layout import scratch_rows
+from warpchain.kernels.cpu.increments import PLANE, WEIGHT
 from warpchain.kernels.cpu.joints import springs
+from warpchain.kernels.cpu.placing import place_ends
 from warpchain.kernels.cpu.tilting import tilting_plane
 from warpchain.kernels.cpu.upright import upright_plane
 from warpchain.kernels.events.present_chain import has_changed, present_chain
@@ -31,7 +32,6 @@ from warpchain.kernels.features import COMPILER_FLAGS, Features
 from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step
 from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.physics.elementary import ONE, ZERO
-from warpchain.kernels.physics.geometry import link_is_finite, whole_lanes
 from warpchain.kernels.physics.scaled_loads import write_links
 from warpchain.kernels.types import Chain, Control, Drive, Integers, Model, Record, Rows, State, read_ground
 
@@ -39,8 +39,8 @@ from warpchain.kernels.types import Chain, Control, Drive, Integers, Model, Reco
 @wp.func
 def load_state(K: Rows, model: Model, state: State, chain: Chain, world: int):
     """Fills the rows of the state; rows of losses start at zero, columns behind the links are links without mass."""
-    for i in range(whole_lanes(chain.link_count)):
-        for row in range(wp.static(layout.STAGES)):
+    for i in range((chain.link_count + wp.static(2 * layout.LANES - 1)) & wp.static(-2 * layout.LANES)):
+        for row in range(wp.static(layout.SCRATCH_ROWS)):
             K[row, i] = ZERO
             if row < 6 and i < chain.link_count:
                 K[row, i] = state.links[world, row, i]
@@ -49,10 +49,11 @@ def load_state(K: Rows, model: Model, state: State, chain: Chain, world: int):
 
 @wp.func
 def state_is_finite(K: Rows, chain: Chain):
-    """False if the state or its first derivative holds an infinity or a NaN."""
+    """False if the state holds an infinity or a NaN."""
     finite = bool(True)
     for i in range(chain.link_count):
-        finite = finite and link_is_finite(K, i, layout.STAGES)
+        for row in range(6):
+            finite = finite and wp.isfinite(K[row, i])
     return finite
 
 
@@ -64,7 +65,7 @@ def make_advance(features: Features):
     lists: (W, size) int32; both belong to a world until its run ends, see :mod:`layout`, :mod:`contacts.list_layout`.
     """
     columns = features.columns
-    rows = scratch_rows(features.method, columns)
+    rows = scratch_rows(features.method, columns, features.is_mixed)
     list_size = list_layout(columns).size
     is_driven = features.is_driven
     face_of = BODIES[features.fixed_body].face
@@ -72,8 +73,9 @@ def make_advance(features: Features):
     # on the sprocket the pauses between impulses are too short for a flight; in flight joints feel weight only
     can_fly = not is_driven and not features.moving_sprocket and features.load == "weight"
     has_flight = find_method(features.method).has_rigid_flight and can_fly
-    on_springs = springs(features.method, features.acceleration)
-    joints = rigid_in_flight(features.method, columns) if has_flight else on_springs
+    load = PLANE if features.tilts else WEIGHT if features.load == "weight" else features.acceleration
+    on_springs = springs(features.method, columns, features.is_mixed, load)
+    joints = rigid_in_flight(on_springs, columns) if has_flight else on_springs
     plane = tilting_plane(joints) if features.tilts else upright_plane(features.fixed_body, joints)
     meet_bodies = body_pass(features, plane)
     make_list, meet_links = link_pass(features, joints)
@@ -95,6 +97,7 @@ def make_advance(features: Features):
             book_softening(chain, after, state, world)
             if wp.static(is_driven):
                 write_links(K, model, world, state.load_factor[world])
+                joints.take_constants(K, after)
             state.has_first_stage[world] = 0
         return after
 
@@ -105,7 +108,7 @@ def make_advance(features: Features):
         step = h * LEAST_SHRINKAGE
         if wp.isfinite(error):
             step = h * joints.shrinkage(state, world, error)
-        elif not state_is_finite(K, chain):
+        elif not (state_is_finite(K, chain) and joints.rates_are_finite(K, chain, state, world)):
             state.status[world] = NOT_FINITE
         state.step[world] = step
         if state.status[world] == RUNNING and step < control.smallest_step:
@@ -137,6 +140,7 @@ def make_advance(features: Features):
         chain = present_chain(model, state, control, world)
         if state.is_fresh[world] != 0:
             load_state(K, model, state, chain, world)
+            joints.take_constants(K, chain)
             place_ends(K, chain)
             plane.begin_run(K, P, chain)
             state.gap[world] = plane.gap(K, plane.at_start(P, chain), ground, still)
@@ -167,12 +171,11 @@ def make_advance(features: Features):
             error = wp.cast(joints.attempt(K, felt, state, control, world, h, tolerance), wp.float64)
             attempts += 1
             if error <= ONE:
-                factor, joints_may_stay = joints.accept(K, chain, state, control, world, h, error)
+                factor, joints_may_stay = joints.accept(K, felt, state, control, world, h, error)
                 add_count(state, world, layout.ACCEPTED, wp.int64(1))
                 state.time[world] = wp.where(reaches_stop, stop_time, time + h)
                 state.step[world] = next_step(state.step[world], h, factor)
                 state.last_error[world] = wp.max(error, wp.float64(1e-4))
-                place_ends(K, chain)
                 opening = greatest_opening(K, chain)
                 raise_extreme(state, world, layout.OPENING, opening)
                 plane.end_step(K, P, chain, h)

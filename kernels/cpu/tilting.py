@@ -10,14 +10,12 @@ from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.cpu.contacts.proximity import FURTHEST, any_negative, placed_link
 from warpchain.kernels.cpu.joints import Joints
 from warpchain.kernels.cpu.upright import Plane
-from warpchain.kernels.layout import LEFT_X, LOST_FIXED, STAGES, SUMS_OF_MOTION, U
+from warpchain.kernels.layout import LEFT_X, LOST_FIXED, SUMS, SUMS_OF_MOTION, U
 from warpchain.kernels.physics import plane
 from warpchain.kernels.physics.elementary import ZERO, from_order_key, order_key
 from warpchain.kernels.physics.geometry import LANES, whole_lanes
 from warpchain.kernels.types import Chain, Ground, Row, Rows, State, with_circles
 
-SUMS = STAGES + layout.STAGE_ROWS
-"""First of the rows for terms of sums: those of the second to fourth stage, which are free between attempts."""
 SUMMED_IN_CONTACT = 3
 """Impulse on the plane and its two moments."""
 TOUCHES = SUMS + SUMMED_IN_CONTACT
@@ -64,15 +62,6 @@ def write_plane_sums(K: Rows, P: Row, chain: Chain):
     write_sums_of_motion(K, P, chain)
     P[layout.SUM_MASS] = chain.mass
     plane.invert_mass(P)
-
-
-@wp.func
-def shift_first_stage(K: Rows, before: Chain, now: Chain):
-    """Changes the stored first stage from one plane to another; links are the same."""
-    i = int(0)
-    while i < whole_lanes(now.link_count):
-        plane.shift_stage(K, STAGES, i, before, now)
-        i += 1
 
 
 @wp.func
@@ -158,9 +147,10 @@ def tilting_plane(joints: Joints) -> Plane:
         before = plane.on_plane(chain, P, wp.static(layout.PLANE_MID))
         plane.begin_step(P, chain.gravity, h)
         felt = plane.on_plane(chain, P, wp.static(layout.PLANE_MID))
-        if state.has_first_stage[world] != 0:
-            shift_first_stage(K, before, felt)
+        was_known = state.has_first_stage[world] != 0
         joints.first_stage(K, felt, state, world)
+        if was_known:
+            joints.shift_first_stage(K, before, felt)
         return felt
 
     @wp.func

@@ -1,8 +1,8 @@
 """Embedded explicit Runge–Kutta methods on a GPU: one thread per link, stages in registers.
 
-The same stages as in :mod:`cpu.explicit`, for the same tableaus. In every stage the threads wait for the friction of
-their joints. Meanwhile they evaluate their places in the next stage, which in the Nyström form do not depend on the
-present one. In a last stage at the new state they evaluate its proximity instead.
+Stages of the same tableaus as in :mod:`cpu.increments`, in double precision. In every stage the threads wait for the
+friction of their joints. Meanwhile they evaluate their places in the next stage, which in the Nyström form do not
+depend on the present one. In a last stage at the new state they evaluate its proximity instead.
 """
 
 import functools

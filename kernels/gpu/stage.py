@@ -13,9 +13,8 @@ import warp as wp
 
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
-from warpchain.kernels.methods.controller import quick_quotient
 from warpchain.kernels.physics import geometry
-from warpchain.kernels.physics.elementary import order_bits_single
+from warpchain.kernels.physics.elementary import order_bits_single, quick_quotient
 from warpchain.kernels.physics.geometry import Link, end_positions, end_velocities
 from warpchain.kernels.physics.joint import friction_torque, joint_force, link_acceleration
 from warpchain.kernels.physics.plane import on_plane

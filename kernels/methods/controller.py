@@ -36,17 +36,6 @@ def quick_power(x: wp.float32, y: wp.float32) -> wp.float32:
 
 @wp.func_native("""
 #if defined(__CUDA_ARCH__)
-    return __fdividef(a, b);
-#else
-    return a / b;
-#endif
-""")
-def quick_quotient(a: wp.float32, b: wp.float32) -> wp.float32:
-    """a / b; on a GPU to two units in the last place, and 0 for b beyond 2¹²⁶."""
-
-
-@wp.func_native("""
-#if defined(__CUDA_ARCH__)
     float y;
     asm("sqrt.approx.ftz.f32 %0, %1;" : "=f"(y) : "f"(x));
     return y;

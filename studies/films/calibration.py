@@ -22,6 +22,7 @@ class Calibration:
     sigmas: Array  # Standard deviations that the posterior says, likewise
     values: Array  # Truths, likewise
     refused: float  # Share of sets of films that were refused as outside of the bank
+    chains: int  # Hidden chains, those that were refused among them
 
     @property
     def width(self) -> Array:
@@ -74,4 +75,4 @@ def calibrate(
             continue
         found.append((answer.mean - values, answer.sigma, values))
     errors, sigmas, values = np.reshape(found, (-1, 3, len(bank.names))).swapaxes(0, 1)
-    return Calibration(tuple(bank.names), errors, sigmas, values, refused / len(truths.values))
+    return Calibration(tuple(bank.names), errors, sigmas, values, refused / len(truths.values), len(truths.values))

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 import warpchain
 from studies import common
-from studies.common import DISTANCE, LINE_COLORS, Array, Block, Columns
+from studies.common import LINE_COLORS, Array, Block, Columns
 
 FOLDER = Path(__file__).parent
 RESULTS = "results/slopes.csv"  # In the folder of the page
@@ -80,7 +80,7 @@ def draw(block: Block) -> Figure:
             label = f"$n$ = {links:g}, $ν$ = {frequency:g} Hz"
             common.error_line(distance, slope, cells, (row, column), label=label, **style)
             share.plot(slope, endless[row, column], **style)
-    distance.set(yscale="log", ylabel=DISTANCE)
+    distance.set(yscale="log", ylabel="distance walked $Δx$ = $x$ / cos $α$ / m")
     distance.legend(frameon=False, fontsize="small")
     share.set(ylabel="share\nwithout end", xlabel="slope / °, positive downhill")
     for panel in (distance, share):

@@ -9,7 +9,7 @@ from tests.oracle_model import motion_equations
 from tests.support.command_line import Command
 from tests.support.presets import PAPER
 from warpchain.bench import measurements
-from warpchain.inputs.start_shapes import ellipse, lay_chain
+from warpchain.chain.start_shapes import ellipse, lay_chain
 from warpchain.kernels.methods.method import method_names
 from warpchain.run.simulation import simulate
 

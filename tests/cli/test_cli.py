@@ -152,6 +152,6 @@ def test_a_defect_is_not_disguised_as_bad_input(monkeypatch: pytest.MonkeyPatch)
     def broken(*_: object, **__: object) -> None:
         raise ValueError("operands could not be broadcast together")
 
-    monkeypatch.setattr("warpchain.walks.one_walk.run_walk", broken)
+    monkeypatch.setattr("warpchain.results.one_walk.run_walk", broken)
     with pytest.raises(ValueError, match="broadcast"):
         main(["walk"])

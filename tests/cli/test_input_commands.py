@@ -22,7 +22,7 @@ def test_parameters_as_a_table(command: Command) -> None:
     rows = {line.split()[0]: " ".join(line.split()) for line in lines if line and not line.startswith(" ")}
     assert rows.keys() == {"name", *SECTION_OF}
     assert rows["floor_friction"] == "floor_friction mu_fc 0.27 [0, 10] friction coefficient, floor and chain"
-    assert rows["load_factor"].startswith("load_factor null [1, 10000] by which gravity")
+    assert rows["load_factor"].startswith("load_factor null [1, 10000] factor by which gravity")
     some = command("parameters", "k", "scene.nu", "--preset", "soft").out.splitlines()
     assert [line.split()[:3] for line in some[1:]] == [["joint_stiffness", "k", "1e7"], ["frequency", "nu", "15"]]
 

@@ -36,7 +36,7 @@ REFUSED = {
     "animate nowhere.h5": "nowhere.h5: cannot be read (No such file or directory)",
     "animate walk.h5 -o nowhere/walk.gif": "nowhere/walk.gif: cannot be written",
     "foo": "No such command 'foo'; see warpchain --help",
-    "info": "Missing argument 'DIR'; see warpchain info --help",
+    "info": "Missing argument 'DIR...'; see warpchain info --help",
     "parameters floor_frictoin": "'floor_frictoin': unknown name; did you mean parameters.floor_friction?",
     "schema -o no/schema.json": "no/schema.json: cannot be written",
     "sweep": "FILE.yaml: missing; give a sweep file, or --new FILE.yaml",
@@ -102,5 +102,5 @@ def test_a_folder_cannot_hide_its_name(command: Command, tmp_path: Path) -> None
     result = make_sweep(tmp_path / "s", content())
     result.sweep["name"] = ESCAPE
     with contextlib.redirect_stdout(io.StringIO()) as out:
-        print_sweep(result, as_json=False)
+        print_sweep(result, None, as_json=False)
     assert "\x1b" not in out.getvalue() and "\x07" not in out.getvalue() and "\\x1b]0;owned" in out.getvalue()

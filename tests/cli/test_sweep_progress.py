@@ -10,9 +10,9 @@ import yaml
 from tests.run.test_sweep_run import TINY
 from tests.support import synthetic_sweep
 from tests.support.command_line import Command
+from warpchain.results import one_walk
 from warpchain.run import progress_bar
 from warpchain.run.single_walk import walk
-from warpchain.walks import one_walk
 
 
 def test_without_a_terminal_lines_of_progress_are_printed(
@@ -45,7 +45,7 @@ def test_the_time_of_a_walk_is_without_compilation(monkeypatch: pytest.MonkeyPat
 def test_info_lists_a_thousand_cells_at_most(tmp_path: Path, command: Command) -> None:
     """The table of more cells ends with a line that counts the others; JSON has them all."""
     wide = synthetic_sweep.synthetic_sweep(
-        {"name": "main", "grid": {"gravity": list(map(float, range(1, 1201)))}, "samples": 1}
+        {"name": "main", "grid": {"walk_limit": list(map(float, range(1, 1201)))}, "samples": 1}
     )
     synthetic_sweep.run(tmp_path, wide, shard_size=1200)
     lines = command("info", ".").out.splitlines()

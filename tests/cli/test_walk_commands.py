@@ -10,7 +10,7 @@ from tests.support.command_line import Command
 from tests.support.made_walks import assert_same
 from warpchain.inputs.options import Options
 from warpchain.inputs.validation import InputError
-from warpchain.walks.walk_result import WalkResult
+from warpchain.results.walk_result import WalkResult
 
 TINY = {
     "links": 20,
@@ -120,6 +120,6 @@ def test_a_method_beside_like_brings_its_settings(
         seen.append(setup)
         raise InputError("enough")
 
-    monkeypatch.setattr("warpchain.walks.one_walk.run_walk", run_walk)
+    monkeypatch.setattr("warpchain.results.one_walk.run_walk", run_walk)
     assert command("walk", "--like", str(saved), *line.split()).err == "error: enough\n"
     assert seen[0].options == Options.model_validate(expected)

@@ -1,15 +1,15 @@
 """Batches side by side, their memory, and the copies of their arrays on the host; what of it needs no GPU."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import pytest
 
 from tests.run.test_sweep_run import brief_setup, outcomes
+from warpchain.chain.keep import Keep
+from warpchain.chain.setup import Setup
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import Fibers
 from warpchain.inputs.options import Options
-from warpchain.inputs.setup import Setup
 from warpchain.walks import scheduler
 
 
@@ -40,15 +40,15 @@ def test_walks_do_not_depend_on_the_batches_they_are_spread_over(monkeypatch: py
     assert outcomes(setups) == alone
 
 
-@pytest.mark.parametrize("kept", [{}, {"keeps_samples": True, "frame_every": 2, "keeps_loads": True}])
-def test_a_gpu_carries_as_many_chains_as_fit(kept: dict[str, Any]) -> None:
+@pytest.mark.parametrize("keep", [Keep(), Keep(series_every=1, frame_every=2, loads=True)])
+def test_a_gpu_carries_as_many_chains_as_fit(keep: Keep) -> None:
     """A batch knows what its arrays take, in proportion to its worlds; half of the free memory is enough for all."""
-    taken = [Batch(worlds, 60, Options(method="dp5"), **kept).bytes for worlds in (40, 80)]
+    taken = [Batch(worlds, 60, Options(method="dp5"), keep).bytes for worlds in (40, 80)]
     assert taken[1] == pytest.approx(2 * taken[0], rel=0.01) and taken[0] > 40 * 60 * 8 * 20
     options = Options(method="dp5", device="fibers")
-    worlds = scheduler.most_worlds(60, options=options, **kept)
+    worlds = scheduler.most_worlds(Batch(1, 60, options, keep))
     free = Fibers.free_memory
-    assert 1 <= worlds and Batch(worlds, 60, options, **kept).bytes <= free / 2
+    assert 1 <= worlds and Batch(worlds, 60, options, keep).bytes <= free / 2
 
 
 def test_a_gpu_that_is_nearly_full_carries_one_chain_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -57,4 +57,4 @@ def test_a_gpu_that_is_nearly_full_carries_one_chain_at_a_time(monkeypatch: pyte
     one = Batch(1, 60, options).bytes
     for free, worlds in ((0, 1), (7 * one, 3), (15 * one, 7)):
         monkeypatch.setattr(Fibers, "free_memory", free)
-        assert scheduler.most_worlds(60, options=options) == worlds
+        assert scheduler.most_worlds(Batch(1, 60, options)) == worlds

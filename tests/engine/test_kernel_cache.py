@@ -1,13 +1,21 @@
 """Damage in the cache of compiled kernels is found before a kernel is loaded, whatever it hits."""
 
+import json
 import os
+import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+
+from warpchain.chain.resolution import resolve
+from warpchain.run.sweep_run import kinds_of_kernels
+from warpchain.sweeps.plan import load_sweep
+from warpchain.sweeps.sweep_file import shipped_sweeps
+from warpchain.walks.walk_phases import phase_features
 
 ROOT = Path(__file__).parents[2]
 KERNEL = """
@@ -32,14 +40,18 @@ lean = {"method": "bs32", "self_contact": False, "frame_interval": None}  # a ke
 walk = warpchain.walk(links=20, preset="soft", start="ellipse", walk_limit=0.05, **lean)
 print(walk.center[-1, 0].hex())
 """
+NAMESPACE = ("unshare", "--mount", "--map-root-user", "sh", "-c")
+READ_ONLY = (*NAMESPACE, 'mount --bind "$1" "$1" && mount -o remount,bind,ro "$1" && exec $0')
+FULL = (*NAMESPACE, 'cp -rT "$1" "$1+" && mount -t tmpfs -o size=2m tmpfs "$1" && cp -r "$1+/." "$1" && exec $0')
+"""Shells that run a command, $0, while the folder $1 is read-only, or full but for 2 MB."""
 
 
-def computed(cache: Path, script: str = KERNEL) -> str:
-    """What a process of its own prints that loads its kernels from this cache."""
+def computed(cache: Path, script: str = KERNEL, within: Sequence[str] = ()) -> str:
+    """What a process of its own prints that loads its kernels from this cache, maybe within a shell that mounts it."""
     file = cache / f"script{len(script)}.py"
     file.write_text(script)
     done = subprocess.run(
-        [sys.executable, str(file)],
+        [*within, f"{sys.executable} {file}", str(cache)] if within else [sys.executable, str(file)],
         env=os.environ | {"WARP_CACHE_PATH": str(cache), "PYTHONPATH": str(ROOT)},
         capture_output=True,
         text=True,
@@ -103,3 +115,57 @@ def test_a_walk_compares_its_kernels(tmp_path: Path) -> None:
     expected = computed(tmp_path, WALK)
     flip(compiled(tmp_path, ".o"))
     assert computed(tmp_path, WALK) == expected
+
+
+def test_a_complete_cache_that_cannot_be_written_is_used(cache: tuple[Path, str], tmp_path: Path) -> None:
+    """On a read-only file system what is whole in the cache runs; what is missing or damaged is refused in one line."""
+    folder, expected = cache
+    if shutil.which("unshare") is None or subprocess.run([*READ_ONLY, "true", folder]).returncode != 0:
+        pytest.skip("needs a mount namespace")
+    shutil.copytree(folder, kept := tmp_path / "kept")
+    assert computed(kept) == expected
+    assert computed(kept, within=READ_ONLY) == expected
+    flip(compiled(kept, ".o"))
+    with pytest.raises(
+        AssertionError, match=rf"InputError: WARP_CACHE_PATH: {kept}/\S+: Read-only file system; name a"
+    ):
+        computed(kept, within=READ_ONLY)
+
+
+def test_a_full_disk_is_one_line(tmp_path: Path) -> None:
+    """Without room for a kernel nothing is compiled: an `OSError` in one line, and nothing is left in the cache."""
+    if shutil.which("unshare") is None or subprocess.run([*FULL, "true", tmp_path]).returncode != 0:
+        pytest.skip("needs a mount namespace")
+    program = KERNEL.replace("load_checked(", "try:\n    load_checked(").replace(
+        "wp.launch(",
+        "except OSError as error:\n    import pathlib, sys\n    left = pathlib.Path(wp.config.kernel_cache_dir)\n"
+        "    print(error, *(path for path in left.rglob('*') if path.is_file() and path.stat().st_size))\n"
+        "    sys.exit()\nwp.launch(",
+    )
+    line = computed(tmp_path, program, within=FULL)
+    assert line.startswith(str(tmp_path)) and line.endswith(
+        ": No space left on device; make room for kernels, or set WARP_CACHE_PATH\n"
+    )
+
+
+def test_compile_fills_a_cache(tmp_path: Path) -> None:
+    """After `compile` of a sweep its walks find every kernel, also in a cache that cannot be written to."""
+    lean = {"method": "bs32", "self_contact": False}
+    scene = {"links": 20, "start": "ellipse", "frequency": 3.0, "walk_limit": 0.05}
+    sweep = {"version": 1, "name": "lean", "seed": 1, "preset": "soft", "samples": 1, "scene": scene, "options": lean}
+    (tmp_path / "lean.yaml").write_text(json.dumps(sweep))
+    program = f"from warpchain.cli.main import main\nmain(['compile', {str(tmp_path / 'lean.yaml')!r}])"
+    assert computed(tmp_path, program) == "lean: kernels compiled\n"
+    before = sorted(path for path in tmp_path.rglob("wp_*/*.o"))
+    assert before
+    computed(tmp_path, WALK)
+    assert sorted(path for path in tmp_path.rglob("wp_*/*.o")) == before
+
+
+def test_shipped_sweeps_have_the_kernels_of_usual_walks() -> None:
+    """`compile` without a file serves the walks of the README: from rest, spinning, from an ellipse, and tilting."""
+    planned = [load_sweep(name) for name in shipped_sweeps()]
+    known = {each for sweep in planned for setup in kinds_of_kernels(sweep) for each in phase_features(setup).values()}
+    for scene in ({"links": 60}, {"links": 60, "start": "spinning"}, {"links": 30, "start": "ellipse"}):
+        setup = resolve("paper", scene={"frequency": 15.0, **scene}, options={}, parameters={})
+        assert {*phase_features(setup).values()} <= known, scene

@@ -95,7 +95,7 @@ def test_an_answer_outside_of_the_bank_is_refused(friction: float, higher: float
     """Friction 2.2 standard deviations off the middle, where few chains are; an outline that no chain has."""
     exact = motion(friction)
     exact = dataclasses.replace(exact, outline=exact.outline + np.array([0, 0, 0, higher]))
-    film = exact.seen(CAMERA, np.zeros(8), np.random.default_rng(0))
+    film = exact.seen(CAMERA, np.zeros(9), np.random.default_rng(0))
     with pytest.raises(InputError, match=f"; check direction, .*; if right, give one about these values\n{wrong}$"):
         made_bank(160, seed=1).posterior([film])
 
@@ -147,6 +147,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
             scene={"start": "spinning", "walk_until": 0.4},
             record={"series": {"interval": 0.004}, "frames": {"interval": 0.4}},
             same_samples_along=["links", "frequency", "phase"],
+            independent=["clearance"],
             out=path,
             progress=False,
         )
@@ -181,10 +182,58 @@ def test_a_sweep_that_is_no_bank_is_refused(tmp_path: Path) -> None:
 
     with pytest.raises(InputError, match=r"same_samples_along: \[links, frequency\]"):
         bank("a", {"links": [40], "frequency": [15, 20]})
-    along = ["links", "frequency"]
+    along, phases = ["links", "frequency", "phase"], {"links": [40], "frequency": [15], "phase": [0.1, 0.2]}
     with pytest.raises(InputError, match=r"same_samples_along: \[links, frequency, phase\]"):
-        bank("b", {"links": [40], "frequency": [15], "phase": [0.1, 0.2]}, same_samples_along=along)
+        bank("b", phases, same_samples_along=along[:2])
+    with pytest.raises(InputError, match="and no parameter as independent"):
+        bank("c", phases, same_samples_along=along, independent=["clearance", "inner_mass"])
     with pytest.raises(InputError, match="grid: its axes are frequency"):
-        bank("c", {"frequency": [15]})
+        bank("d", {"frequency": [15]})
     with pytest.raises(InputError, match="bank: no motion was recorded"):
-        bank("d", {"links": [40], "frequency": [15]})  # too short
+        bank("e", {"links": [40], "frequency": [15]})  # too short
+
+
+@pytest.mark.parametrize(
+    ("grid", "more", "wrong"),
+    [
+        ({"phase": [0.1, 0.2]}, {}, "clearance"),
+        ({"phase": [0.1]}, {}, "clearance"),
+        ({"phase": [0.1, 0.2]}, {"scene": {"clearance": 0.01}}, "clearance"),
+        ({"phase": [0.1, 0.2]}, {"distributions": {"clearance": "fixed"}}, "clearance"),
+        ({}, {"independent": ["clearance"]}, "phase"),
+        ({"clearance": [0.01, 0.02]}, {}, "phase"),
+    ],
+)
+def test_a_bank_whose_releases_are_alike_is_refused(
+    grid: dict[str, Any], more: dict[str, Any], wrong: str, tmp_path: Path
+) -> None:
+    """Clearance and phase are each release's own: of two films they are neither drawn once nor fixed; one may be so."""
+    settings: dict[str, Any] = {"samples": 1, "preset": "soft", **more}
+    settings["scene"] = {"start": "spinning", "walk_until": 0.4, **more.get("scene", {})}
+    settings["record"] = {"series": {"interval": 0.004}, "frames": {"interval": 0.4}}
+    axes = {"links": [40], "frequency": [15, 20], **grid}
+    result = warpchain.sweep(grid=axes, same_samples_along=list(axes), out=tmp_path / "a", progress=False, **settings)
+    bank = films.Bank.of(result)
+    seen = [row[0].seen(CAMERA, np.zeros(9), np.random.default_rng(0)) for row in bank.films[0]]
+    with pytest.raises(InputError, match=rf"^bank: {wrong} is the same in all films of .* independent: \[{wrong}\]"):
+        bank.posterior(seen)
+    with pytest.raises(InputError, match=r"^films: they are not .* a bank of 32 chains or more"):
+        bank.posterior(seen[:1])
+
+
+def test_films_of_a_chain_come_from_heights_of_their_own() -> None:
+    """Where a bank has three heights on an axis, two films of a hidden chain may be of any two; intervals hold."""
+    speeds, heights = ((60, 5.0), (60, 20.0)), (0.006, 0.010, 0.014)
+    bank, hidden = (made_bank(chains, seed, 3, speeds, heights) for chains, seed in ((96, 1), (60, 2)))
+    errors, refused = [], 0
+    for chain, truth in enumerate(hidden.values):
+        random = np.random.default_rng(chain)
+        shared = CAMERA.errors(random)
+        seen = [row[random.integers(3)].seen(CAMERA, shared, random) for row in hidden.films[chain]]
+        try:
+            answer = bank.posterior(seen)
+        except InputError:
+            refused += 1
+            continue
+        errors.append((answer.mean - truth) / answer.sigma)
+    assert refused < 12 and (np.mean(np.abs(errors) < 1.96, axis=0) > 0.85).all()

@@ -10,8 +10,8 @@ from tests.oracle_model import contact_equations, motion_equations
 from tests.oracle_model.circular_loop import circular_loop
 from tests.support.arrays import Array
 from tests.support.presets import PAPER, SOFT
+from warpchain.chain.start_shapes import ellipse, lay_chain, links_between
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.start_shapes import ellipse, lay_chain, links_between
 from warpchain.kernels.methods.method import method_names
 from warpchain.run.simulation import Trajectory
 
@@ -20,6 +20,10 @@ State = tuple[Array, Array]
 
 METHODS = method_names()
 every_method = pytest.mark.parametrize("method", METHODS)
+MIXED = ("os32", "dp5", "hybrid")
+every_precision = pytest.mark.parametrize(
+    ("method", "precision"), [*((name, "double") for name in METHODS), *((name, "mixed") for name in MIXED)]
+)
 
 UNDISSIPATIVE: Final[Mapping[str, float]] = {
     "joint_stiffness": 1e5,

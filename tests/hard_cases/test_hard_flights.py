@@ -23,6 +23,7 @@ from tests.hard_cases.starts import (
     energy_error,
     energy_scale,
     every_method,
+    every_precision,
     folded,
     overlapping,
     pulled_apart,
@@ -43,9 +44,9 @@ class Flight:
     duration: float
     settings: dict[str, Any] = field(default_factory=dict)
 
-    def simulate(self, method: str) -> Trajectory:
+    def simulate(self, method: str, precision: str = "double") -> Trajectory:
         """Its end; one that takes 20 million attempts counts as hanging."""
-        limits = {"step_limit": 20_000_000, "flight_tolerance": 1e-4}
+        limits = {"step_limit": 20_000_000, "flight_tolerance": 1e-4, "precision": precision}
         return simulate(self.parameters, self.start(), self.duration, method=method, **limits | self.settings)
 
 
@@ -191,11 +192,11 @@ FLIGHTS: list[tuple[Check, Flight, float]] = [
 """What must hold, the flight, and how well its energy ledger closes."""
 
 
-@every_method
+@every_precision
 @pytest.mark.parametrize(("check", "flight", "within"), FLIGHTS, ids=[check.__name__ for check, _, _ in FLIGHTS])
-def test_flights(check: Check, flight: Flight, within: float, method: str) -> None:
+def test_flights(check: Check, flight: Flight, within: float, method: str, precision: str) -> None:
     """Every flight ends sound, and as its check says."""
-    start, end = flight.start(), flight.simulate(method)
+    start, end = flight.start(), flight.simulate(method, precision)
     assert_sound(end, flight.parameters, start, within)
     check(flight, start, end)
 
@@ -233,17 +234,27 @@ def test_any_smoothing_of_friction(method, smoothing):
 
 
 @pytest.mark.parametrize(
-    ("method", "tolerance", "bound"),
-    [("rkf78", 1e-8, 1e-5), ("dp5", 1e-8, 5e-5), ("bs32", 1e-7, 3e-3), ("os32", 1e-7, 3e-3), ("hybrid", 1e-7, 3e-3)],
+    ("method", "tolerance", "bound", "precision"),
+    [
+        ("rkf78", 1e-8, 1e-5, "double"),
+        ("dp5", 1e-8, 5e-5, "double"),
+        ("bs32", 1e-7, 3e-3, "double"),
+        ("os32", 1e-7, 3e-3, "double"),
+        ("hybrid", 1e-7, 3e-3, "double"),
+        ("os32", 1e-6, 3e-2, "mixed"),
+        ("hybrid", 1e-6, 3e-2, "mixed"),
+    ],
 )
-def test_elastic_bouncing_keeps_the_energy_for_a_second(method, tolerance, bound):
+def test_elastic_bouncing_keeps_the_energy_for_a_second(method, tolerance, bound, precision):
     """Without any dissipation a bouncing chain keeps its energy and its momentum along the floor over 1 s.
 
     A step may err by the tolerance, and in a spring that rings 10 000 rad/s for a second without damping nothing
     forgets an error: the bounds are a few times what this makes of the tolerance.
     """
     state = BOUNCING()
-    flight = warpchain.simulate(ELASTIC, *state, 1.0, times=np.linspace(0, 1, 21), method=method, tolerance=tolerance)
+    flight = warpchain.simulate(
+        ELASTIC, *state, 1.0, times=np.linspace(0, 1, 21), method=method, tolerance=tolerance, precision=precision
+    )
     assert flight.status == Status.FINISHED
     energy = [
         motion_equations.total_energy(x, v, ELASTIC) for x, v in zip(flight.position, flight.velocity, strict=True)
@@ -280,12 +291,12 @@ def test_whole_turns_of_a_link_mean_nothing(method):
         assert np.abs(flight.position[-1] - plain.position[-1])[:, :2].max() < 1e-6
 
 
-@every_method
+@every_precision
 @pytest.mark.parametrize("factor", [1e10, 1e100, 1e200, 1e305])
-def test_absurd_speeds_are_a_status(method, factor):
+def test_absurd_speeds_are_a_status(method, precision, factor):
     """Speeds beyond what numbers can hold end at the start with a status; no NaN and no infinity comes back."""
     position, velocity = dropped()
-    flight = simulate(SOFT, (position, velocity * factor), 1e-2, method=method)
+    flight = simulate(SOFT, (position, velocity * factor), 1e-2, method=method, precision=precision)
     assert flight.status in (Status.STEP_TOO_SMALL, Status.NOT_FINITE)
     assert flight.status == Status.NOT_FINITE or factor < 1e305
     assert flight.time[-1] == 0.0

@@ -10,7 +10,7 @@ from tests.hard_cases.starts import METHODS, SOFT, every_method
 from tests.support.setups import setup_walk
 from warpchain import Status, WalkResult
 from warpchain.inputs.methods import METHODS_BY_NEED
-from warpchain.walks.one_walk import run_walk
+from warpchain.results.one_walk import run_walk
 
 QUICK = ("rkf78", "dp5", "hybrid")
 every_method_walks = pytest.mark.parametrize(

@@ -1,13 +1,15 @@
 """Values of Table 1, presets, slips of units, and what a chain on its sprocket needs."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from pydantic import ValidationError
 
+from warpchain.chain.setup import Setup
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS, Parameters, preset
-from warpchain.inputs.scene import Scene, check_scene, contact_radius, fewest_links, joint_radius
+from warpchain.inputs.scene import Scene
 from warpchain.inputs.validation import InputError
 
 TABLE_1 = {
@@ -67,18 +69,23 @@ def test_presets() -> None:
     assert repr(preset("paper").with_values({"gravity": 10}).gravity) == "10.0"
 
 
+def setup_of(scene: Scene, parameters: Parameters) -> Setup:
+    """The setup of a walk with usual options, unchecked."""
+    return Setup("paper", parameters, scene, Options())
+
+
 def test_contact_and_pitch_radius() -> None:
     """The sprocket radius is where circles touch, or one circle radius further out where joints ride."""
     parameters = preset("paper")
-    contact, pitch = Scene(sprocket_radius_is="contact"), Scene(sprocket_radius_is="pitch")
-    assert (contact_radius(contact, parameters), joint_radius(pitch, parameters)) == (5.56e-2, 5.56e-2)
-    assert joint_radius(contact, parameters) == pytest.approx(5.98e-2, rel=1e-14)
-    assert contact_radius(pitch, parameters) == pytest.approx(5.14e-2, rel=1e-14)
+    contact, pitch = (setup_of(Scene(sprocket_radius_is=kind), parameters) for kind in ("contact", "pitch"))
+    assert (contact.contact_radius, pitch.joint_radius) == (5.56e-2, 5.56e-2)
+    assert contact.joint_radius == pytest.approx(5.98e-2, rel=1e-14)
+    assert pitch.contact_radius == pytest.approx(5.14e-2, rel=1e-14)
     small = parameters.with_values({"sprocket_radius": 4.2e-3})
     with pytest.raises(InputError, match=r"^parameters\.sprocket_radius: 0\.0042 is too small"):
-        check_scene(pitch, small)
-    check_scene(contact, small)
-    check_scene(Scene(sprocket_radius_is="pitch", start="ellipse"), small)
+        replace(pitch, parameters=small).checked()
+    replace(contact, parameters=small).checked()
+    setup_of(Scene(sprocket_radius_is="pitch", start="ellipse"), small).checked()
 
 
 @pytest.mark.parametrize("sides", [6, 8, 30, 60])
@@ -90,8 +97,8 @@ def test_fewest_links_is_the_polygon(sides: int, kind: str) -> None:
     corner_radius = 0.02 / (2 * math.sin(math.pi / sides)) - (0.002 if kind == "contact" else 0.0)
     inside = parameters.with_values({"sprocket_radius": corner_radius * (1 - 1e-9)})
     outside = parameters.with_values({"sprocket_radius": corner_radius * (1 + 1e-9)})
-    check_scene(scene, inside)
-    assert (fewest_links(scene, inside), fewest_links(scene, outside)) == (sides, sides + 2)
+    reaches, is_short = setup_of(scene, inside).checked(), setup_of(scene, outside)
+    assert (reaches.fewest_links, is_short.fewest_links) == (sides, sides + 2)
     with pytest.raises(InputError, match=rf"^scene\.links: {sides} links .* give at least {sides + 2}$"):
-        check_scene(scene, outside)
-    check_scene(Scene.model_validate({**scene.model_dump(), "start": "ellipse"}), outside)
+        is_short.checked()
+    setup_of(Scene.model_validate({**scene.model_dump(), "start": "ellipse"}), outside).checked()

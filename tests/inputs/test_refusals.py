@@ -14,7 +14,7 @@ import pytest
 
 import warpchain
 from tests.support.setups import setup_walk
-from warpchain.inputs.setup import SECTIONS, resolve
+from warpchain.chain.resolution import SECTIONS, resolve
 from warpchain.inputs.validation import LONGEST_LINE, SECTION_OF, InputError, field_limits
 from warpchain.inputs.yaml_files import LARGEST_FILE, read_yaml
 from warpchain.kernels.methods.method import find_method, method_names
@@ -98,8 +98,23 @@ STILL = [0.1, 0, 0, 0]
         ),
         ({"contact_step": 1e-13}, "options.smallest_step: 1e-12 s is not below contact_step; give less"),
         ({"circle_radius": 0.007}, "parameters.circle_radius: 0.007 is not below half a link, 0.00634; give less"),
-        ({"ell": 12.68, "r": 5e-3}, "parameters.link_length: 1000 times Table 1's; give 0.01268 m"),
-        ({"m_inner": 3.7}, "parameters.inner_mass: 1000 times Table 1's; give 0.0037 kg"),
+        # values in other units
+        ({"ell": 12.7}, "parameters.link_length: 12.7 m is 1000 times Table 1's; did you mean 0.0127 (12.7 mm)? Else "),
+        ({"ell": 1.27}, "parameters.link_length: 1.27 m is 100 times Table 1's; did you mean 0.0127 (1.27 cm)? Else "),
+        ({"ell": 0.5}, "parameters.link_length: 0.5 m is 39.4 times Table 1's; did you mean 0.0127 (0.5 inches)? "),
+        ({"R": 55.6}, "parameters.sprocket_radius: 55.6 m is 1000 times Table 1's; did you mean 0.0556 (55.6 mm)? "),
+        ({"m_inner": 3.7}, "parameters.inner_mass: 3.7 kg is 1000 times Table 1's; did you mean 0.0037 (3.7 g)? Else "),
+        ({"m_outer": 3e-6}, "parameters.outer_mass: 3e-6 kg is 0.000953 times Table 1's; give it in kg, or set "),
+        (
+            {"I_inner": 169},
+            "parameters.inner_inertia: 169 kg m² is 1e9 times Table 1's; did you mean 1.69e-7 (169 g mm²)",
+        ),
+        ({"g": 981}, "parameters.gravity: 981 m/s² is 100 times Table 1's; did you mean 9.81 (981 cm/s²)? Else set "),
+        (
+            {"link_masses": [3.7] * 60},
+            "scene.link_masses: 3.7 kg is 1000 times Table 1's; did you mean 0.0037 (3.7 g)?",
+        ),
+        ({"charm_radius": 4.5}, "scene.charm_radius: 4.5 m is 1070 times Table 1's; did you mean 0.0045 (4.5 mm)? "),
         # links that are unlike
         ({"links": 61}, "scene.links: 61 is odd; give an even number, or link_masses and "),
         ({"links": 61, "start": "ellipse"}, "scene.links: 61 is odd; give an even number, or link_masses and "),

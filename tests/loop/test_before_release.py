@@ -8,7 +8,7 @@ import pytest
 import warpchain
 from warpchain.inputs.validation import InputError
 from warpchain.loop.stationary_loop import FIELDS, BeforeRelease
-from warpchain.walks.one_walk import run_walk
+from warpchain.results.one_walk import run_walk
 
 BRIEF = {
     "links": 40,

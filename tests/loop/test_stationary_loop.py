@@ -5,7 +5,7 @@ import pytest
 
 from tests.support.made_walks import make_walk
 from tests.support.presets import SOFT
-from warpchain.inputs.start_shapes import ellipse, lay_chain
+from warpchain.chain.start_shapes import ellipse, lay_chain
 from warpchain.loop.stationary_loop import BeforeRelease, StationaryLoop, average_frames
 
 LENGTH, MASS = SOFT.link_length, (SOFT.inner_mass + SOFT.outer_mass) / 2

@@ -12,7 +12,7 @@ from matplotlib.patches import Circle
 
 from tests.support.made_tilting_walks import make_tilting_walk
 from tests.support.made_walks import made_setup, make_unreleased, make_walk
-from warpchain.inputs.sprocket_motion import sprocket_places
+from warpchain.chain.sprocket_motion import sprocket_places
 from warpchain.pictures.animation import Film
 from warpchain.pictures.chain import link_outlines
 from warpchain.pictures.labels import kinds_of

@@ -1,5 +1,7 @@
 """Figures of a quantity over any grid."""
 
+import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +16,8 @@ from warpchain.inputs.validation import InputError
 from warpchain.pictures.grid_figure import MOST_PANELS
 from warpchain.pictures.style import NothingToShow
 from warpchain.reports.sweep_figures import figures
+from warpchain.reports.sweep_page import write_report
+from warpchain.results.sweep_result import load, merge
 from warpchain.status import Status
 from warpchain.sweeps.plan import PlannedWalk
 
@@ -50,8 +54,8 @@ def lines(axes: Axes) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 def drawn_lines(axes: Axes) -> list[Any]:
-    """The lines of a panel, without the crosses of failures."""
-    return [line for line in axes.lines if line.get_marker() != "x"]
+    """The lines of a panel, without the crosses of failures and the marks of survivors."""
+    return [line for line in axes.lines if line.get_marker() != "x" and line.get_label() != "_mark"]
 
 
 def legend_texts(figure: Any) -> list[str]:
@@ -268,3 +272,67 @@ def test_the_axis_along_x_may_be_chosen(tmp_path: Path) -> None:
         np.testing.assert_array_equal([mean for _, mean in lines(axes)], means[row])
     with pytest.raises(InputError, match=r"^x: 'gravity' is no axis of several values; give one of links, freq"):
         result.plot(x="gravity")
+
+
+# Means of survivors
+
+
+def slid_away(walk: PlannedWalk) -> float | Status:
+    """On the slope of 15° two of three walks go on without end, on that of 20° all."""
+    if walk.setup.scene.slope == 20 or (walk.setup.scene.slope == 15 and walk.sample):
+        return Status.DISTANCE_LIMIT
+    return 2.0
+
+
+def test_means_of_survivors_are_marked_and_bounded(tmp_path: Path, command: Command) -> None:
+    """Figure, table, JSON and page mark a mean that leaves out walks, and bound that of all walks where one can."""
+    content = sweep({"slope": [0, 15, 20]}, scene={"distance_limit": 20.0})
+    result = make_sweep(tmp_path / "slope", content, slid_away)
+    cells = result.statistics()
+    assert cells.of_survivors.tolist() == [False, True, False] and cells.absent.tolist() == [0, 2, 3]
+    np.testing.assert_allclose(cells.at_least, [np.nan, (2.0 + 2 * 20.0) / 3, 20.0])
+    figure = result.plot()
+    (axes,) = panels(figure).values()
+    marks = {line.get_marker(): line.get_xydata().tolist() for line in axes.lines if line.get_label() == "_mark"}
+    assert marks == {"o": [[15.0, 2.0]], "^": [[15.0, pytest.approx(14.0)], [20.0, 20.0]]}
+    assert {"mean of survivors only", "at least, of all walks"} <= set(legend_texts(figure))
+    text = command("info", str(tmp_path / "slope")).out
+    assert "2.0000*" in text and "14.0000" in text and "* mean of the walks that came to rest only" in text
+    (block,) = json.loads(command("info", str(tmp_path / "slope"), "--json").out)["blocks"].values()
+    assert block["dx"]["at_least"] == [None, 14.0, 20.0]
+    write_report(tmp_path / "slope", tmp_path / "page.html")
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "2.0000*" in page and "mean of the walks that came to rest only" in page
+
+
+@pytest.mark.parametrize(
+    ("keys", "bound"),
+    [
+        ({"scene": {"distance_limit": 20.0}}, 14.0),
+        ({"scene": {"distance_limit": 20.0, "floor": [[-1, 0], [0, 0], [0, -0.1], [1, -0.1]]}}, 14.0),
+        ({"scene": {"distance_limit": 20.0, "floor": [[0, 0], [0.5, -0.1], [1, 0.2]]}}, math.nan),
+        ({"scene": {"distance_limit": 20.0, "slope": -10}}, math.nan),
+    ],
+)
+def test_a_bound_needs_a_floor_that_does_not_rise(tmp_path: Path, keys: dict[str, Any], bound: float) -> None:
+    """Where a chain may slide back, how far it was says nothing of Δx; the mean is marked all the same."""
+    content = sweep({"frequency": [10, 20]}, **keys)
+    ended = make_sweep(tmp_path, content, lambda walk: Status.DISTANCE_LIMIT if walk.sample else 2.0)
+    np.testing.assert_allclose(ended.statistics().at_least, [bound, bound])
+    assert ended.statistics().of_survivors.all()
+    assert np.isnan(ended.statistics("walk_time").at_least).all()
+
+
+def test_a_figure_of_one_randomisation_says_that_it_has_no_errors(tmp_path: Path, command: Command) -> None:
+    """Legend, table and page say why no bars are there; eight randomisations have bars."""
+    for count, text in ((1, "one randomisation: no standard error"), (8, "± standard error")):
+        content = sweep({"frequency": [5, 10, 15]}, sampler="sobol", samples=16, randomisations=count)
+        result = make_sweep(tmp_path / str(count), content)
+        assert text in legend_texts(result.plot()) and len(legend_texts(result.plot())) == 3
+        told = command("info", str(tmp_path / str(count))).out
+        assert ("gives no standard error; randomisations: 8" in told) == (count == 1)
+        assert result.to_xarray().randomisation.values.tolist() == [k % count for k in range(16)]
+    merge(tmp_path / "8", tmp_path / "8.h5")
+    np.testing.assert_array_equal(
+        load(tmp_path / "8.h5").statistics().standard_error, result.statistics().standard_error
+    )

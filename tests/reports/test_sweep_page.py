@@ -15,10 +15,10 @@ from tests.support.made_walks import make_unreleased, make_walk
 from warpchain.inputs.validation import InputError
 from warpchain.reports import sweep_page
 from warpchain.reports.sweep_page import write_report
+from warpchain.results.sweep_result import load
+from warpchain.results.walk_result import WalkResult
 from warpchain.status import Status
-from warpchain.store.sweep_result import load
 from warpchain.sweeps.plan import PlannedWalk, load_sweep
-from warpchain.walks.walk_result import WalkResult
 
 CONTENT = SMALL | {"options": {"method": "explicit"}, "distributions": {"gravity": {"uniform": [9.0, 10.0]}}}
 
@@ -100,7 +100,7 @@ def with_walk(monkeypatch: pytest.MonkeyPatch, made: Callable[..., WalkResult], 
         asked.append(setup)
         return made(**changes)
 
-    monkeypatch.setattr("warpchain.walks.one_walk.run_walk", run_walk)
+    monkeypatch.setattr("warpchain.results.one_walk.run_walk", run_walk)
     return asked
 
 
@@ -115,7 +115,7 @@ def test_cells(folder: Path, page: str) -> None:
     dx = load(folder).blocks["rest"].dx
     sample = dx[0, 1, 1:]
     mean, sd = sample.mean(), sample.std(ddof=1)
-    assert rows[2] == ["60", "20", f"{mean:.4f}", f"{sd:.4f}", f"{sd / 2**0.5:.4f}", "2", "1"]
+    assert rows[2] == ["60", "20", f"{mean:.4f}*", f"{sd:.4f}", f"{sd / 2**0.5:.4f}", "2", "1"]
     assert rows[5][-1] == "not run yet" and rows[7][-3:] == ["2", "0", "1"]
 
 

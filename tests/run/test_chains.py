@@ -8,7 +8,7 @@ import pytest
 import warpchain
 from tests.support.folded_chains import folded_chain
 from tests.support.presets import SOFT
-from warpchain.inputs.start_shapes import ellipse, lay_chain
+from warpchain.chain.start_shapes import ellipse, lay_chain
 
 LINKS = 12
 

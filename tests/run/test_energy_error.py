@@ -12,10 +12,9 @@ from tests.support.command_line import Command
 from tests.support.made_walks import make_unreleased, make_walk
 from warpchain.cli.output import print_walk
 from warpchain.engine.tallies import CONTACTS
-from warpchain.inputs.scene import link_values
+from warpchain.results.sweep_result import load
 from warpchain.run.progress_bar import SweepProgress
 from warpchain.run.sweep_run import sweep
-from warpchain.store.sweep_result import load
 from warpchain.sweeps.plan import load_sweep
 from warpchain.walks.landmarks import FAULTS, LENGTHS
 from warpchain.walks.rows import faults_of_columns
@@ -80,7 +79,7 @@ def test_the_smallest_circle_tells_what_sank_in(circles: dict[str, Any], drawn: 
         {"version": 1, "name": "s", "seed": 1, "preset": "paper", "samples": 1, "distributions": draws, **given}
     )
     setup = sweep.planned(0).setup
-    narrowest = link_values(setup.scene, setup.parameters).radius.min()
+    narrowest = setup.link_values.radius.min()
     lengths = {name: sweep.blocks[0].parameter(name) for name in LENGTHS}
     for depth, sank in ((0.999 * narrowest, False), (1.001 * narrowest, True)):
         walk = make_walk(setup=setup, greatest_penetration=dict.fromkeys(CONTACTS, depth))

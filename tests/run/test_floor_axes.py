@@ -12,8 +12,8 @@ from pydantic.fields import FieldInfo
 import warpchain
 from tests.support.sweep_content import content
 from warpchain.inputs.validation import FIELDS, InputError
+from warpchain.results.sweep_result import merge
 from warpchain.run.sweep_run import sweep_of_keywords
-from warpchain.store.sweep_result import merge
 from warpchain.sweeps.block import is_axis
 from warpchain.sweeps.plan import load_sweep
 

@@ -12,7 +12,7 @@ from tests.support.presets import SOFT
 from tests.support.setups import setup_walk
 from warpchain import Chains, InputError, simulate, walk
 from warpchain.engine.batch import Batch
-from warpchain.walks import one_walk
+from warpchain.results import one_walk
 
 SETUP = setup_walk("soft", {})
 POSITION, VELOCITY = circular_loop(8, SOFT, 1.0)
@@ -90,7 +90,7 @@ REFUSED: dict[Callable[..., object], list[tuple[dict[str, Any], str]]] = {
         ({"links": 28}, r"scene\.links: 28 links do not reach round .*; give at least 30"),
         ({"clearance_of": "hanging", "start": "spinning"}, r"scene\.clearance_of: 'hanging' needs .*; give .*"),
         (
-            {"sprocket_radius": 3e-3, "sprocket_radius_is": "pitch"},
+            {"sprocket_radius": 3e-3, "sprocket_radius_is": "pitch", "unusual_values": True},
             r"parameters\.sprocket_radius: 0.003 is too small for .*; give more",
         ),
         ({"seed": True}, r"seed: Input should be a valid integer; given True"),

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.support.setups import setup_walk
-from warpchain.inputs.setup import Setup
+from warpchain.chain.setup import Setup
 from warpchain.run.sweep_run import run_shards, sweep
 from warpchain.run.workers import LostWorkersError
 from warpchain.status import Status
@@ -38,7 +38,7 @@ def brief_setup(seed: int, **settings: object) -> Setup:
 
 def outcome(run) -> tuple:
     """Everything of a walk that a row keeps."""
-    return run.status, run.outcome()["walk_time"], tuple(run.counts.values()), tuple(run.energy().values())
+    return run.status, run.outcome().walk_time, str(vars(run.outcome()))
 
 
 def outcomes(setups, **how) -> list:

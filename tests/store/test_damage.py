@@ -13,10 +13,10 @@ from tests.support.command_line import Command
 from tests.support.made_walks import make_walk
 from tests.support.synthetic_sweep import SWEEP, run
 from warpchain.inputs.validation import InputError
+from warpchain.results.sweep_result import load, merge
+from warpchain.results.walk_result import load_walk
 from warpchain.store.folder import SweepFolder
-from warpchain.store.sweep_result import load, merge
 from warpchain.version import FORMAT_VERSION
-from warpchain.walks.walk_result import load_walk
 
 FLIPS, SECTOR = 200, 512
 
@@ -89,7 +89,7 @@ def test_info_tells_a_damaged_file_from_another(tmp_path: Path, command: Command
     path.write_bytes(content)
     answer = command("info", str(path))
     assert answer.status == 1
-    assert answer.err.startswith(f"error: {path}: damaged, cut short or of an earlier warpchain; ")
+    assert answer.err.startswith(f"error: {path}: damaged or cut short; ")
     shard = next((tmp_path / "sweep/shards").iterdir())
     answer = command("info", str(shard))
     assert answer.status == 2
@@ -107,7 +107,7 @@ def test_files_of_other_versions_are_refused(tmp_path: Path, version: int, monke
     with pytest.raises(InputError, match="update warpchain$" if newer else "of an earlier warpchain, which reads it"):
         load_walk(path)
     path.write_bytes(b"\x89HDF\r\n\x1a\n" + b"x" * 900 + _OLDER)
-    with pytest.raises(InputError, match=f"^{path}: damaged, cut short or of an earlier warpchain; "):
+    with pytest.raises(InputError, match=f"^{path}: of an earlier warpchain, or damaged; "):
         load_walk(path)
 
 

@@ -11,7 +11,7 @@ from tests.support.made_sweeps import distance, make_sweep
 from tests.support.sweep_content import content
 from warpchain.reports.sweep_figures import figures
 from warpchain.reports.sweep_page import write_report
-from warpchain.store.sweep_result import SweepResult, load, merge
+from warpchain.results.sweep_result import SweepResult, load, merge
 
 VALUES = {"floor_friction": 0.27, "clearance": 0.01, "tilt": 0.5}
 

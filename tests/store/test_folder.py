@@ -19,10 +19,11 @@ from tests.support import synthetic_sweep
 from tests.support.stopped_calls import is_stopped
 from tests.support.synthetic_sweep import LONG_SWEEP, SHARD_SIZE, SWEEP, content, run, synthetic_rows, write
 from warpchain.inputs.validation import InputError, InputWarning
-from warpchain.store import folder
+from warpchain.results.sweep_result import load
+from warpchain.run.sweep_run import run_shards
+from warpchain.store import shards
 from warpchain.store.folder import SweepFolder
 from warpchain.store.shards import Manifest, read_manifest, stamp, write_shard
-from warpchain.store.sweep_result import load
 from warpchain.sweeps.plan import Sweep, load_sweep
 from warpchain.version import NUMERICS_VERSION
 
@@ -45,7 +46,7 @@ def play(part: str, directory: Path, *within: str) -> Any:
 
 
 @contextmanager
-def refused(error: type[Exception], directory: Path, *words: str) -> Iterator[None]:
+def refused(error: type[Exception] | tuple[type[Exception], ...], directory: Path, *words: str) -> Iterator[None]:
     """The block fails with one line that has the words, and the folder keeps all that it had."""
     before = content(directory) if directory.exists() else {}
     with pytest.raises(error) as caught:
@@ -148,10 +149,52 @@ def test_other_numerics_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     """Walks of another version of the numerics are not gone on with, but still read."""
     run(tmp_path)
     (tmp_path / "lock").unlink()  # as of a copied folder
-    monkeypatch.setattr(folder, "NUMERICS_VERSION", 99)
+    monkeypatch.setattr(shards, "NUMERICS_VERSION", 99)
     with refused(InputError, tmp_path, f"numerics {NUMERICS_VERSION}, but this warpchain has 99", "start anew"):
         open_folder(tmp_path)
     assert load(tmp_path).missing_count == 0 and not (tmp_path / "lock").exists()
+
+
+def test_shards_of_other_numerics_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Such shards, copied into a folder, are named with both versions, by readers and by runs; nothing is deleted."""
+    run(tmp_path / "now")
+    with monkeypatch.context() as patched:
+        patched.setattr(shards, "NUMERICS_VERSION", 16)
+        run(tmp_path / "old")
+    path = tmp_path / "now/shards" / FIRST
+    shutil.copy(tmp_path / "old/shards" / FIRST, path)
+    for act in (load, open_folder):
+        with refused(InputError, tmp_path, f"{path}: ", f"of numerics 16, those of this folder of {NUMERICS_VERSION}"):
+            act(tmp_path / "now")
+
+
+def test_a_worker_of_other_numerics_computes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It compares its version with that of the folder before it begins."""
+    with open_folder(tmp_path) as opened:
+        seal, missing = stamp(tmp_path), opened.missing()
+    monkeypatch.setattr(shards, "NUMERICS_VERSION", 99)
+    monkeypatch.setattr("warpchain.run.sweep_run.run_setups", lambda *given, **more: pytest.fail("walks were run"))
+    words = f"{tmp_path}: its walks are of numerics {NUMERICS_VERSION}", "this warpchain has 99", "all workers"
+    with refused(InputError, tmp_path, *words):
+        run_shards(SWEEP, str(tmp_path), seal, missing[:1])
+
+
+@pytest.mark.parametrize("name", [".keep", "999999.h5", "000100.h5", "notes", "notes.txt", "000001.h5"])
+def test_only_what_a_sweep_has_written_is_deleted(tmp_path: Path, name: str) -> None:
+    """Files, folders and other programs' HDF5 files among the shards are named by --fresh, and all stays."""
+    run(tmp_path)
+    path = tmp_path / "shards" / name
+    if name in ("999999.h5", "notes"):
+        path.mkdir()
+        (path / "mine").write_text("mine")
+    else:
+        path.unlink(missing_ok=True)
+        path.write_bytes(b"\x89HDF\r\n\x1a\nmine" * 50)
+    with refused(InputError, tmp_path, f"{path}: no sweep has written this; move it out of this folder"):
+        open_folder(tmp_path, CHANGED, fresh=True)
+    if name[:6].isdigit():
+        with refused((InputError, OSError), tmp_path, f"{path}: "):
+            open_folder(tmp_path)
 
 
 @pytest.mark.parametrize("fresh", [False, True])
@@ -184,7 +227,7 @@ def test_a_shard_of_another_sweep_is_refused(tmp_path: Path) -> None:
         shutil.copy(stranger, first)
         with refused(InputError, tmp_path, f"{first}: a shard of another sweep", "move it"):
             open_folder(tmp_path / "one")
-    second.write_bytes(b"damaged")
+    second.write_bytes(second.read_bytes()[:-1])
     with refused(InputError, tmp_path, f"{first}: a shard of another sweep", "move it"):
         open_folder(tmp_path / "one")
     first.write_bytes(kept)

@@ -13,10 +13,10 @@ from tests.support.sweep_content import UNIFORM, blocks, content
 from tests.support.synthetic_sweep import content as files
 from tests.support.synthetic_sweep import run
 from warpchain.inputs.validation import InputError
-from warpchain.store import sweep_result
+from warpchain.results import sweep_result
+from warpchain.results.sweep_result import SweepResult, load, merge
 from warpchain.store.folder import SweepFolder
 from warpchain.store.shards import Manifest, read_manifest
-from warpchain.store.sweep_result import SweepResult, load, merge
 from warpchain.sweeps.designs import EXTENSIBLE
 from warpchain.sweeps.plan import PlannedWalk, load_sweep
 

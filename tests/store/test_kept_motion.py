@@ -8,12 +8,12 @@ import pytest
 
 import warpchain
 from tests.run.test_sweep_run import TINY, brief_setup, data_of, outcome, outcomes
+from warpchain.chain.keep import Keep
 from warpchain.engine.batch import CAPACITY_SAMPLES
 from warpchain.inputs.validation import InputError, InputWarning
 from warpchain.reports.sweep_page import write_report
+from warpchain.results.sweep_result import load
 from warpchain.run.sweep_run import sweep
-from warpchain.store.sweep_result import load
-from warpchain.walks.motion import Keep
 from warpchain.walks.scheduler import run_setups
 
 OFTEN = {"method": "dp5", "record_interval": 1e-4}
@@ -103,7 +103,7 @@ def test_long_motions_are_drained_between_launches() -> None:
     setup = brief_setup(1, record_interval=1e-6, walk_limit=0.04)  # a sample after each step
     ((_, run),) = run_setups([setup], keeps=[Keep(series_every=1, frame_every=10)])
     time = run.recorder.motion()["time"]
-    assert run.counts["accepted"] > 3 * CAPACITY_SAMPLES
+    assert run.outcome().steps_accepted > 3 * CAPACITY_SAMPLES
     np.testing.assert_allclose(time, np.arange(40_001) * 1e-6, rtol=1e-12)
     frames = run.recorder.motion()["frame_time"]
     assert len(frames) > 100 and np.all(np.diff(frames) > 0)
@@ -141,7 +141,7 @@ def test_damage_to_a_motion_is_seen(kept: Path, tmp_path: Path) -> None:
     content[content.index(wanted) + 11] ^= 4
     path.write_bytes(content)
     for read in (lambda: result.series(links=30, frequency=5, sample=3), lambda: load(tmp_path)):
-        with pytest.raises(InputError, match=f"{path}: damaged, .*; delete it and run the sweep again"):
+        with pytest.raises(InputError, match=f"{path}: damaged .*; move it out of this folder and run the sweep again"):
             read()
     with pytest.warns(InputWarning, match=f"{path}: .*; its walks are computed again"):
         sweep(KEPT, tmp_path)
@@ -154,7 +154,7 @@ def test_report_and_pictures_use_kept_frames(kept: Path, tmp_path: Path, monkeyp
     def refuse(*arguments: object, **settings: object) -> None:
         raise AssertionError("run again")
 
-    monkeypatch.setattr("warpchain.walks.one_walk.run_walk", refuse)
+    monkeypatch.setattr("warpchain.results.one_walk.run_walk", refuse)
     write_report(kept, tmp_path / "page.html", animation_of=12)
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "Its frames were kept by the sweep" in page and "run again" not in page

@@ -4,6 +4,7 @@ import itertools
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 
@@ -12,9 +13,10 @@ from tests.support.command_line import Command
 from tests.support.made_sweeps import make_sweep
 from tests.support.made_walks import assert_same
 from tests.support.sweep_content import blocks, content
+from tests.support.synthetic_sweep import run, synthetic_sweep
 from warpchain.inputs.validation import InputError, InputWarning
+from warpchain.results.sweep_result import load, merge
 from warpchain.run.sweep_run import sweep
-from warpchain.store.sweep_result import load, merge
 
 
 @pytest.mark.parametrize(
@@ -64,3 +66,23 @@ def test_parts_of_one_grid_are_the_whole(command: Command) -> None:
     assert command("merge", "part-1", "all.h5", "twice.h5").status == 2
     with pytest.raises(InputError, match=r"holds part 1/3 of its sweep, not 2/3; give --part 1/3"):
         sweep("tiny.yaml", "part-1", seed=11, samples=9, part="2/3")
+
+
+def test_several_folders_are_one_result_everywhere(tmp_path: Path, command: Command) -> None:
+    """`load`, `info` and `plot` take all parts of a sweep as `merge` does; a part says how far it is by itself."""
+    sweep = synthetic_sweep({"name": "main", "grid": {"links": [60, 90, 120]}, "samples": 9})
+    run(tmp_path / "whole", sweep)
+    parts = [tmp_path / f"part-{number}" for number in (1, 2)]
+    for number, folder in enumerate(parts, 1):
+        run(folder, sweep, part=(number, 2), shard_size=4)
+    for name, values in load(tmp_path / "whole").columns.items():
+        np.testing.assert_array_equal(load(parts).columns[name], values)
+    names = [*map(str, parts)]
+    assert command("info", *names).out == command("info", str(tmp_path / "whole")).out
+    assert "part 1/2: 14 of 14 walks\n" in command("info", names[0]).out
+    assert "part 2/2: 13 of 13 walks\n" in command("info", names[1]).out
+    min((parts[1] / "shards").glob("*.h5")).unlink()
+    assert "part 2/2: 9 of 13 walks\n" in command("info", names[1]).out
+    assert command("plot", *names, "-o", "figures").status == 0 and (tmp_path / "figures/distance.png").exists()
+    with pytest.raises(InputError, match="has walks that a folder before it has"):
+        load([parts[0], parts[0]])

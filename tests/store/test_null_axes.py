@@ -15,7 +15,7 @@ from tests.support.command_line import Command
 from tests.support.made_sweeps import make_sweep
 from warpchain.inputs.validation import InputError
 from warpchain.reports.sweep_figures import figures
-from warpchain.store.sweep_result import load, merge
+from warpchain.results.sweep_result import load, merge
 from warpchain.sweeps.plan import load_sweep
 
 AXES = {"load_factor": [None, 1.0], "steady_time": [None, 0.1], "soft_tolerance": [1e-3, None]}

@@ -11,12 +11,12 @@ import xarray
 from tests.support.command_line import Command
 from tests.support.synthetic_sweep import SHARD_SIZE, SWEEP, run, synthetic_rows, synthetic_sweep, write
 from warpchain.inputs.validation import InputError, InputWarning
+from warpchain.results.sweep_result import load, merge
+from warpchain.results.walk_result import load_walk
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
 from warpchain.store.shards import Manifest
-from warpchain.store.sweep_result import load, merge
 from warpchain.walks.rows import COLUMNS, STORED_COLUMNS, drawn_column
-from warpchain.walks.walk_result import load_walk
 
 SINGLE = synthetic_sweep(
     {
@@ -135,7 +135,7 @@ def test_no_sweep_no_result(tmp_path: Path, single: Path) -> None:
     run(tmp_path)
     path = tmp_path / "shards/000001.h5"
     path.write_bytes(path.read_bytes()[:-1])
-    with pytest.raises(InputError, match=f"{path}: damaged, cut short or of an earlier warpchain; delete it"):
+    with pytest.raises(InputError, match=f"{path}: damaged or cut short; move it"):
         load(tmp_path)
 
 
@@ -173,7 +173,7 @@ def test_merged_file_of_one_block(single: Path, tmp_path: Path) -> None:
         assert set(data.coords) == {"links", "start", "self_contact", "frequency", "sample"}
         xarray.testing.assert_equal(data, expected)
         assert data.self_contact.dtype == bool and data.start.values.tolist() == ["rest", "ellipse"]
-        assert set(data.attrs) == {*expected.attrs, "format", "format_version"}
+        assert set(data.attrs) == {*expected.attrs, "checksum", "format", "format_version", "format_digest"}
         for name in expected.variables:
             notes = {key: np.array(value).tolist() for key, value in data[name].attrs.items()}
             assert notes == {key: np.array(value).tolist() for key, value in expected[name].attrs.items()}, name

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 import warpchain
 from studies.waves.wave_drag import RUNNING, drag_waves, inertia_of, loop_motions, wave_motion
 from tests.support.arrays import Array
+from warpchain.chain.start_shapes import ellipse, lay_chain
 from warpchain.inputs.parameters import preset
-from warpchain.inputs.start_shapes import ellipse, lay_chain
 
 LINKS, SPEED = 60, 5.0
 CHAIN = preset("soft")

@@ -11,8 +11,10 @@ from tests.support.arrays import Array
 from tests.support.folded_chains import folded_chain
 from tests.support.presets import SOFT
 from tests.support.unlike_links import UnlikeLinks
-from warpchain.engine.batch import Batch, Recorded
-from warpchain.inputs.floor import Floor, floor_from
+from warpchain.chain.floor import Floor, floor_from
+from warpchain.chain.keep import NOTHING, Keep
+from warpchain.engine.batch import Batch
+from warpchain.engine.world import Recorded
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels.contacts.list_layout import list_layout
@@ -34,9 +36,9 @@ def floor_with(points: Array, parameters: Parameters | UnlikeLinks) -> Floor:
 def run_recorded(batch: Batch, features: Features) -> list[Recorded]:
     """Carry the first chain on until it stops: what each launch has recorded."""
     pieces = []
-    while batch.status(0) == Status.RUNNING:
+    while batch.worlds[0].status == Status.RUNNING:
         batch.launch([0], features)
-        pieces.append(batch.drain(0))
+        pieces.append(batch.worlds[0].drain())
     return pieces
 
 
@@ -78,17 +80,17 @@ def batch_of(
     """
     longest = max(len(position) for position, _ in chains)
     options = Options(method=method, tolerance=0.1 if fixed_step else tolerance, self_contact=self_contact)
-    kept = {"keeps_samples": keeps, "frame_every": 2 if keeps else None, "keeps_loads": keeps}
-    batch = Batch(len(chains), longest, options, faces=len(HILLS) - 1, **kept)
+    keep = Keep(series_every=1, frame_every=2, loads=True) if keeps else NOTHING
+    batch = Batch(len(chains), longest, options, keep, faces=len(HILLS) - 1)
     batch.control.launch_time = 1e9  # attempts alone end a launch, however busy the machine is
     if fixed_step:
         batch.control.skin = 1e-9
         batch.control.contact_step = FIXED_STEP
         batch.control.soft_contact_step = FIXED_STEP
     for world, (position, velocity) in enumerate(chains):
-        batch.set_chain(world, SOFT, len(position))
-        batch.load(world, position, velocity, stop_time=stop_time, stop_status=Status.FINISHED)
-        batch.set_drive(world, sprocket_speed=-50.0)
+        batch.worlds[world].set_chain(SOFT, len(position))
+        batch.worlds[world].load(position, velocity, stop_time=stop_time, stop_status=Status.FINISHED)
+        batch.worlds[world].set_drive(sprocket_speed=-50.0)
         if fixed_step:
             batch.state.step.numpy()[world] = FIXED_STEP
     return batch
@@ -106,15 +108,15 @@ def launch_kernel(batch: Batch, kernel: wp.Kernel, worlds: Sequence[int], attemp
 def launch_blocks(batch: Batch, features: Features, attempts: int, *, block_dim: int) -> None:
     """Carry all worlds on in the GPU kernel for these features."""
     kernel = gpu_loop.make_advance_block(features, block_dim)
-    launch_kernel(batch, kernel, range(len(batch.links)), attempts, block_dim=block_dim)
+    launch_kernel(batch, kernel, range(len(batch.worlds)), attempts, block_dim=block_dim)
 
 
 def launch_chains(batch: Batch, features: Features, attempts: int) -> None:
     """Carry all worlds on in the CPU kernel for these features."""
     batch.control.attempts = attempts
     arrays = [batch.model, batch.drive, batch.state, batch.record, batch.scratch, batch.lists, batch.control]
-    inputs = [wp.array(range(len(batch.links)), dtype=wp.int32, device="cpu"), *arrays]
-    wp.launch(cpu_loop.make_advance(features), dim=len(batch.links), inputs=inputs, device="cpu")
+    inputs = [wp.array(range(len(batch.worlds)), dtype=wp.int32, device="cpu"), *arrays]
+    wp.launch(cpu_loop.make_advance(features), dim=len(batch.worlds), inputs=inputs, device="cpu")
 
 
 def listed_pairs(batch: Batch, world: int = 0) -> set[tuple[int, int]]:

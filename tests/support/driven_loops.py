@@ -1,6 +1,6 @@
 """Loops on their sprocket: driven up to their release, and held on from there."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -8,11 +8,11 @@ import numpy as np
 from tests.support.arrays import Array
 from tests.support.blocks_under_test import run_recorded
 from tests.support.setups import setup_walk
+from warpchain.chain.keep import Keep
+from warpchain.chain.link_values import LinkValues
+from warpchain.chain.setup import Setup
 from warpchain.engine.batch import Batch
-from warpchain.inputs.link_values import LinkValues
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.scene import loop_speed
-from warpchain.inputs.setup import Setup
 from warpchain.kernels import layout
 from warpchain.status import Status
 from warpchain.walks.walk_phases import WalkRun
@@ -32,7 +32,7 @@ class Loop:
 
 def period_of(setup: Setup) -> float:
     """Time [s] in which a loop goes round, a quarter of a second if it stands still."""
-    speed = loop_speed(setup.scene, setup.parameters)
+    speed = setup.loop_speed
     return setup.scene.links * setup.parameters.link_length / speed if speed > 0 else 0.25
 
 
@@ -40,13 +40,13 @@ def released_loop(preset: str = "soft", **settings: Any) -> Loop:
     """Carry a walk of a preset's chain to the end of its drive."""
     setup = setup_walk(preset, {"method": "explicit"} | settings)
     batch = Batch(1, setup.scene.links, setup.options)
-    run = WalkRun(batch, 0, setup)
+    run = WalkRun(batch.worlds[0], setup)
     found: Loop | None = None
     for features in run.phases():
         if run.progress().phase == "walk":
             break
         batch.run([0], features)
-        found = Loop(setup, batch.position(0), batch.velocity(0))
+        found = Loop(setup, batch.worlds[0].position, batch.worlds[0].velocity)
     assert found is not None and run.progress().phase == "walk", "it was not released"
     return found
 
@@ -57,14 +57,16 @@ def hold(
     """Hold a loop on for a time [s] with other parameters; means of `SHAPE` at its end and `bottom_curvature`, (5,)."""
     setup = loop.setup
     scene = setup.scene
-    batch = Batch(1, scene.links, setup.options, keeps_samples=True, frame_every=1)
-    batch.set_chain(0, parameters, scene.links, own, scene)
+    batch = Batch(1, scene.links, setup.options, keep=Keep(series_every=1, frame_every=1))
+    other = replace(setup, parameters=parameters)
+    batch.worlds[0].set_chain(parameters, scene.links, own, other.contact_radius)
     softness = 1.0 if setup.options.soften_drive else 0.0
-    batch.load(0, loop.position, loop.velocity, stop_time=duration, stop_status=Status.NOT_STEADY, softness=softness)
-    batch.set_drive(
-        0,
+    batch.worlds[0].load(
+        loop.position, loop.velocity, stop_time=duration, stop_status=Status.NOT_STEADY, softness=softness
+    )
+    batch.worlds[0].set_drive(
         sprocket_speed=-2 * np.pi * scene.frequency,
-        loop_speed=loop_speed(scene, parameters),
+        loop_speed=other.loop_speed,
         loop_period=period_of(setup),
         load_factor=load_factor,
         steady_window=period_of(setup),
@@ -74,7 +76,7 @@ def hold(
         push_rate=5e3,
     )
     pieces = run_recorded(batch, batch.features(fixed_body="sprocket"))
-    assert batch.status(0) == Status.NOT_STEADY
+    assert batch.worlds[0].status == Status.NOT_STEADY
     rows, times, joints, _, _ = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
     since = duration - period_of(setup)
     shape = rows[rows[:, layout.TIME] > since][:, SHAPE].mean(axis=0)

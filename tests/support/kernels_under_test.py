@@ -14,9 +14,9 @@ import warp as wp
 from tests.support.arrays import Array
 from tests.support.blocks_under_test import floor_with
 from tests.support.unlike_links import UnlikeLinks
+from warpchain.chain.floor import Floor
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import start_device
-from warpchain.inputs.floor import Floor
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
@@ -25,8 +25,8 @@ from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.cpu.contacts.neighbour_list import list_slack, neighbour_list
 from warpchain.kernels.cpu.contacts.proximity import fixed_contacts, greatest_opening
 from warpchain.kernels.cpu.contacts.self_contacts import self_contacts
-from warpchain.kernels.cpu.explicit import place_ends
 from warpchain.kernels.cpu.loop import load_state
+from warpchain.kernels.cpu.placing import place_ends
 from warpchain.kernels.features import COMPILER_FLAGS
 from warpchain.kernels.types import Model, State, read_ground
 
@@ -51,9 +51,9 @@ def model_of(chains: Sequence[tuple[int, Parameters | UnlikeLinks]]) -> Model:
     batch = Batch(len(chains), max(links for links, _ in chains), Options())
     for world, (links, chain) in enumerate(chains):
         if isinstance(chain, UnlikeLinks):
-            batch.set_chain(world, chain.parameters, links, own=chain.own)
+            batch.worlds[world].set_chain(chain.parameters, links, own=chain.own)
         else:
-            batch.set_chain(world, chain, links)
+            batch.worlds[world].set_chain(chain, links)
     return batch.model
 
 
@@ -170,7 +170,7 @@ class ContactPass:
         for name, rows in (("faces", floor.faces()), ("cells", floor.cells(*sizes))):
             same = np.repeat(rows[None], len(chains), axis=0)
             setattr(self.model, name, wp.array(same, dtype=wp.float64, device=DEVICE))
-        worlds, rows, size = len(chains), layout.scratch_rows(0), list_layout(self.columns).size
+        worlds, rows, size = len(chains), layout.SCRATCH_ROWS, list_layout(self.columns).size
         self.state = State()
         self.state.load_factor = wp.ones(worlds, dtype=wp.float64, device=DEVICE)
         self.state.links = poisoned(worlds, 6, max(self.links))

@@ -26,22 +26,30 @@ def motion(friction: float, clearance: float = 0.01, stiffness: float = 1.0, fre
 
 
 def made_bank(
-    chains: int, seed: int, repetitions: int = 4, experiments: tuple[tuple[int, float], ...] = ((60, 20.0),)
+    chains: int,
+    seed: int,
+    repetitions: int = 4,
+    experiments: tuple[tuple[int, float], ...] = ((60, 20.0),),
+    clearances: tuple[float, ...] | None = None,
 ) -> films.Bank:
-    """Chains with drawn friction, radius (which outline and speed show) and restitution (which nothing shows)."""
+    """Chains with drawn friction, radius (which outline and speed show) and restitution (which nothing shows).
+
+    Each repetition has its clearance; None: each film has its own.
+    """
     random = np.random.default_rng(seed)
     normal = [NormalDist().inv_cdf((number + 0.5) / chains) for number in range(chains)]  # so that few are enough
     drawn = np.column_stack([random.permutation(normal) for _ in range(3)])
     values = np.array([0.27, 0.056, 0.05]) + np.array([0.05, 0.0015, 0.01]) * drawn
 
-    def film(chain: int, frequency: float) -> films.Film:
-        seen = motion(values[chain, 0], random.uniform(0.006, 0.014), frequency=frequency)
+    def film(chain: int, frequency: float, repetition: int) -> films.Film:
+        clearance = random.uniform(0.006, 0.014) if clearances is None else clearances[repetition]
+        seen = motion(values[chain, 0], clearance, frequency=frequency)
         assert seen.outline is not None
         outline = seen.outline + (values[chain, 1] - 0.056 + random.normal() * 1e-4) * np.array([-1, 1, 0, 2])
         return replace(seen, outline=outline, speed=2 * np.pi * frequency * (values[chain, 1] + 0.004))
 
     walks = [
-        [[film(chain, frequency) for _ in range(repetitions)] for _, frequency in experiments]
+        [[film(chain, frequency, number) for number in range(repetitions)] for _, frequency in experiments]
         for chain in range(chains)
     ]
     return films.Bank(("floor_friction", "sprocket_radius", "floor_restitution"), values, walks)

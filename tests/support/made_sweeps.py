@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from warpchain.results.sweep_result import SweepResult, load
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
 from warpchain.store.shards import stamp, write_shard
-from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import PlannedWalk, load_sweep
 from warpchain.walks.rows import KEYS, Rows, missing_rows, quantity_of
 

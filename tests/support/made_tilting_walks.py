@@ -7,8 +7,8 @@ import numpy as np
 
 from tests.support.arrays import Array
 from tests.support.made_walks import make_walk
-from warpchain.inputs.setup import resolve
-from warpchain.walks.walk_result import WalkResult
+from warpchain.chain.resolution import resolve
+from warpchain.results.walk_result import WalkResult
 
 
 def plane_axes(tilt: Array, yaw: Array) -> Array:

@@ -6,12 +6,15 @@ from typing import Any, get_args
 
 import numpy as np
 
+from warpchain.chain.resolution import resolve
+from warpchain.chain.setup import Setup
 from warpchain.engine.tallies import CONTACTS
-from warpchain.inputs.setup import Setup, resolve
 from warpchain.loop.stationary_loop import BeforeRelease
+from warpchain.results.walk_result import WalkResult
 from warpchain.status import Status
 from warpchain.walks.landmarks import RELEASE
-from warpchain.walks.walk_result import ENERGIES, MOTION, NUMBERS, WalkResult
+from warpchain.walks.outcome import ENERGIES
+from warpchain.walks.walk_numbers import MOTION, NUMBERS
 
 
 def make_walk(links: int = 30, **changes: Any) -> WalkResult:

@@ -6,8 +6,8 @@ from scipy.integrate import solve_ivp
 from tests.oracle_model import motion_equations
 from tests.support.arrays import Array
 from tests.support.presets import PAPER
+from warpchain.chain.start_shapes import ellipse, lay_chain
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.start_shapes import ellipse, lay_chain
 
 # --- by dense algebra ---
 

@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping
 
-from warpchain.inputs.setup import Setup, resolve
+from warpchain.chain.resolution import resolve
+from warpchain.chain.setup import Setup
 from warpchain.inputs.validation import by_section
 
 

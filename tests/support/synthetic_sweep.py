@@ -18,10 +18,10 @@ from typing import Any
 import h5py  # noqa: F401 - before the forks below, or each would read it anew
 import numpy as np
 
+from warpchain.results.sweep_result import load
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
 from warpchain.store.shards import Shard, stamp, write_shard
-from warpchain.store.sweep_result import load
 from warpchain.sweeps.plan import Sweep, load_sweep
 from warpchain.walks.rows import STORED_COLUMNS, Rows, missing_rows, quantity_of
 

@@ -10,13 +10,14 @@ import warp as wp
 from tests.oracle_model.tilting_plane import Plane
 from tests.support.arrays import Array
 from tests.support.kernels_under_test import DEVICE, chain_on_cpu, compiled, poisoned
+from warpchain.chain.keep import NOTHING, Keep
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.terrain import Face
-from warpchain.kernels.cpu.explicit import place_ends
 from warpchain.kernels.cpu.loop import load_state
+from warpchain.kernels.cpu.placing import place_ends
 from warpchain.kernels.cpu.tilting import resolve_tilting_floor, tilting_gap, write_plane_sums
 from warpchain.kernels.physics.plane import on_plane
 from warpchain.kernels.types import Ground, Model, State
@@ -27,12 +28,12 @@ Start = tuple[Array, Array, Plane]
 
 
 def row_of(plane: Plane) -> Array:
-    """A plane as `Batch.set_plane` takes it, (12,)."""
+    """A plane as `World.set_plane` takes it, (12,)."""
     return np.array([plane.speed, *plane.turn, *plane.x, *plane.y, *plane.origin])
 
 
 def plane_of(row: Array) -> Plane:
-    """A plane from what `Batch.plane` gives, (12,)."""
+    """A plane from what `World.plane` gives, (12,)."""
     return Plane(float(row[0]), row[1:3].copy(), row[3:6].copy(), row[6:9].copy(), row[9:12].copy())
 
 
@@ -44,29 +45,29 @@ def tilting_batch(
     *,
     longest_step: float | None = None,
     stop_status: Status = Status.FINISHED,
-    **kept: bool | int,
+    keep: Keep = NOTHING,
 ) -> Batch:
-    """A batch of chains of equal length, about to start; `kept` is what it is to keep.
+    """A batch of chains of equal length, about to start.
 
     No step is longer than `longest_step` [s]; all are that long if the tolerance allows more. It needs contacts, among
     links or with the floor, in the kernel's features. A run that stops as `FINISHED` does not end at rest before.
     """
     links = len(starts[0][0])
-    batch = Batch(len(starts), links, options, tilts=True, **kept)
+    batch = Batch(len(starts), links, options, keep, tilts=True)
     if longest_step is not None:
         batch.control.skin, batch.control.contact_step = 1e-9, longest_step
     for world, ((position, velocity, plane), chain) in enumerate(zip(starts, parameters, strict=True)):
-        batch.set_chain(world, chain, links)
-        batch.load(world, position, velocity, stop_time=stop_time, stop_status=stop_status)
+        batch.worlds[world].set_chain(chain, links)
+        batch.worlds[world].load(position, velocity, stop_time=stop_time, stop_status=stop_status)
         if longest_step is not None:
             batch.state.step.numpy()[world] = longest_step
-        batch.set_plane(world, row_of(plane))
+        batch.worlds[world].set_plane(row_of(plane))
     return batch
 
 
 def end_of(batch: Batch, world: int = 0) -> Start:
     """Where a run has left a chain."""
-    return batch.position(world), batch.velocity(world), plane_of(batch.plane(world))
+    return batch.worlds[world].position, batch.worlds[world].velocity, plane_of(batch.worlds[world].plane)
 
 
 def fly(
@@ -78,12 +79,15 @@ def fly(
     tolerance: float = 1e-9,
     longest_step: float | None = None,
 ) -> Batch:
-    """A flight [s] that must reach its end without contacts; the batch afterwards. Steps as in `tilting_batch`."""
-    options = Options(method=method, tolerance=tolerance)
+    """A flight [s], in double precision, that must reach its end without contacts; the batch afterwards.
+
+    Steps are as in `tilting_batch`.
+    """
+    options = Options(method=method, tolerance=tolerance, precision="double")
     batch = tilting_batch([start], [parameters], options, duration, longest_step=longest_step)
     batch.run([0], batch.features(fixed_body="floor", tilts=True))
-    assert batch.status(0) == Status.FINISHED
-    assert batch.counts(0)["self"] == batch.counts(0)["floor"] == 0
+    assert batch.worlds[0].status == Status.FINISHED
+    assert batch.worlds[0].counts["self"] == batch.worlds[0].counts["floor"] == 0
     return batch
 
 
@@ -128,7 +132,7 @@ def floor_pass(
     links = len(position)
     columns = layout.padded_width(links)
     model, state = chain_on_cpu(position, velocity, parameters)
-    scratch = poisoned(1, layout.scratch_rows(0), columns)
+    scratch = poisoned(1, layout.SCRATCH_ROWS, columns)
     values = np.full((1, layout.PLANE_ROWS), np.nan)
     values[0, : layout.PLANE_VALUES] = row_of(plane)
     planes = wp.array(values, dtype=wp.float64, device=DEVICE)

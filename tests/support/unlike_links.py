@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from warpchain.inputs.link_values import LinkValues
+from warpchain.chain.link_values import LinkValues
 from warpchain.inputs.parameters import Parameters
 
 

@@ -93,6 +93,7 @@ def test_digest_tells_apart_what_matters() -> None:
         {"grid": {"frequency": [5, 10], "links": [60, 90]}},
         {"grid": {"links": [60, 90], "frequency": [5, 10.000000000000002]}},
         {"same_samples_along": ["links"]},
+        {"independent": ["clearance"]},
         {"record": {"series": True}},
         {"record": {"series": {"interval": 2e-3}}},
         {"record": {"series": True, "frames": True}},

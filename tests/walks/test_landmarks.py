@@ -9,7 +9,7 @@ import pytest
 import warpchain
 from tests.support.made_walks import make_unreleased, make_walk
 from warpchain import InputError, WalkResult
-from warpchain.inputs.setup import resolve
+from warpchain.chain.resolution import resolve
 from warpchain.walks.landmarks import bounces
 
 

@@ -10,7 +10,7 @@ from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 import warpchain
 from tests.walks.test_states import assert_rest_of
 from warpchain import InputError
-from warpchain.inputs.sprocket_motion import motion_rows, sprocket_places
+from warpchain.chain.sprocket_motion import motion_rows, sprocket_places
 from warpchain.kernels.contacts.fixed_body import moved_sprocket
 from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.types import Drive

@@ -10,7 +10,7 @@ import warpchain
 from tests.oracle_model.motion_equations import friction_torque, link_masses
 from tests.support.made_walks import assert_same
 from warpchain.inputs.validation import InputError
-from warpchain.walks.walk_result import WalkResult
+from warpchain.results.walk_result import WalkResult
 
 FLIGHT: dict[str, Any] = {"preset": "soft", "start": "ellipse", "links": 24, "clearance": 0.03, "walk_limit": 0.04}
 """A loop that does not reach the floor within its 40 ms."""

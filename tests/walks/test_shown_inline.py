@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from tests.support.made_sweeps import FIGURE_6, make_sweep
 from tests.support.made_walks import make_unreleased, make_walk
-from warpchain.store.sweep_result import SweepResult
+from warpchain.results.sweep_result import SweepResult
 
 PNG = b"\x89PNG\r\n\x1a\n"
 

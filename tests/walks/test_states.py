@@ -13,7 +13,7 @@ from scipy.optimize import minimize
 import warpchain
 from tests.oracle_model.motion_equations import gravitational_energy, kinetic_energy
 from warpchain import InputError, State, WalkResult
-from warpchain.walks.walk_result import MOTION, NUMBERS
+from warpchain.walks.walk_numbers import MOTION, NUMBERS
 
 SPUN = {"links": 36, "frequency": 15.0, "start": "spinning"}
 ELLIPSE = {"links": 36, "frequency": 20.0, "start": "ellipse", "preset": "soft", "method": "dp5"}
@@ -132,7 +132,7 @@ RING = outline(12, LENGTH)
 
 def test_a_measured_outline_closes_and_moves_as_little_as_it_must() -> None:
     """Joints with errors become links of one length that meet; no way to do so needs noticeably less motion."""
-    measured = RING + np.random.default_rng(3).normal(0, 3e-4, (12, 2))
+    measured = RING + np.random.default_rng(3).normal(0, 7e-5, (12, 2))
     state = State.of_joints(measured)
     spans = np.linalg.norm(state.joints - np.roll(state.joints, 1, axis=0), axis=1)
     np.testing.assert_allclose(spans, LENGTH, rtol=1e-12)

@@ -10,8 +10,7 @@ import warpchain
 from tests.support.presets import SOFT
 from tests.support.setups import setup_walk
 from warpchain import Status
-from warpchain.inputs.link_values import alternating
-from warpchain.inputs.scene import link_values, riding_radius
+from warpchain.chain.link_values import alternating
 from warpchain.pictures.chain import link_outlines
 from warpchain.pictures.places import circle_radii
 
@@ -29,8 +28,7 @@ KINDS = {
 
 def values_of(links: int = 60, **settings: Any) -> Any:
     """Values of the links of a scene."""
-    setup = setup_walk("soft", {"links": links, **settings})
-    return link_values(setup.scene, setup.parameters)
+    return setup_walk("soft", {"links": links, **settings}).link_values
 
 
 def test_two_kinds_given_link_by_link_walk_as_two_kinds() -> None:
@@ -46,7 +44,7 @@ def test_a_walk_in_another_unit_of_mass_is_the_same(start: str) -> None:
     """With 512 times all masses, inertias, frictions, k and b: equal to the bit, on softened joints too."""
     paper = warpchain.preset("paper")
     names = [name for name, q in paper.quantities().items() if "kg" in q.unit or "N" in q.unit]
-    heavy = {name: 512 * getattr(paper, name) for name in names}
+    heavy = {"unusual_values": True, **{name: 512 * getattr(paper, name) for name in names}}
     usual, same = (warpchain.walk(links=30, start=start, frame_interval=None, **each) for each in ({}, heavy))
     assert len(names) == 8 and usual.softened_at == same.softened_at > 0
     assert same.dx == usual.dx and same.energy == {name: 512 * value for name, value in usual.energy.items()}
@@ -65,7 +63,7 @@ def test_the_sprocket_knows_the_circles_of_the_links(measures: str) -> None:
 def test_joints_ride_on_the_wider_of_their_circles() -> None:
     """Every second link may be narrow, and a charm wide: the other joints ride as high as without."""
     for wide, height in (({"link_radii": [2e-3, 6e-3] * 30}, 6e-3), ({"charm_radius": 6e-3}, SOFT.circle_radius)):
-        assert riding_radius(setup_walk("soft", {"links": 60, **wide}).scene, SOFT) == height
+        assert setup_walk("soft", {"links": 60, **wide}).riding_radius == height
 
 
 def test_a_charm_closes_the_ledger_and_is_read_back(tmp_path: Path) -> None:

@@ -8,9 +8,12 @@ import h5py
 import pytest
 
 from tests.support.made_walks import assert_same, make_unreleased, make_walk
-from warpchain.hdf5_files import hdf5_image
+from warpchain.hdf5_files import Format, Stored, hdf5_image
+from warpchain.inputs.validation import InputError
+from warpchain.results import walk_result
+from warpchain.results.walk_result import WalkResult, load_walk
 from warpchain.status import Status
-from warpchain.walks.walk_result import WalkResult, load_walk
+from warpchain.walks.walk_numbers import STORED
 
 # Status
 
@@ -41,12 +44,24 @@ def test_foreign_files_are_refused(tmp_path: Path) -> None:
     with h5py.File(path, "w") as file:
         file["x"] = 1.0
     for content, problem in (
-        (path.read_bytes(), "damaged, cut short or of an earlier warpchain"),
+        (path.read_bytes(), "not an HDF5 file of warpchain"),
         (b"dx = 0.6\n", "not an HDF5 file"),
         (b"", "not an HDF5 file"),
-        (hdf5_image("another kind", lambda file: None), "a another kind, not a warpchain walk"),
+        (hdf5_image(Format.of("another kind"), lambda file: None), "a another kind, not a warpchain walk"),
     ):
         path.write_bytes(content)
         with pytest.raises(ValueError, match=rf"^{path}: {problem}.*; .*$") as caught:
             load_walk(path)
         assert "\n" not in str(caught.value)
+
+
+def test_a_file_with_other_fields_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A field that is added without another version makes another format; the wording of a meaning does not."""
+    path, unit = tmp_path / "walk.h5", Stored("m", "one meaning")
+    assert Format.of("kind", {"dx": unit}) == Format.of("kind", {"dx": Stored("m", "said otherwise")})
+    assert Format.of("kind", {"dx": unit}) != Format.of("kind", {"dx": Stored("mm", "one meaning")})
+    with monkeypatch.context() as patched:
+        patched.setattr(walk_result, "_FORMAT", Format.of("warpchain walk", STORED, {"rebound_height": unit}))
+        make_walk().save(path)
+    with pytest.raises(InputError, match=f"^{path}: has other fields than .*; run the walk again"):
+        load_walk(path)

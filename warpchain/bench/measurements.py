@@ -21,13 +21,13 @@ from typing import Any, Final
 import numpy as np
 import warp as wp
 
+from warpchain.chain.start_shapes import ellipse, lay_chain
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import gpu_turn, start_device
 from warpchain.engine.processors import processors
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.options import FIBERS, Options, on_gpu
 from warpchain.inputs.parameters import Parameters, preset
-from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels.methods.method import find_method, method_names
 from warpchain.run.progress_bar import SweepProgress
 from warpchain.run.simulation import simulate
@@ -104,18 +104,19 @@ def fly(start: State, method: str, chains: int, device: str) -> tuple[State, flo
     worlds, links = range(chains), len(start[0])
     with gpu_turn([device]):
         batch = Batch(chains, links, Options.model_validate({"method": method, "device": device}))
-        for world in worlds:
-            batch.set_chain(world, PARAMETERS, links)
-            batch.load(world, *start, stop_time=COMPARED_TIME, stop_status=Status.FINISHED)
+        for world in batch.worlds:
+            world.set_chain(PARAMETERS, links)
+            world.load(*start, stop_time=COMPARED_TIME, stop_status=Status.FINISHED)
         features = batch.features(fixed_body="floor")
         batch.run(worlds, features)
-        compared, before = (batch.position(0), batch.velocity(0)), batch.counts(0)
-        batch.resume(list(worlds), TIMED, Status.FINISHED)
+        one = batch.worlds[0]
+        compared, before = (one.position, one.velocity), one.counts
+        batch.several(worlds).resume(TIMED, Status.FINISHED)
         began = time.perf_counter()
         batch.run(worlds, features)
-        seconds, after = time.perf_counter() - began, batch.counts(0)
+        seconds, after = time.perf_counter() - began, one.counts
         if (batch.statuses() != Status.FINISHED).any():
-            raise RuntimeError(f"{method}: {batch.status(0).sentence}")  # all chains are alike
+            raise RuntimeError(f"{method}: {one.status.sentence}")  # all chains are alike
     return compared, seconds, after["accepted"] - before["accepted"], after["rejected"] - before["rejected"]
 
 

@@ -18,9 +18,9 @@ import typer
 from warpchain.cli.input_commands import bench, parameters, schema
 from warpchain.cli.interrupts import INTERRUPTED, interrupts_heard
 from warpchain.cli.live_command import live
-from warpchain.cli.sweep_commands import info, merge, plot, report, sweep
+from warpchain.cli.sweep_commands import compile_kernels, info, merge, plot, report, sweep
 from warpchain.cli.walk_commands import FAILED, animate, walk
-from warpchain.files import DISK_FAILURES
+from warpchain.files import DISK_FAILURES, described
 from warpchain.version import VERSION
 
 REFUSED: Final = 2
@@ -60,7 +60,9 @@ def _refuse_for(error: Exception) -> None:
         command = context.command_path if context is not None else "warpchain"
         problems, status = [f"{error.format_message().rstrip('.')}; see {command} --help"], error.exit_code
     elif isinstance(error, OSError):
-        status = FAILED if error.errno in DISK_FAILURES else REFUSED
+        problems, status = [described(error)], FAILED if error.errno in DISK_FAILURES else REFUSED
+    elif isinstance(error, MemoryError):
+        problems, status = [f"out of memory ({error or 'no size is known'}); give less at once, or free memory"], FAILED
     elif isinstance(error, InputError):
         problems, status = [*error.args], FAILED if isinstance(error, DamagedFileError) else REFUSED
     elif isinstance(error, LostWorkersError):
@@ -105,3 +107,4 @@ def _warpchain(
 
 for _command in (walk, sweep, info, plot, report, merge, animate, live, parameters, schema, bench):
     app.command()(_command)
+app.command("compile")(compile_kernels)

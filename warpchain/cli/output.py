@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, Final, get_args
 from warpchain.engine.tallies import LOST
 from warpchain.files import checked_output, make_folder, naming, remove_output
 from warpchain.inputs.validation import InputError, json_value, one_line, printable
-from warpchain.pictures.labels import Kind, cell_table
+from warpchain.pictures.labels import COUNTS, SPREADS, Kind, cell_notes, cell_table
+from warpchain.results.walk_result import WalkResult, load_walk
+from warpchain.status import Status
 from warpchain.walks.landmarks import FAULTS
-from warpchain.walks.walk_result import WalkResult, load_walk
 
 if TYPE_CHECKING:
-    from warpchain.store.sweep_result import SweepResult
+    from warpchain.results.sweep_result import SweepResult
 
 RECORD: Final = "walk.h5"
 _PICTURES: Final = (*(f"{kind}.png" for kind in get_args(Kind)), "walk.gif")
@@ -41,14 +42,19 @@ def print_table(headings: Iterable[str], rows: Iterable[Sequence[str]], left: Co
     Console(highlight=False, markup=False, width=width).print(table)
 
 
-def print_sweep(result: "SweepResult", as_json: bool) -> None:
-    """Print the statuses of a sweep and the mean Δx of each cell on standard output, as a table or one JSON object."""
+def print_sweep(result: "SweepResult", folder: Path | None, as_json: bool) -> None:
+    """Print the statuses of a sweep and the mean Δx of each cell on standard output, as a table or one JSON object.
+
+    If a folder is given, and holds a part of the sweep, a line says how far the part is.
+    """
+    from warpchain.store.shards import read_manifest
+
     summary, statistics = result.summary(), result.cell_statistics()
     if as_json:
         blocks = {
             name: {
                 "axes": cells.axes,
-                "dx": {key: getattr(cells, key) for key in ("mean", "sd", "count", "absent", "failed", "missing")},
+                "dx": {key: getattr(cells, key) for key in (*SPREADS, "independent", *COUNTS)},
             }
             for name, cells in statistics.items()
         }
@@ -58,6 +64,11 @@ def print_sweep(result: "SweepResult", as_json: bool) -> None:
         return
     counts = ", ".join(f"{count:,} {label}" for label, count in summary.items() if count)
     print(f"{printable(result.name)}: {result.walk_count:,} walks, {counts}")
+    if folder is not None and folder.is_dir():
+        manifest = read_manifest(folder)
+        (part, parts), own = manifest.part, sum(map(len, manifest.wanted))
+        if parts > 1:
+            print(f"part {part}/{parts}: {result.walk_count - result.missing_count:,} of {own:,} walks")
     for fault, remedy in FAULTS.items():
         if number := sum(int(block.faults[fault].sum()) for block in result.blocks.values()):
             print(f"{number:,} inaccurate: {remedy}")
@@ -69,6 +80,8 @@ def print_sweep(result: "SweepResult", as_json: bool) -> None:
         if room:
             print_table(head, itertools.islice(rows, room))
         room = max(0, room - cells.mean.size)
+    for note in cell_notes(statistics.values()):
+        print(note)
     if (more := sum(cells.mean.size for cells in statistics.values()) - _MOST_CELLS) > 0:
         print(f"… and {more:,} more cells, which --json lists")
 
@@ -87,8 +100,10 @@ def _walk_rows(result: WalkResult) -> Iterator[tuple[str, str]]:
     yield "Δx", f"{result.dx:.4f} m" if math.isfinite(result.dx) else "unknown"
     yield "status", status.label if status.ok else f"{status.label}: {status.sentence}"
     if math.isfinite(result.hold_time):
-        moved = f", drift {100 * result.drift:.2g} %" if math.isfinite(result.drift) else ""
-        yield "loop held", f"{result.hold_time:.3f} s at full frequency{moved}"
+        drift = f"drift {100 * result.drift:.2g} %" if math.isfinite(result.drift) else ""
+        if result.status is Status.NOT_STEADY:  # the drift of its last, short watch is no reason
+            drift = f"shape or speed kept changing; {drift} while last watched" if drift else "never watched"
+        yield "loop held", f"{result.hold_time:.3f} s at full frequency" + (f", {drift}" if drift else "")
     yield "walk time", f"{result.walk_time:.3f} s"
     yield "bounces", f"{result.bounces}"
     if math.isfinite(result.greatest_tilt):
@@ -119,11 +134,11 @@ def _walk_rows(result: WalkResult) -> Iterator[tuple[str, str]]:
 def saved(path: Path, wanted: str) -> "WalkResult | SweepResult":
     """The walk or the sweep of a file or a folder; else an `InputError` says what is `wanted` in its place."""
     from warpchain.hdf5_files import kind_of_hdf5
-    from warpchain.store.sweep_result import KIND, load
+    from warpchain.results.sweep_result import MERGED, load
 
     record = path / RECORD if os.path.isfile(path / RECORD) else path
     is_sweep = record.is_dir() or (record.suffix != ".h5" and not record.exists())
-    return load(record) if is_sweep or kind_of_hdf5(record, wanted) == KIND else load_walk(record)
+    return load(record) if is_sweep or kind_of_hdf5(record, wanted) == MERGED.kind else load_walk(record)
 
 
 def try_walk_folder(folder: Path) -> None:

@@ -1,16 +1,20 @@
-"""The commands of the command line that are about sweeps: sweep, info, plot, report, merge."""
+"""The commands of the command line that are about sweeps: sweep, compile, info, plot, report, merge."""
 
 import contextlib
 import sys
 from pathlib import Path
-from typing import Annotated, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
 from warpchain.cli.walk_commands import FAILED
 from warpchain.cli.words import JSON, argument, option, output, output_path
 
+if TYPE_CHECKING:
+    from warpchain.results.sweep_result import SweepResult
+
 _FILE: Final = "The sweep, or the bare name of one that comes with warpchain, such as figure6."
+_FILES: Final = "Sweeps, or bare names of those that come with warpchain. Default: all that come with it."
 _DEVICE: Final = "cpu, cuda (the first GPU) or cuda:N, instead of what the sweep says."
 
 AsJson = Annotated[bool, JSON]
@@ -85,7 +89,7 @@ def sweep(
     except KeyboardInterrupt:
         print(f"the same command{', without --fresh,' if fresh else ''} goes on with the sweep", file=sys.stderr)
         raise
-    print_sweep(result, as_json)
+    print_sweep(result, folder, as_json)
     counts = result.summary()
     failed = [status for status in Status if not status.ok and counts.get(status.label)]
     for status in failed:
@@ -94,22 +98,47 @@ def sweep(
         raise typer.Exit(FAILED)
 
 
+def compile_kernels(
+    sources: Annotated[list[Path] | None, argument("[FILE.yaml]...", _FILES)] = None,
+    device: Annotated[str | None, option("NAME", _DEVICE)] = None,
+) -> None:
+    """Compile the kernels of sweeps into Warp's cache, for machines or users that cannot write there.
+
+    The sweeps that come with warpchain have the kernels of walks with default settings. WARP_CACHE_PATH names the
+    folder of the cache. A kernel serves only the versions of warpchain, Warp and Python that compiled it, and
+    processors or GPUs of the same kind.
+    """
+    from warpchain.run.progress_bar import changing_line
+    from warpchain.run.sweep_run import compile_sweep
+    from warpchain.sweeps.sweep_file import shipped_sweeps
+
+    for source in sources or map(Path, shipped_sweeps()):
+        with changing_line() as show:
+            show(f"{source}: compiling kernels")
+            planned = compile_sweep(source, device)
+        print(f"{planned.name}: kernels compiled")
+
+
 def info(
-    directory: Annotated[Path, argument("DIR", "Folder of a sweep, or a merged file.")], as_json: AsJson = False
+    directories: Annotated[list[Path], argument("DIR...", "Folder of a sweep, or of each part; merged files, too.")],
+    as_json: AsJson = False,
 ) -> None:
     """Show how far a sweep is and what it has found so far.
 
     Of a merged file the checksum is compared first.
     """
     from warpchain.cli.output import print_sweep
-    from warpchain.store.sweep_result import load
+    from warpchain.results.sweep_result import load
 
-    print_sweep(load(directory), as_json)
+    print_sweep(load(directories), directories[0] if len(directories) == 1 else None, as_json)
 
 
 def plot(
-    path: Annotated[Path, argument("PATH", "Folder of a sweep or of a saved walk, or the file of either.")],
-    folder: Annotated[Path | None, output("DIR", "Folder of the figures. Default: that of PATH.")] = None,
+    paths: Annotated[
+        list[Path],
+        argument("PATH...", "Folder of a sweep, or of each part, or of a saved walk; or the file of either."),
+    ],
+    folder: Annotated[Path | None, output("DIR", "Folder of the figures. Default: that of the first PATH.")] = None,
     quantity: Annotated[
         str | None, option("NAME", "Column of a sweep to draw: dx, walk_time, bounces, hold_time ... Default: dx.")
     ] = None,
@@ -129,9 +158,15 @@ def plot(
     from warpchain.inputs.validation import InputError, printable
     from warpchain.pictures.labels import kinds_of
     from warpchain.reports.sweep_figures import figures
-    from warpchain.walks.walk_result import WalkResult
+    from warpchain.results.walk_result import WalkResult
 
-    found = saved(path, "give the folder of a sweep, a merged file, or the file of a saved walk")
+    path, *others = paths
+    if others:
+        from warpchain.results.sweep_result import load
+
+        found: WalkResult | SweepResult = load(paths)
+    else:
+        found = saved(path, "give the folder of a sweep, a merged file, or the file of a saved walk")
     folder = folder or (path.parent if path.is_file() else path)
     if isinstance(found, WalkResult):
         if quantity is not None:
@@ -184,7 +219,7 @@ def merge(
 ) -> None:
     """Put the results of a folder, or of all parts of a sweep, into one file, which xarray opens."""
     from warpchain.inputs.validation import printable
-    from warpchain.store.sweep_result import merge as merge_shards
+    from warpchain.results.sweep_result import merge as merge_shards
 
     merge_shards(directories, path)
     print(printable(str(path)))

@@ -10,11 +10,12 @@ import typer
 
 from warpchain.cli.words import JSON, argument, option, output
 from warpchain.inputs.methods import METHODS
+from warpchain.inputs.starts import STARTS
 
 FAILED: Final = 1
 """Exit status of a command whose walks failed."""
 
-_STARTS: Final = "rest: spin up on the sprocket; spinning: circulate on it; ellipse: without a sprocket. Default: rest."
+_STARTS: Final = f"{'; '.join(f'{word}: {start.described}' for word, start in STARTS.items())}. Default: rest."
 _PRESETS: Final = "Parameters to start from. paper: Table 1 of the paper; soft: softer joints. Default: paper."
 _METHODS: Final = (
     "standard: hybrid at 3e-3, joints softened on the sprocket and in the pile, on a GPU the next; explicit: os32 at "
@@ -69,18 +70,21 @@ def walk(
     as_json: Annotated[bool, JSON] = False,
 ) -> None:
     """Spin up one chain, drop it, and follow it until it rests."""
+    from warpchain.chain.resolution import SECTIONS, continued, resolve
+    from warpchain.chain.setup import DEFAULT_PRESET
     from warpchain.cli.output import print_walk, saved, try_walk_folder, write_walk
     from warpchain.inputs.distributions import Seed
-    from warpchain.inputs.options import replaced_by
-    from warpchain.inputs.setup import DEFAULT_PRESET, SECTIONS, continued, resolve
     from warpchain.inputs.validation import InputError, checked, printable
     from warpchain.inputs.yaml_files import parse_yaml
+    from warpchain.results.one_walk import run_walk
+    from warpchain.results.walk_result import WalkResult
     from warpchain.run.progress_bar import changing_line, walk_progress_text
-    from warpchain.walks.one_walk import run_walk
-    from warpchain.walks.walk_result import WalkResult
+    from warpchain.sweeps.block import refuse_axes
 
     named = {"links": links, "frequency": frequency, "start": start}
     given = _given_values(named | {"method": method, "tolerance": tolerance, "device": device}, assignments or [])
+    for section in given.values():
+        refuse_axes(section)
     own: Mapping[str, Mapping[str, Any]] = {}
     number = None if seed is None else checked(parse_yaml(seed, "seed"), "seed", Seed)
     if like is not None:
@@ -97,8 +101,8 @@ def walk(
         else:
             block, place = found.located(parse_yaml(index, "--index"))
             base, number = block.setup_at(place), block.origin.seed
-        replaced = replaced_by(given["options"])
-        preset, own = base.preset, {name: getattr(base, name).model_dump(exclude=replaced) for name in SECTIONS}
+        preset, kept = base.preset, base.options.beside(given["options"])
+        own = {name: getattr(base, name).model_dump() for name in SECTIONS} | {"options": kept}
     elif config is not None:
         from warpchain.sweeps.sweep_file import read_walk_file  # its grammar takes long to build
 
@@ -153,7 +157,7 @@ def animate(
     """Write a film of a saved walk: GIF, MP4 or HTML with a player."""
     from warpchain.cli.output import RECORD
     from warpchain.inputs.validation import InputError, printable
-    from warpchain.walks.walk_result import load_walk
+    from warpchain.results.walk_result import load_walk
 
     record = walk / RECORD if walk.is_dir() else walk
     result, path = load_walk(walk), path or record.with_suffix(".gif")

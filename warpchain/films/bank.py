@@ -5,12 +5,15 @@ A camera with errors films them, as many walks of each experiment as there are f
 One ridge regression gives the parameters from all films of a chain together, and its residuals on chains that it was
 not fitted to are the errors. So what films have in common, errors of the camera and of the regression among them,
 counts as common: more films do not make it smaller.
+
+What films of a chain do not have in common must not be common in the bank either: every release has a clearance and a
+phase of its own. A bank whose films of a chain share them would take what they have in common for known, and be wrong.
 """
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import product
+from itertools import combinations, product
 from typing import Final, NamedTuple, Self
 
 import numpy as np
@@ -20,10 +23,9 @@ from pydantic import InstanceOf
 from warpchain.films.film import CAREFUL, CLOCK, Camera, Film, edges, summary
 from warpchain.inputs.arrays import Array, checked_array
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.scene import loop_speed
 from warpchain.inputs.validation import InputError, checked
-from warpchain.store.block_result import BlockResult
-from warpchain.store.sweep_result import SweepResult
+from warpchain.results.block_result import BlockResult
+from warpchain.results.sweep_result import SweepResult
 from warpchain.walks.rows import MISSING
 
 FOUND: Final = (
@@ -31,6 +33,8 @@ FOUND: Final = (
     *("sprocket_radius", "circle_radius", "floor_restitution"),
 )
 """Parameters that a posterior has, as far as its bank draws them."""
+OF_RELEASES: Final = ("clearance", "phase")
+"""What every film of a chain has of its own; all other drawn parameters are the chain's."""
 DRAWS: Final = 4
 """Times that each chain of a bank is filmed, with other errors."""
 PENALTIES: Final = 10.0 ** np.arange(-6, 1.5, 0.5)
@@ -55,11 +59,13 @@ class Bank:
         names: of the parameters.
         values: of each chain, (c, p).
         films: `films[c][e]` are those of chain c in experiment e, one for each repetition.
+        tied: what two films of a chain have in common although releases differ in it, of clearance and phase.
     """
 
     names: tuple[str, ...]
     values: Array
     films: Sequence[Sequence[Sequence[Film]]]
+    tied: tuple[str, ...] = ()
 
     @property
     def experiments(self) -> list[tuple[int, float]]:
@@ -74,7 +80,9 @@ class Bank:
     def of(cls, result: SweepResult | BlockResult) -> Self:
         """The bank of a sweep, or a block, over links, frequency and repetitions, such as `phase`.
 
-        Its samples are the chains; those of which a walk failed, or lasted for less than 0.4 s, are left out.
+        Its samples are the chains; those of which a walk failed, or lasted for less than 0.4 s, are left out. The sweep
+        has the same samples along all axes, but of clearance and phase, which differ between the films of a chain: each
+        is an axis, or drawn and `independent`.
 
         Raises:
             InputError: walks or motions are missing, axes are others, or the chains differ along them.
@@ -85,9 +93,13 @@ class Bank:
             raise InputError(f"grid: its axes are {', '.join(axes)}; give links, frequency and then repetitions")
         if not names or np.any(result.columns["status"] == MISSING):
             raise InputError("bank: walks are missing, or their chains are all the same; run the sweep to its end")
-        drawn = np.stack([result.columns[f"{name}_drawn"].reshape(-1, shape[-1]) for name in names], axis=-1)
-        if np.any(drawn != drawn[0]):
-            raise InputError(f"bank: its chains differ along the axes; give same_samples_along: [{', '.join(axes)}]")
+        columns = {name: result.columns[f"{name}_drawn"].reshape(-1, shape[-1]) for name in result.drawn}
+        if any(np.any(columns[name] != columns[name][0]) for name in columns if name in Parameters.model_fields):
+            remedy = f"give same_samples_along: [{', '.join(axes)}], and no parameter as independent"
+            raise InputError(f"bank: its chains differ along the axes; {remedy}")
+        alike = {name for name in columns if any(np.array_equal(*two) for two in combinations(columns[name], 2))}
+        tied = tuple(name for name in OF_RELEASES if name not in axes and (name in alike or name not in columns))
+        drawn = np.stack([columns[name] for name in names], axis=-1)
         walks, end = {}, CLOCK[-1] + 0.03
         for place, group in result.kept_motions(np.flatnonzero(result.kept)):  # in the order of the files
             if "frames/joints" in group and (time := group["series/time"][()])[-1] >= end:  # else it failed early
@@ -99,14 +111,14 @@ class Bank:
                     links=int(result.axes["links"][links]),
                     frequency=float(result.axes["frequency"][frequency]),
                     outline=edges(group["frames/joints"][0].astype(float)),
-                    speed=loop_speed(setup.scene, setup.parameters),
+                    speed=setup.loop_speed,
                 )
         places = np.moveaxis(np.arange(drawn[..., 0].size).reshape(shape[0] * shape[1], -1, shape[-1]), 2, 0)
         chains = np.flatnonzero(np.isin(places, list(walks)).all(axis=(1, 2)))
         if not len(chains):
             raise InputError("bank: no motion was recorded; give record: {series: true, frames: true}")
         films = [[[walks[place] for place in row] for row in chain] for chain in places[chains].tolist()]
-        return cls(names, drawn[0, chains], films)
+        return cls(names, drawn[0, chains], films, tied)
 
     def posterior(self, films: Sequence[Film], camera: Camera = CAREFUL) -> "Posterior":
         """The parameters of the chain in some films, and how well they would be known of chains of the bank.
@@ -116,9 +128,16 @@ class Bank:
             camera: of all films.
 
         Raises:
-            InputError: a film is of no experiment of the bank, or not as the camera says, or lies outside of the bank.
+            InputError: a film is of no experiment of the bank, or not as the camera says, or lies outside of the bank;
+                or the bank takes for common to several films what each release has of its own.
         """
         films = checked(films, "films", list[InstanceOf[Film]])
+        if self.tied and len(films) > 1:
+            names = " and ".join(self.tied)
+            remedy = f"draw it, and give the sweep independent: [{', '.join(self.tied)}]"
+            raise InputError(
+                f"bank: {names} is the same in all films of a chain, but each release has its own; {remedy}"
+            )
         groups: dict[tuple[int, float], list[Film]] = {}
         for film in films:
             film.check(camera)
@@ -244,9 +263,9 @@ def _chosen(found: Array, penalties: NDArray[np.intp]) -> Array:
 def _trained(bank: Bank, design: tuple[tuple[int, int], ...], has: tuple[bool, bool], camera: Camera) -> _Trained:
     """Film all chains of a bank, so many films of each experiment, and learn each from the others."""
     random, rows = np.random.default_rng(0), []
-    for draw, films in product(range(DRAWS), bank.films):
+    for _, films in product(range(DRAWS), bank.films):
         errors = camera.errors(random)
-        walks = [[films[at][(draw + k) % len(films[at])] for k in range(count)] for at, count in design]
+        walks = [[films[at][k] for k in random.permutation(len(films[at]))[:count]] for at, count in design]
         rows.append(_features([[walk.seen(camera, errors, random) for walk in group] for group in walks], *has))
     features, chains = np.array(rows), np.tile(np.arange(len(bank.values)), DRAWS)
     values = ((bank.values - bank.values.mean(axis=0)) / bank.values.std(axis=0))[chains]

@@ -19,6 +19,8 @@ SLIDES: Final = 0.08
 """After 40 ms of fall nearly all that touches the floor slides for this many v/(μ g), v the speed of the loop."""
 STICKS: Final = 0.05
 """Relative error of μ, if v < 11 m/s μ; none above 20 m/s μ: some links stick at the first touch."""
+GREATEST: Final = 3.0
+"""No floor has a friction above that of tyres on a track; what comes out greater is an error of the film."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -49,32 +51,37 @@ class FrictionLine:
 def friction_line(film: Film, camera: Camera = CAREFUL) -> FrictionLine:
     """The friction of the floor while all that touches it slides: m x″ = μ m (y″ + g), whatever happens in the chain.
 
-    Friction, place, height, moment of the release, speed at the release and roll of the camera are fitted together,
-    the last four within their errors. The fit ends early for slow loops, whose links soon stick, and its error grows.
+    Friction, place, height, moment of the release, speed at the release, roll and clock of the camera are fitted
+    together, the last five within their errors. The fit ends early for slow loops, whose links soon stick, and its
+    error grows.
 
     Raises:
-        InputError: the film is too short, of more than 100 links, not as the camera says, or not of a free fall.
+        InputError: the film is too short, of more than 100 links, not as the camera says, or not of a free fall; or
+            its friction would not lie between 0 and 3.
     """
     if film.links > MOST_LINKS:
         raise InputError(f"film.links: {film.links} are too many for a line; give {MOST_LINKS} or less, or a bank")
     film.check(camera)
     x, y = (film.center - film.center[film.time < -2 * camera.release].mean(axis=0)).T
-    time, noise = np.maximum(film.time, 0), film.noise
+    time, noise = np.maximum(film.time, 0), film.error(camera)
     lift, one, none = y + GRAVITY * time**2 / 2, np.ones_like(y), np.zeros_like(y)
     speed = film.speed or 2 * np.pi * film.frequency * 0.06  # by default that on Table 1's sprocket
-    # columns: friction, place, height, delay of the release, speeds at the release, roll
-    prior = np.array([1e3, 1, 1, camera.release, RELEASE_SPEED, RELEASE_SPEED, camera.roll])
-    vertical = np.column_stack([none, none, one, GRAVITY * time, none, time, none])
-    forward = np.column_stack([none, one, none, none, time, none, y])
+    # columns: friction, place, height, delay of the release, speeds at the release, roll, clock
+    prior = np.array([1e3, 1, 1, camera.release, RELEASE_SPEED, RELEASE_SPEED, camera.roll, camera.clock])
+    vertical = np.column_stack([none, none, one, GRAVITY * time, none, time, none, GRAVITY * time**2])
+    forward = np.column_stack([none, one, none, none, time, none, y, none])
     friction, falls = 0.3, film.time < FALLS
     for _ in range(8):
         end = min(FALLS + 0.01 + SLIDES * speed / (max(friction, 0.05) * GRAVITY), CLOCK[-1])
         slides, size = film.time <= end, np.hypot(1, friction)
-        along = (forward - friction * vertical + np.outer(lift, np.eye(7)[0])) / size
+        along = (forward - friction * vertical + np.outer(lift, np.eye(8)[0])) / size
         matrix = np.vstack([vertical[falls], along[slides]]) / noise
         covariance = np.linalg.inv(matrix.T @ matrix + np.diag(prior**-2.0))
         found = covariance @ (matrix.T @ np.concatenate([lift[falls], x[slides] / size])) / noise
         friction = float(found[0])
+    if not 0 < friction < GREATEST:  # NaN, too
+        wrong = f"{friction:.3g}, expected 0 to {GREATEST:g}"
+        raise InputError(f"film: its floor_friction would be {wrong}; check direction, unit, fps and release")
     sticks = STICKS * np.clip((friction / speed - 0.05) / 0.04, 0, 1)
     after = film.time > 0
     return FrictionLine(

@@ -1,18 +1,30 @@
 """Films out of text tables, as Tracker and other programs that follow points in videos export them."""
 
+import codecs
 import os
 import re
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated, Final, Literal
 
 import numpy as np
 from pydantic import Field
 
-from warpchain.films.film import BEFORE, GRAVITY, Film
+from warpchain.films.film import BEFORE, GRAVITY, Film, rounding_of
 from warpchain.inputs.arrays import Array, checked_array
 from warpchain.inputs.validation import InputError, Whole, checked, checked_path, shown
 
 UNITS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+_OF_HEADS: Final = {"x": UNITS, "y": UNITS, "t": {"s": 1.0, "ms": 1e-3}}
+"""Name of a column → the units that its head may give."""
+_HEAD: Final = re.compile(r"(?P<name>[txy])(?:_\{(?P<below>[^}]*)\})?(?!\w)[\s/.,]*[(\[]?(?P<unit>[^)\]]*)[)\]]?")
+"""Head of a column: its name, a subscript, and a unit, as in `x (cm)`, `x / cm`, `x [cm]` and `x_{cm} (mm)`."""
+LARGEST: Final = 8_000_000
+"""Most bytes of a file; a minute of 240 frames a second with 20 columns has half of them."""
+LONGEST: Final = 60.0
+"""Most seconds of a film; the release is looked for everywhere in it."""
+SLOWEST: Final = 10.0
+"""Least frames a second; fewer are times in another unit."""
 _POSITIVE: Final = Annotated[float, Field(gt=0)]
 
 
@@ -32,7 +44,8 @@ def read(
     """Read a film: a text table with columns t, x and y of the centre of mass, as Tracker exports it.
 
     Lines above the heads of the columns, other columns, and frames with an empty cell or `nan` are passed over.
-    Columns are parted by tabs, semicolons, commas or spaces; a comma that does not part them is a decimal point.
+    Columns are parted by tabs, semicolons, commas or spaces; a comma that does not part them is a decimal point. Heads
+    may have a unit, m, cm or mm, and s or ms, as in `x (cm)` and `t (ms)`; others are refused.
 
     Args:
         path: the file.
@@ -59,24 +72,10 @@ def read(
     checked(outline, "outline", Annotated[list[float], Field(min_length=4, max_length=4)] | None)
     if unit not in (None, *UNITS) or direction not in ("right", "left"):
         raise InputError(f"unit: {shown(unit)}, direction: {shown(direction)}; give m, cm or mm, and right or left")
-    lines, file = [], checked_path(path, "path")
-    if file.exists() and not file.is_file():  # others may never end
-        raise InputError(f"{path}: no regular file; give the path of a text table")
-    for line in file.read_text(encoding="utf-8-sig", errors="replace").splitlines():
-        mark = next((mark for mark in "\t;," if mark in line), None)
-        line = line if mark == "," else line.replace(",", ".")  # numbers with decimal points
-        cells = line.split(mark) if mark else re.split(r"\s+(?![(\[])", line.strip())  # a unit stays with its head
-        lines.append([cell.strip(' "') for cell in cells])
-    heads = [[re.sub(r"[\s(\[].*", "", cell) for cell in cells] for cells in lines]  # without units
-    first = next((number for number, names in enumerate(heads) if {"t", "x", "y"} <= set(names)), None)
-    if first is None:
-        raise InputError(f"{path}: no line with the column heads t, x and y; export these of the centre of mass")
-    units = {*re.findall(r"\b[xy][^\w;]+([cm]?m)\b", ";".join(lines[first])), *([unit] if unit else [])} or {"m"}
-    if len(units) > 1:
-        raise InputError(f"unit: heads of {path} and unit say {' and '.join(sorted(units))}; correct one of them")
-    names, rows = heads[first], []
-    if names.count("x") > 1:
-        raise InputError(f"{path}: several columns x; export one track, the centre of mass")
+    lines = [_cells(line) for line in _text(checked_path(path, "path"), path).splitlines()]
+    first, heads = _heads(lines, path)
+    scale, seconds = _units(heads, unit, path)
+    names, rows = [head and head[1] for head in heads], []
     for number, cells in enumerate(lines[first + 1 :], first + 2):
         row = [cells[k] for k in map(names.index, "txy") if k < len(cells) and cells[k]]
         if any(cells[len(names) :]):
@@ -90,26 +89,89 @@ def read(
     time, x, y = table[np.isfinite(table).all(axis=1)].T  # pandas writes nan where nothing was marked
     if len(time) < 20 or np.any(np.diff(time) <= 0):
         raise InputError(f"{path}: {len(time)} frames; give at least 20, in order of time")
-    time = time if fps is None else np.round((time - time[0]) / np.median(np.diff(time))) / fps
+    time = time * seconds if fps is None else np.round((time - time[0]) / np.median(np.diff(time))) / fps
+    rate, span = 1 / float(np.median(np.diff(time))), float(time[-1] - time[0])
+    if rate < SLOWEST:
+        raise InputError(f"t: {rate:.3g} frames a second; if the times are in ms, write t (ms), or give fps")
+    if not span <= LONGEST:
+        raise InputError(f"t: the film lasts {span:.4g} s; cut it to {LONGEST:g} s at most about the release")
     sign, order = (1, [0, 1, 2, 3]) if direction == "right" else (-1, [1, 0, 2, 3])
-    scale = UNITS[units.pop()] * np.array([sign, 1])
-    center = (np.column_stack([x, y]) - origin) * scale
-    edges = None if outline is None else (np.reshape(outline, 4)[order] - np.repeat(origin, 2)) * np.repeat(scale, 2)
+    scales = scale * np.array([sign, 1])
+    center = (np.column_stack([x, y]) - origin) * scales
+    edges = None if outline is None else (np.reshape(outline, 4)[order] - np.repeat(origin, 2)) * np.repeat(scales, 2)
     release = _fitted_release(time, center[:, 1]) if release is None else release
     return Film(time=time - release, center=center, links=links, frequency=frequency, outline=edges, speed=speed)
+
+
+def _text(file: Path, path: object) -> str:
+    """The text of a file, in UTF-8 or, as some programs for Windows write it, UTF-16 that says so."""
+    if file.exists() and not file.is_file():  # others may never end
+        raise InputError(f"{path}: no regular file; give the path of a text table")
+    with file.open("rb") as opened:
+        content = opened.read(LARGEST + 1)
+    if len(content) > LARGEST:
+        raise InputError(f"{path}: more than {LARGEST / 1e6:g} MB; export the centre of mass about the release only")
+    wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    text = content.decode("utf-16" if wide else "utf-8-sig", errors="replace")
+    if "\0" in text:
+        raise InputError(f"{path}: neither UTF-8 nor UTF-16 with a byte-order mark; save it as a text in UTF-8")
+    return text
+
+
+def _cells(line: str) -> list[str]:
+    """The cells of a line."""
+    mark = next((mark for mark in "\t;," if mark in line), None)
+    line = line if mark == "," else line.replace(",", ".")  # numbers with decimal points
+    cells = line.split(mark) if mark else re.split(r"\s+(?![(\[])", line.strip())  # a unit stays with its head
+    return [cell.strip(' "') for cell in cells]
+
+
+def _heads(lines: list[list[str]], path: object) -> tuple[int, list[re.Match[str] | None]]:
+    """Number of the line with the heads of the columns, and what each says; None for other columns."""
+    for number, cells in enumerate(lines):
+        heads = [_HEAD.fullmatch(cell) for cell in cells]
+        names = [head[1] for head in heads if head]
+        if {"t", "x", "y"} <= {*names}:
+            if len(names) > 3:
+                raise InputError(f"{path}: several columns t, x or y; export one track, the centre of mass")
+            return number, heads
+    words = next((cells for cells in lines if len(cells) > 2 and not re.search(r"\d", "".join(cells))), None)
+    others = f", but {shown(', '.join(words))}" if words else ""
+    wanted = "export these of the centre of mass, or rename them"
+    raise InputError(f"{path}: no line with the column heads t, x and y{others}; {wanted}")
+
+
+def _units(heads: list[re.Match[str] | None], given: str | None, path: object) -> tuple[float, float]:
+    """Metres in the unit of lengths and seconds in that of times: those that heads say, the one given, or m and s."""
+    lengths, seconds = set() if given is None else {given}, 1.0
+    for head in filter(None, heads):
+        known = _OF_HEADS[head["name"]]
+        if head["unit"] and head["unit"] not in known:
+            remedy = f"give {', '.join(known)}, or name the column {head['name']}"
+            raise InputError(f"{path}: unknown unit in the head {shown(head[0])}; {remedy}")
+        if head["name"] == "t":
+            seconds = known[head["unit"] or "s"]
+        elif head["unit"]:
+            lengths.add(head["unit"])
+        elif head["below"] in UNITS and given is None:
+            raise InputError(f"unit: the head {head[0]} of {path} may mean a unit or the centre of mass; give unit")
+    if len(lengths) > 1:
+        raise InputError(f"unit: heads of {path} and unit say {' and '.join(sorted(lengths))}; correct one of them")
+    return UNITS[lengths.pop() if lengths else "m"], seconds
 
 
 def _fitted_release(time: Array, y: Array) -> float:
     """When a height that was constant begins to fall freely, for at least 30 ms."""
 
     def misfit(start: float) -> float:
-        near = (time > start - BEFORE) & (time < start + 0.03)
+        near = slice(*np.searchsorted(time, [start - BEFORE, start + 0.03]))
         return float((y[near] + GRAVITY / 2 * np.maximum(time[near] - start, 0) ** 2).var())
 
     starts = np.arange(time[0] + BEFORE / 2, time[-1] - 0.1, 2.5e-4)
     if not len(starts):
         raise InputError("release: the film is too short to fit it; give it")
     release = float(min(starts, key=misfit))
-    if misfit(release) > 4 * max(y[(time > release - BEFORE) & (time < release)].var(), 1e-8):
+    still = y[(time > release - BEFORE) & (time < release)].var()
+    if misfit(release) > 4 * max(still, rounding_of(y) ** 2, 1e-8):
         raise InputError("release: nothing begins to fall freely; check unit and fps, or give it")
     return release

@@ -1,1 +1,1 @@
-"""What a user may say: checked once, at the door."""
+"""What a user may say: fields, their checks, and how files and errors name them."""

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.inputs.validation import InputError
+from warpchain.inputs.validation import MASKED, InputError, is_masked
 
 Array = NDArray[np.float64]
 AnyArray = NDArray[Any]
@@ -14,6 +14,8 @@ AnyArray = NDArray[Any]
 def checked_array(given: object, path: str, *shape: int | str) -> Array:
     """Finite real numbers of any kind as a float64 array of a shape, letters for any size; else an `InputError`."""
     wanted = f"({', '.join(map(str, shape))}{',' * (len(shape) == 1)})"
+    if is_masked(given):  # NumPy would take what lies under the mask
+        raise InputError(f"{path}: {MASKED}")
     try:
         if np.array(given).dtype.kind in "cSU":  # complex numbers and text would be converted without a word
             raise TypeError

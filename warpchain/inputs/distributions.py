@@ -9,7 +9,7 @@ What is drawn is a mapping of names to distributions, in the order of drawing. A
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from statistics import NormalDist
 from typing import Annotated, Final
 
@@ -17,8 +17,7 @@ import numpy as np
 from pydantic import Field
 
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.scene import Scene, link_values
-from warpchain.inputs.state import Setup
+from warpchain.inputs.scene import Scene
 from warpchain.inputs.validation import FIELDS, SECTION_OF, InputError, Whole, field_bounds
 
 DRAW_LIMIT: Final = 1000
@@ -68,7 +67,8 @@ class Uniform:
 class Gaussian:
     """A Gaussian truncated at the physical bounds; a value outside is drawn again, never clipped.
 
-    Mean and standard deviation are those of the whole Gaussian; a mean of None is the chain's own value, see `placed`.
+    Mean and standard deviation are those of the whole Gaussian; a mean of None is the chain's own value, which
+    `Setup.placed` gives it.
     """
 
     mean: float | None
@@ -96,7 +96,7 @@ class Gaussian:
     @property
     def _placed_mean(self) -> float:
         if self.mean is None:
-            raise ValueError("the Gaussian has no mean before `placed` gives it one")
+            raise ValueError("the Gaussian has no mean before `Setup.placed` gives it one")
         return self.mean
 
     def _standard_ends(self) -> tuple[float, float]:
@@ -131,24 +131,6 @@ TABLE: Final[Mapping[str, Distribution]] = {
 release."""
 
 
-def placed(distributions: Mapping[str, Distribution], setup: Setup) -> dict[str, Distribution]:
-    """The distributions with means and bounds for one chain.
-
-    A Gaussian without a mean gets the chain's value. A link length must leave room for two circles of the widest link.
-    """
-    complete: dict[str, Distribution] = {}
-    for name, distribution in distributions.items():
-        if isinstance(distribution, Gaussian) and distribution.mean is None:
-            value = getattr(getattr(setup, SECTION_OF[name]), name)
-            distribution = Gaussian(float(value), distribution.sigma, distribution.bounds)
-        complete[name] = distribution
-    if "link_length" in distributions and "circle_radius" not in distributions:
-        widest = float(link_values(setup.scene, setup.parameters).radius.max())
-        room = math.nextafter(2 * widest, math.inf), math.inf
-        complete["link_length"] = replace(complete["link_length"], bounds=room)
-    return complete
-
-
 def draw(distributions: Mapping[str, Distribution], rng: np.random.Generator) -> dict[str, float]:
     """A value of each of the `placed` distributions, in order, redrawn until in bounds; an `InputError` if none is."""
     drawn = {}
@@ -165,6 +147,6 @@ def draw(distributions: Mapping[str, Distribution], rng: np.random.Generator) ->
     return drawn
 
 
-def random_generator(seed: int, cell: int = 0, sample: int = 0) -> np.random.Generator:
+def random_generator(seed: int, cell: int = 0, sample: int = 0, *more: int) -> np.random.Generator:
     """The random generator of one sample, given the sweep's seed, the number of its cell, and its own in there."""
-    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(cell, sample)))
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(cell, sample, *more)))

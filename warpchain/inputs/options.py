@@ -7,7 +7,7 @@ from typing import Annotated, Any, Final, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from warpchain.inputs.methods import BURST_TOLERANCE, METHODS, METHODS_BY_NEED
-from warpchain.inputs.validation import InputError, Section, Whole, number_field, shown, suggestion
+from warpchain.inputs.validation import InputError, Section, Whole, number_field, shown, suggestion, validated
 from warpchain.kernels.methods.explicit_tableaus import HYBRID
 from warpchain.kernels.methods.method import find_method, method_names
 
@@ -16,6 +16,12 @@ LONGEST_DRIVE_INTERVAL: Final = 2e-3
 
 TOLERANCES: Final[Mapping[str, Any]] = {"ge": 1e-13, "le": 1e-1}
 
+LEAST_MIXED: Final = 1e-6
+"""Least tolerance that steps in mixed precision follow: below it their rounding takes part in the error."""
+
+LEAST_MIXED_BY_DEFAULT: Final = 1e-5
+"""Least tolerance at which they are the default."""
+
 FIBERS: Final = "fibers"
 """Device that runs a GPU's kernels on a CPU, slowly, so that tests pass through all that the host does for a GPU."""
 
@@ -23,17 +29,6 @@ FIBERS: Final = "fibers"
 def on_gpu(device: str) -> bool:
     """Whether a device runs a GPU's kernels."""
     return device != "cpu"
-
-
-def replaced_by(options: Mapping[str, object]) -> set[str]:
-    """Options of a walk that some given ones bring anew.
-
-    A method brings its own settings, and a tolerance also holds where joints are soft, as in a new walk.
-    """
-    replaced = {"soft_tolerance"} if "tolerance" in options else set()
-    if "method" in options:
-        replaced |= {"tolerance", "soft_tolerance"}.union(*METHODS_BY_NEED.values())
-    return replaced
 
 
 def _known_method(method: str) -> str:
@@ -49,6 +44,12 @@ def _supported_device(device: str) -> str:
     if not re.fullmatch(rf"cpu|cuda(:\d{{1,3}})?|{FIBERS}", device):
         raise ValueError(f"{shown(device)} is no device; give cpu, cuda or cuda:N")
     return device
+
+
+def _tightest(values: Mapping[str, object]) -> float:
+    """The lesser of a walk's tolerances on springs; what is no number is refused elsewhere."""
+    given = [values.get("tolerance", 1e-6), values.get("soft_tolerance")]
+    return min((float(value) for value in given if isinstance(value, int | float)), default=0.0)
 
 
 class Options(Section):
@@ -101,8 +102,39 @@ class Options(Section):
     soften_drive: bool = False
     """whether joints are softened on the sprocket: softest until it has spun up, then as soft as the loop's tension
     allows; within 0.03 s after the release they regain their own values"""
+    unusual_values: bool = False
+    """whether lengths, masses, moments of inertia and gravity far from Table 1's are meant; otherwise a value more than
+    10 times as large, or less than a tenth, is refused as a probable mistake of its unit"""
+    precision: Literal["double", "mixed"] = "double"
+    """precision of steps on springs; mixed: changes within a step are in single precision, and the state in double;
+    the default is mixed if tolerance and soft_tolerance are at least 1e-5"""
     device: Annotated[str, AfterValidator(_supported_device)] = "cpu"
     """device that runs the walks: cpu, cuda (the first GPU) or cuda:N"""
+
+    @classmethod
+    def chosen(cls, given: Mapping[str, object], *, tilts: bool = False, loads: bool = False) -> Self:
+        """The checked options that a user gives for a walk whose plane tilts, or whose joint loads are recorded.
+
+        `standard` then means `explicit`, as it does on a GPU: rigid flights have neither.
+        """
+        if (tilts or loads) and given.get("method", "standard") == "standard":
+            given = {**given, "method": "explicit"}
+        return validated(cls, given, "options")
+
+    def beside(self, given: Mapping[str, object]) -> dict[str, object]:
+        """The values of these options that stay beside some given ones.
+
+        A method brings its own settings, and a tolerance also holds where joints are soft, as in a new walk.
+        """
+        replaced = {"soft_tolerance", "precision"} if "tolerance" in given else set()
+        if "method" in given:
+            replaced |= {"tolerance", "soft_tolerance", "precision"}.union(*METHODS_BY_NEED.values())
+        return self.model_dump(exclude=replaced)
+
+    @property
+    def is_mixed(self) -> bool:
+        """Whether stages of steps are in single precision."""
+        return self.precision == "mixed" and not on_gpu(self.device)
 
     @model_validator(mode="before")
     @classmethod
@@ -119,12 +151,17 @@ class Options(Section):
             defaults["tolerance"] = BURST_TOLERANCE
         if "tolerance" in values:
             defaults.pop("soft_tolerance", None)  # an explicit tolerance is meant everywhere
-        return {**defaults, **{name: value for name, value in values.items() if name != "method"}}
+        all_values = {**defaults, **{name: value for name, value in values.items() if name != "method"}}
+        return {"precision": "mixed" if _tightest(all_values) >= LEAST_MIXED_BY_DEFAULT else "double", **all_values}
 
     @model_validator(mode="after")
     def _goes_together(self) -> Self:
         if on_gpu(self.device) and find_method(self.method).has_rigid_flight:
             raise InputError(f"method: {shown(self.method)} runs on a CPU only; give explicit, or device: cpu")
+        tightest = _tightest({"tolerance": self.tolerance, "soft_tolerance": self.soft_tolerance})
+        if self.precision == "mixed" and tightest < LEAST_MIXED:
+            problem = f"mixed does not follow a tolerance of {tightest:g}"
+            raise InputError(f"precision: {problem}; use double, or a tolerance of at least {LEAST_MIXED:g}")
         if self.smallest_step >= self.contact_step:
             raise InputError(f"smallest_step: {self.smallest_step} s is not below contact_step; give less")
         if self.soften_drive and self.record_interval > LONGEST_DRIVE_INTERVAL:

@@ -6,14 +6,13 @@ error messages and the samples of `warpchain.inputs.distributions` are derived f
 Source: "A walking roller chain", Table 1, unless a quantity says otherwise.
 """
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal, Self
 
 from pydantic import model_validator
 
-from warpchain.inputs.validation import InputError, Section, by_name, number_field, short, shown, validated
+from warpchain.inputs.validation import InputError, Section, by_name, number_field, shown, validated
 
 Source = Literal["measured", "looked up", "adjusted", "chosen here"]
 
@@ -134,19 +133,10 @@ class Parameters(Section):
             values: name or symbol, in ASCII or as printed → new value, in the units of the table.
 
         Raises:
-            InputError: a name is unknown, a value is given twice, the new set is not physical, or a length or mass is
-                1000 times Table 1's: in mm or g.
+            InputError: a name is unknown, a value is given twice, or the new set is not physical.
         """
-        named = by_name(values, "parameters")
-        changed = validated(type(self), {**vars(self), **named}, "parameters")
-        for name, (usual, unit) in _SLIPS.items():
-            if name in named and math.isclose(getattr(changed, name), 1000 * usual, rel_tol=1e-9):
-                raise InputError(f"parameters.{name}: 1000 times Table 1's; give {short(usual)} {unit}")
-        return changed
+        return validated(type(self), {**vars(self), **by_name(values, "parameters")}, "parameters")
 
-
-_SLIPS: Final = {name: (q.value, q.unit) for name, q in Parameters.quantities().items() if q.unit in ("m", "kg")}
-"""Quantities that are easily given in mm or g: name → value in Table 1, unit."""
 
 _TABLE_1: Final = Parameters.model_validate({name: q.value for name, q in Parameters.quantities().items()})
 

@@ -3,22 +3,17 @@
 import math
 from typing import Annotated, Final, Literal, Self
 
-import numpy as np
 from pydantic import Field, Strict, model_validator
 
-from warpchain.inputs.floor import FloorField
-from warpchain.inputs.link_values import LinkValues, alternating
+from warpchain.inputs.compound_fields import FloorField, Rows
 from warpchain.inputs.options import on_gpu
-from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.sprocket_motion import Rows
+from warpchain.inputs.starts import STARTS, StartWord
 from warpchain.inputs.validation import InputError, Section, Whole, number_field
 
 MOST_LINKS: Final = 100_000
 """A chain of so many links takes 0.4 GB, and kernels of its own."""
 MOST_LINKS_ON_GPU: Final = 1024
 """A chain is a block of threads there, one for each link, and CUDA has no larger blocks."""
-LEAST_SPROCKET: Final = 1e-3
-"""Least distance of the joints from the sprocket's centre, in link lengths; far smaller ones are lost in rounding."""
 HIGHEST: Final = 1e6
 """Greatest height, where numbers still tell a nanometre [m]."""
 FASTEST_TAP: Final = 1e3
@@ -47,7 +42,7 @@ class Scene(Section):
     """number of links of the closed chain; must be even if inner and outer links alternate"""
     frequency: float = number_field(15.0, "Hz", symbol="ν", ge=0, le=300.0)  # more is in turns a minute
     """frequency of the sprocket at the release, in revolutions per second"""
-    start: Literal["rest", "spinning", "ellipse"] = "rest"
+    start: StartWord = "rest"
     """initial state: at rest on the sprocket, already circulating on it, or a circulating ellipse without a sprocket"""
     phase: float = number_field(0.0, "1", ge=0, lt=1)
     """moment of the release, as a fraction of a loop period"""
@@ -130,6 +125,11 @@ class Scene(Section):
     """radius of the contact circles of each link; null: circle_radius for all"""
 
     @property
+    def is_on_sprocket(self) -> bool:
+        """Whether the chain starts on a sprocket."""
+        return STARTS[self.start].on_sprocket
+
+    @property
     def is_level(self) -> bool:
         """Whether the floor is y = 0."""
         return self.floor == "flat" and self.slope == 0
@@ -151,8 +151,8 @@ class Scene(Section):
             raise InputError("plane: 'tilting' needs a flat floor; give plane: fixed, or floor: flat and slope: 0")
         if self.plane == "fixed" and (name := next((name for name in TAP if getattr(self, name) != 0), "")):
             raise InputError(f"{name}: moves the plane of the chain, which is fixed; give plane: tilting, or 0")
-        if self.release is not None and (self.start == "ellipse" or self.plane == "tilting"):
-            word = "start: ellipse" if self.start == "ellipse" else "plane: tilting"
+        if self.release is not None and (not self.is_on_sprocket or self.plane == "tilting"):
+            word = "plane: tilting" if self.is_on_sprocket else f"start: {self.start}"
             raise InputError(f"release: a motion of the sprocket, which {word} does not go with; leave one out")
         if self.clearance_of == "hanging" and self.start != "rest":
             raise InputError(f"clearance_of: 'hanging' needs start: rest, not {self.start}; give that, or 'spinning'")
@@ -163,118 +163,7 @@ COMPOUND: Final = tuple(name for name, field in Scene.model_fields.items() if _C
 """Fields whose values may be lists or mappings, so that on an axis of a sweep they have names."""
 
 
-def link_values(scene: Scene, parameters: Parameters) -> LinkValues:
-    """What each link and joint of the chain of a walk has of its own."""
-    values = alternating(parameters, scene.links)
-    for row, name in zip(vars(values).values(), OF_LINKS, strict=True):
-        if (own := getattr(scene, name)) is not None:
-            row[:] = own
-    if scene.mass_gradient:
-        growth = 1 + scene.mass_gradient * np.linspace(-1.0, 1.0, scene.links)
-        values.mass[:] *= growth
-        values.inertia[:] *= growth
-    values.mass[scene.charm_link] += scene.charm_mass
-    values.inertia[scene.charm_link] += scene.charm_inertia
-    if scene.charm_radius is not None:
-        values.radius[scene.charm_link] = scene.charm_radius
-    values.viscous_friction[scene.stiff_joint] *= scene.stiff_joint_factor
-    values.coulomb_friction[scene.stiff_joint] *= scene.stiff_joint_factor
-    return values
-
-
-def check_links(scene: Scene, parameters: Parameters) -> None:
-    """Check that links that have circles of their own are longer than these are wide; else an `InputError`."""
-    if scene.link_radii is None and scene.charm_radius is None:
-        return
-    radii = link_values(scene, parameters).radius
-    if not radii.max() < (half := parameters.link_length / 2):
-        field = "charm_radius" if scene.charm_radius == radii.max() else f"link_radii[{radii.argmax()}]"
-        raise InputError(f"scene.{field}: {radii.max()} is not below half a link, {half}; give less")
-
-
-def check_parity(scene: Scene, parameters: Parameters, path: str = "scene.links") -> None:
-    """Check that links of two kinds are even in number; else an `InputError` that begins with `path`."""
-    is_one_kind = (parameters.inner_mass, parameters.inner_inertia) == (parameters.outer_mass, parameters.outer_inertia)
-    if scene.links % 2 and not is_one_kind and (scene.link_masses is None or scene.link_inertias is None):
-        raise InputError(f"{path}: {scene.links} is odd; give an even number, or link_masses and link_inertias")
-
-
-def settling_time(scene: Scene) -> float:
-    """Time [s] for which the chain settles on the sprocket before that turns; 0 unless it starts at rest."""
-    if scene.start != "rest":
-        return 0.0
-    if scene.settle_time is not None:
-        return scene.settle_time
-    return 2.0 if scene.clearance_of == "hanging" else 0.1
-
-
-def riding_radius(scene: Scene, parameters: Parameters) -> float:
-    """Height [m] of the joints above a surface that the chain rides on: half of them are at least so high."""
-    if scene.link_radii is None and scene.charm_radius is None:
-        return parameters.circle_radius
-    radius = link_values(scene, parameters).radius
-    return float(np.median(np.maximum(radius, np.roll(radius, -1))))
-
-
-def joint_radius(scene: Scene, parameters: Parameters) -> float:
-    """Distance from the sprocket's centre at which the joints ride, in m."""
-    if scene.sprocket_radius_is == "pitch":
-        return parameters.sprocket_radius
-    return parameters.sprocket_radius + riding_radius(scene, parameters)
-
-
-def loop_speed(scene: Scene, parameters: Parameters) -> float:
-    """Speed [m/s] along the loop of a chain that does not slip on its sprocket.
-
-    Links on it are chords, each seen from the centre under 2 asin(ℓ / 2ρ), with ρ of `joint_radius`.
-    """
-    half = math.asin(min(1.0, parameters.link_length / (2 * joint_radius(scene, parameters))))
-    return math.pi * scene.frequency * parameters.link_length / half
-
-
-def contact_radius(scene: Scene, parameters: Parameters) -> float:
-    """Radius of the sprocket that the circles of the links touch, in m."""
-    if scene.sprocket_radius_is == "contact":
-        return parameters.sprocket_radius
-    return parameters.sprocket_radius - riding_radius(scene, parameters)
-
-
-def fewest_links(scene: Scene, parameters: Parameters) -> int:
-    """Least even number of links whose loop can hang round the sprocket.
-
-    A link whose joints are both at least ρ, the `joint_radius`, from the centre is seen from there under an angle of at
-    most 2 asin(ℓ / 2ρ), and a loop round the sprocket needs 2π in all: n ≥ π / asin(ℓ / 2ρ).
-    """
-    sine = parameters.link_length / (2 * joint_radius(scene, parameters))
-    around = math.ceil(math.pi / math.asin(sine)) if sine < 1 else 2
-    return max(4, around + around % 2)
-
-
 def check_links_on_gpu(links: int, device: str, field: str) -> None:
     """Check that a device can carry a chain of this many links; else an `InputError` that begins with `field`."""
     if on_gpu(device) and links > MOST_LINKS_ON_GPU:
         raise InputError(f"{field}: {links} are too many for a GPU; give {MOST_LINKS_ON_GPU} or less, or device: cpu")
-
-
-def check_scene(scene: Scene, parameters: Parameters) -> None:
-    """Check what a scene and its parameters must fulfil together; else an `InputError`. Ellipses need no sprocket."""
-    check_links(scene, parameters)
-    check_parity(scene, parameters)
-    if scene.start == "ellipse":
-        return
-    radius = parameters.sprocket_radius
-    if contact_radius(scene, parameters) <= 0:
-        raise InputError(f"parameters.sprocket_radius: {radius} is too small for sprocket_radius_is: pitch; give more")
-    highest = scene.clearance + scene.links * parameters.link_length / 2  # of the sprocket's lowest point
-    if scene.release and scene.is_level and (lowest := min(row[2] for row in scene.release)) < -highest:
-        raise InputError(f"scene.release: y = {lowest:g} m is through the floor; give {-highest:g} m or more")
-    if joint_radius(scene, parameters) < LEAST_SPROCKET * parameters.link_length:
-        raise InputError(f"parameters.sprocket_radius: {radius} is nothing beside a link; give more, or start: ellipse")
-    if scene.load_factor is not None:
-        greatest = link_values(scene, parameters).greatest_load(parameters.link_length)
-        if scene.load_factor > greatest:
-            problem = f"{scene.load_factor:g} is too much for links of so little rotary inertia"
-            raise InputError(f"scene.load_factor: {problem}; give at most {greatest:.6g}, or null")
-    fewest = fewest_links(scene, parameters)
-    if scene.links < fewest:
-        raise InputError(f"scene.links: {scene.links} links do not reach round the sprocket; give at least {fewest}")

@@ -9,7 +9,7 @@ import functools
 import math
 import reprlib
 import textwrap
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Set, ValuesView
 from pathlib import Path
 from typing import Annotated, Any, Final, TypeVar
 
@@ -61,6 +61,10 @@ class InputError(ValueError):
 
 class DamagedFileError(InputError):
     """A file that is not what warpchain wrote; its text is `path: what is wrong; what to do`, in one line."""
+
+
+class ChangedFileError(DamagedFileError):
+    """A file that is whole but that another program has changed since warpchain wrote it."""
 
 
 class InputWarning(UserWarning):
@@ -157,6 +161,9 @@ def suggested_name(written: object, keys: Iterable[str] = ()) -> str:
     """The remedy for an unknown name of a field, or for one of these keys, or for a field in a wrong place."""
     if written in SECTION_OF:
         return f"give it in {SECTION_OF[str(written)]}"
+    stem = f"{spelled(written)}_" if isinstance(written, str) else ""
+    if family := [symbol for symbol in NAME_OF_SYMBOL if stem and symbol.startswith(stem)]:  # mu: of which pair?
+        return f"did you mean {' or '.join(filter(None, (', '.join(family[:-1]), family[-1])))}?"
     fields = {name: f"{section}.{name}" for name, section in SECTION_OF.items()}
     symbols = {symbol: f"{SECTION_OF[name]}.{symbol}" for symbol, name in NAME_OF_SYMBOL.items()}
     return suggestion(written, {key: key for key in keys} | fields | symbols)
@@ -235,12 +242,12 @@ def plain(value: object, path: str = "value") -> Any:
 
     NumPy's numbers, truth values and texts become Python's; arrays, ranges, tuples and what pandas and xarray have for
     them become lists, tables mappings of lists, also inside of lists and mappings. NumPy's times become texts, which no
-    number can be. An `InputError`, which begins with `path`, says that there are more than `MOST_VALUES` of them, or
-    deeper than `DEEPEST`.
+    number can be. An `InputError`, which begins with the path of a value, says that there are more than `MOST_VALUES`
+    of them, or deeper than `DEEPEST`; that values are masked; or that a set, an iterator or a view stands for a list.
     """
     left = MOST_VALUES
 
-    def converted(value: Any, depth: int) -> Any:
+    def converted(value: Any, depth: int, keys: tuple[object, ...] = ()) -> Any:
         nonlocal left
         left -= 1
         if left < 0:
@@ -251,20 +258,35 @@ def plain(value: object, path: str = "value") -> Any:
             value = value.to_dict("list")
         elif hasattr(value, "to_numpy"):
             value = value.to_numpy()
+        if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+            raise InputError(f"{functools.reduce(path_of, keys, path)}: {MASKED}")
+        if isinstance(value, Set | Iterator | ValuesView | memoryview):
+            where, kind = functools.reduce(path_of, keys, path), type(value).__name__
+            raise InputError(f"{where}: expected a list, got a {kind}, whose order or content is not fixed; use a list")
         if isinstance(value, np.ndarray) and value.ndim == 0:
             value = value[()]
         if isinstance(value, np.generic):
             kind = value.dtype.kind
             return float(value) if kind == "f" else value.item() if kind in "biucSU" else str(value)
-        if not isinstance(value, Mapping | np.ndarray | list | tuple | range) or value is np.ma.masked:
+        if not isinstance(value, Mapping | np.ndarray | list | tuple | range):
             return value
         if depth == DEEPEST:
             raise InputError(f"{path}: more than {DEEPEST} lists or mappings inside of one another; give fewer")
         if isinstance(value, Mapping):
-            return {key: converted(item, depth + 1) for key, item in value.items()}
-        return [converted(item, depth + 1) for item in value]
+            return {key: converted(item, depth + 1, (*keys, key)) for key, item in value.items()}
+        return [converted(item, depth + 1, keys) for item in value]
 
     return converted(value, 0)
+
+
+MASKED: Final = "expected numbers, got masked values; use an array without a mask"
+
+
+def is_masked(value: object, depth: int = 3) -> bool:
+    """Whether a value, or one inside of its lists as deep as arrays go, is an array of NumPy with masked elements."""
+    if isinstance(value, list | tuple):
+        return depth > 0 and any(is_masked(item, depth - 1) for item in value)
+    return isinstance(value, np.ma.MaskedArray) and bool(np.ma.is_masked(value))
 
 
 _adapter = functools.lru_cache(lambda kind: TypeAdapter(kind, config=ConfigDict(strict=True, allow_inf_nan=False)))

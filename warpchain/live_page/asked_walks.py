@@ -17,20 +17,19 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import numpy as np
 from pydantic import Field, Strict
 
+from warpchain.chain.resolution import SECTIONS, resolve
+from warpchain.chain.setup import DEFAULT_PRESET, Setup
 from warpchain.engine.processors import processors
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.options import replaced_by
-from warpchain.inputs.scene import link_values
-from warpchain.inputs.setup import DEFAULT_PRESET, SECTIONS, Setup, resolve
 from warpchain.inputs.validation import InputError, by_section, checked, json_value, shown
 from warpchain.live_page.messages import Film, recipes, summary
 from warpchain.pictures.player import player_data
+from warpchain.results.walk_result import WalkResult
 from warpchain.run.single_walk import walk as run_walk
 from warpchain.walks.walk_phases import Progress
-from warpchain.walks.walk_result import WalkResult
 
 if TYPE_CHECKING:
-    from warpchain.store.sweep_result import SweepResult
+    from warpchain.results.sweep_result import SweepResult
 
 MOST_LINKS: Final = 400
 """Most links of a chain on the page; longer ones need kernels of their own, and minutes."""
@@ -82,11 +81,13 @@ class Walker:
         if seed is not None or preset is not None:
             raise InputError("index: names a walk with its own preset and seed; leave preset and seed out")
         block, place = self.sweep.located(index)
-        setup, replaced = block.setup_at(place), replaced_by(sections["options"])
+        setup = block.setup_at(place)
         if not settings:
             return setup, block.origin.seed
-        own = {name: getattr(setup, name).model_dump(exclude=replaced) | sections[name] for name in SECTIONS}
-        return resolve(setup.preset, **own, seed=None, loads=False), None
+        own = {name: getattr(setup, name).model_dump() for name in SECTIONS}
+        own["options"] = setup.options.beside(sections["options"])
+        given = {name: own[name] | sections[name] for name in SECTIONS}
+        return resolve(setup.preset, **given, seed=None, loads=False), None
 
     def walk(self, asked: Asked, watch: Callable[[Progress], None], record: Mapping[str, Any]) -> WalkResult:
         """The walk of a set-up, pushes included."""
@@ -175,7 +176,7 @@ def _watch(is_gone: IsGone, walks: int = 1) -> Callable[[Progress], None]:
 
 def change_of_velocity(setup: Setup, link: int, impulse: Sequence[float]) -> Array:
     """Change [m/s] of the velocity x, y of a link's centre by an impulse [N s]; an `InputError` if there is no link."""
-    masses = link_values(setup.scene, setup.parameters).mass
+    masses = setup.link_values.mass
     if not 0 <= link < len(masses):
         raise InputError(f"push: link {link} is not in the chain; give 0 to {len(masses) - 1}")
     return np.asarray(np.array(impulse) / masses[link])

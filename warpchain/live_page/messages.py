@@ -11,14 +11,14 @@ from typing import Any, Final, cast
 import numpy as np
 import yaml
 
+from warpchain.chain.resolution import SECTIONS
+from warpchain.chain.setup import DEFAULT_PRESET, Setup
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.scene import contact_radius, link_values
-from warpchain.inputs.setup import DEFAULT_PRESET, SECTIONS, Setup
 from warpchain.inputs.validation import by_section, json_value
-from warpchain.pictures.labels import Walk
 from warpchain.pictures.player import player_data
+from warpchain.results.walk_result import WalkResult
+from warpchain.walks.walk_numbers import WalkNumbers as Walk
 from warpchain.walks.walk_phases import Progress
-from warpchain.walks.walk_result import WalkResult
 
 _OPTIONS: Final = ("links", "frequency", "start")
 """Fields with an option of their own on the command line of `warpchain walk`, which come first there."""
@@ -30,7 +30,7 @@ class Film:
     def __init__(self, setup: Setup) -> None:
         """Begin without a frame."""
         self._setup, self._times, self._joints = setup, list[Array](), list[Array]()
-        self._masses = link_values(setup.scene, setup.parameters).mass[:, None]
+        self._masses = setup.link_values.mass[:, None]
         self.size = 0
 
     def message(self, progress: Progress) -> dict[str, Any]:
@@ -54,7 +54,7 @@ class Film:
             frame_joints=joints,
             joints_in_room=None,
             sprocket_center=None if is_bare else np.array([0.0, height]),
-            sprocket_radius=math.nan if is_bare else contact_radius(setup.scene, setup.parameters),
+            sprocket_radius=math.nan if is_bare else setup.contact_radius,
         )
         data = player_data(cast(Walk, walk), len(times))
         if is_first:

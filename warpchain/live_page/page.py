@@ -14,7 +14,7 @@ from warpchain.pictures.labels import unit_text
 from warpchain.pictures.player import PLAYER
 
 if TYPE_CHECKING:
-    from warpchain.store.sweep_result import SweepResult
+    from warpchain.results.sweep_result import SweepResult
 
 FIRST: Final = {"links": 60, "frequency": 15, "start": "spinning"}
 """The first set-up on the page."""

@@ -60,7 +60,7 @@ class LiveServer(ThreadingHTTPServer):
         """Listen at a port, or at any that is free, and read the sweep of a folder; errors as of `live`."""
         sweep = None
         if folder is not None:
-            from warpchain.store.sweep_result import load
+            from warpchain.results.sweep_result import load
 
             sweep = load(folder)
         self.token, self.closing = secrets.token_urlsafe(24), threading.Event()

@@ -17,12 +17,12 @@ from typing import Annotated, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.chain.link_values import mean_value
+from warpchain.chain.setup import Setup
+from warpchain.chain.softened_joints import SOFT
 from warpchain.hdf5_files import Stored, stored_fields
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.link_values import mean_value
-from warpchain.inputs.parameters import Parameters, preset
-from warpchain.inputs.scene import joint_radius, link_values
-from warpchain.inputs.setup import Setup
+from warpchain.inputs.parameters import Parameters
 
 BEFORE: Final = "before_release"
 """Name of the motion before the release, among the arrays of a walk and in its file."""
@@ -151,12 +151,12 @@ def average_loop(setup: Setup, before: BeforeRelease | None, center: Array | Non
         raise ValueError("walk: it ended before its release; see its status, which says what to try")
     if before is None:
         raise ValueError("walk: nothing was kept of the time before its release; run it again with record_before")
-    scene, parameters = setup.scene, setup.parameters
+    parameters = setup.parameters
     if setup.options.soften_drive:
-        smoothing = max(parameters.friction_smoothing, preset("soft").friction_smoothing)
+        smoothing = max(parameters.friction_smoothing, SOFT.smoothing)
         parameters = parameters.with_values({"friction_smoothing": smoothing})
-    mass = mean_value(link_values(scene, parameters).mass)
-    return average_frames(before, parameters, mass, center, joint_radius(scene, parameters))
+    mass = mean_value(setup.link_values.mass)
+    return average_frames(before, parameters, mass, center, setup.joint_radius)
 
 
 def average_frames(

@@ -13,7 +13,6 @@ from typing import Annotated, Any, Final, cast
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from pydantic import Field
 from scipy.spatial.transform import Rotation
@@ -22,10 +21,11 @@ from warpchain.files import checked_output, replacing, write_whole
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.validation import InputError, checked, short
 from warpchain.pictures import chain
-from warpchain.pictures.labels import Walk, headline
+from warpchain.pictures.labels import headline
 from warpchain.pictures.places import center_in_room, checked_joints, circle_radii, sprocket_circle, walk_box
 from warpchain.pictures.player import EDGE, INNER, OUTER, floor_marks, player, side_box
-from warpchain.pictures.style import GROUND, INK, tidy
+from warpchain.pictures.style import GROUND, INK, InlineFigure, tidy
+from warpchain.walks.walk_numbers import WalkNumbers as Walk
 
 WIDTH, TALLEST = 960, 560
 """Greatest width and height of a picture [pixels]."""
@@ -150,7 +150,7 @@ class Film:
         space = np.array([WIDTH, TALLEST]) - _PADDING.sum(axis=0)
         scale = float((space / np.diff(box)[:, 0]).min())
         size = 2 * np.rint((np.diff(box)[:, 0] * scale + _PADDING.sum(axis=0)) / 2)
-        self.figure = Figure(figsize=tuple(size / DPI), dpi=DPI)
+        self.figure = InlineFigure(figsize=tuple(size / DPI), dpi=DPI)
         self._canvas: Any = FigureCanvasAgg(self.figure)
         share = _PADDING / size
         self._axes = self.figure.add_axes((*share[0], *(1 - share.sum(axis=0))), xlim=box[0], ylim=box[1])

@@ -13,9 +13,9 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.patches import Circle, Patch, Polygon
 
 from warpchain.inputs.arrays import Array
-from warpchain.pictures.labels import Walk
 from warpchain.pictures.places import sprocket_centers, sprocket_circle, stretches
 from warpchain.pictures.style import DASHES, FAINT, GROUND, INK
+from warpchain.walks.walk_numbers import WalkNumbers as Walk
 
 SIDE: Final = np.eye(3)
 ABOVE: Final = np.eye(3)[[0, 2, 1]]

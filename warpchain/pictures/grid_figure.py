@@ -7,7 +7,7 @@ the lines, or the rows of a map if both have many values; all other axes give pa
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from matplotlib import colormaps
@@ -22,9 +22,7 @@ from warpchain.inputs.validation import InputError, shown
 from warpchain.pictures import labels, style
 from warpchain.pictures.labels import math_symbol, short_texts, unit_text, with_unit
 from warpchain.pictures.style import BLUE, FAINT, GROUND, LINE_COLORS, RED, AnyFigure, NothingToShow, panel_grid, tidy
-
-if TYPE_CHECKING:
-    from warpchain.store.cell_statistics import CellStatistics
+from warpchain.walks.cell_statistics import CellStatistics
 
 MOST_LINES: Final = len(LINE_COLORS)
 """Greatest number of lines in a panel, unless lines are asked for."""
@@ -63,13 +61,19 @@ def draw_grid(
 ) -> AnyFigure:
     """Draw a quantity over the grids of one block or several.
 
-    Lines have bars of one standard error; a single line has lighter ones of one standard deviation, too. A red cross on
-    the x axis, or a dot in a map, says that walks failed there. `blocks`: name of each → the statistics of its cells;
-    the name of the quantity is for labels; all else is as of `SweepResult.plot`. A `NothingToShow` says that no block
-    has an axis of several values, or that there is no mean.
+    Lines have bars of one standard error; a single line has lighter ones of one standard deviation, too. Open symbols
+    are means of survivors, with an upright triangle at the lower bound of the whole mean where there is one. A red
+    cross on the x axis, or a dot in a map, says that walks failed there; a ring in a map is a mean of survivors.
+    `blocks`: name of each → the statistics of its cells; the name of the quantity is for labels; all else is as of
+    `SweepResult.plot`. A `NothingToShow` says that no block has an axis of several values, or that there is no mean.
     """
+    if figure is not None:
+        style.checked_figure(figure)
     panels, left_out = _all_panels(blocks, x)
-    label = with_unit(labels.quantity_text(quantity), next(iter(blocks.values())).unit)
+    text = labels.quantity_text(quantity)
+    if quantity == "dx" and any("slope" in cells.axes for cells in blocks.values()):
+        text = f"{text} = $x$ / cos $α$"
+    label = with_unit(text, next(iter(blocks.values())).unit)
     are_lines = not any(panel.is_map for panel in panels)
     alike = len({panel[:3] for panel in panels}) == 1
     columns = len(panels) if len(panels) <= 3 else min(4, math.ceil(len(panels) ** 0.5))
@@ -156,7 +160,7 @@ def _panels(cells: "CellStatistics", x: str | None, block: str) -> Iterator[Pane
         table = table[np.ix_(*rising)].reshape([len(axis.values) for axis in several]).transpose(order)
         return table[..., np.newaxis, :] if along is None else table
 
-    tables = {name: arranged(getattr(cells, name)) for name in ("mean", "sd", *labels.COUNTS)}
+    tables = {name: arranged(getattr(cells, name)) for name in (*labels.SPREADS, "independent", *labels.COUNTS)}
     texts = [
         [f"{math_symbol(axis.name)} = {text} {unit_text(axis.name)}".rstrip() for text in short_texts(axis.values)]
         for axis in others
@@ -198,6 +202,8 @@ def _draw_lines(axes: Axes, panel: Panel, palette: Mapping[Any, str]) -> None:
         error, line = cells.standard_error[number], "o-" if is_numeric else "o"
         look: dict[str, Any] = {"markersize": 3.5, "linewidth": 1.2, "color": color, "ecolor": (color, _DEEP)}
         axes.errorbar(places + shift, mean, error, fmt=line, elinewidth=3.5, **look)
+        partial, bounds = cells.of_survivors[number], cells.at_least[number]
+        style.mark_survivors(axes, places + shift, mean, partial, bounds, color)
     failed = np.flatnonzero(cells.failed.any(axis=0))
     if failed.size:
         floor: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "clip_on": False, "in_layout": False}
@@ -240,6 +246,9 @@ def _draw_map(axes: Axes, panel: Panel, limits: tuple[float, float]) -> Any:
     share = cells.failed / np.maximum(cells.count + cells.absent + cells.failed, 1)
     rows, columns = np.nonzero(share)
     axes.scatter(columns, rows, 50 * share[rows, columns], color=RED, edgecolor="white", linewidth=0.5)
+    rows, columns = np.nonzero(cells.of_survivors & (cells.failed == 0))
+    if len(rows):
+        axes.scatter(columns, rows, 14, facecolor="none", edgecolor="white", linewidth=1.0)
     return image
 
 
@@ -260,12 +269,21 @@ def _draw_legends(
             if len(palettes) > 1 and not panel.is_map and panel.along and panel.along.name == name:
                 axes.legend(handles=lines, title=with_unit(math_symbol(name), unit_text(name)), **look)
     if not all(panel.is_map for panel in panels):
-        handles.append(Patch(color=(FAINT, _DEEP), linewidth=0, label="± standard error"))
+        known = any(np.isfinite(panel.cells.standard_error).any() for panel in panels)
+        unknown = any(panel.cells.why_no_error for panel in panels)
+        if known or not unknown:
+            handles.append(Patch(color=(FAINT, _DEEP), linewidth=0, label="± standard error"))
+        if unknown:
+            handles.append(Line2D([], [], linestyle="", label="one randomisation: no standard error"))
     if any(panel.along is None for panel in panels):
         handles.append(Patch(color=(FAINT, _LIGHT), linewidth=0, label="± standard deviation"))
     if any(panel.cells.failed.any() for panel in panels):
         marker = "o" if panels[0].is_map else "x"
         handles.append(Line2D([], [], color=RED, marker=marker, linestyle="", label="walks failed"))
+    handles += style.survivor_handles(
+        any(panel.cells.of_survivors.any() for panel in panels),
+        any(np.isfinite(panel.cells.at_least).any() for panel in panels if not panel.is_map),
+    )
     beside = any(panel.along for panel in panels if not panel.is_map)
     place: Any = {"loc": "outside right upper", "ncols": 1} if beside else {"loc": "outside upper right", "ncols": 2}
     if handles:

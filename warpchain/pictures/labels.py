@@ -2,21 +2,15 @@
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+from typing import Any, Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import DIMENSIONLESS, FIELDS, SECTION_OF, field_unit, short
-
-if TYPE_CHECKING:
-    from warpchain.store.cell_statistics import CellStatistics
-    from warpchain.walks.walk_result import WalkResult
-
-    Walk = WalkResult
-else:
-    Walk = object
+from warpchain.walks.cell_statistics import CellStatistics
+from warpchain.walks.walk_numbers import WalkNumbers as Walk
 
 Kind = Literal["film_strip", "height_and_speed", "loop", "energy", "tilt"]
 """Figures of a walk; `tilt` only of one whose plane tilts."""
@@ -32,6 +26,8 @@ _NAMES: Final = {
 }
 """Names that say more than those of the fields."""
 
+SPREADS: Final = ("mean", "sd", "standard_error", "at_least")
+"""Statistics of a quantity in a cell, in its unit: see `CellStatistics`."""
 COUNTS: Final = ("count", "absent", "failed", "missing")
 """Numbers of walks of a cell: at rest with the quantity, at rest without it, ended otherwise, not computed yet."""
 
@@ -112,21 +108,40 @@ def cell_text(values: Mapping[str, Any]) -> str:
     return ", ".join(text.rstrip() for text in texts)
 
 
+MARK: Final = "*"
+"""Of a mean of survivors, see `cell_notes`."""
+
+
 def cell_table(found: "CellStatistics") -> tuple[list[str], Iterator[list[str]]]:
-    """Head and rows of a table: mean and spread of the distance in each cell, and numbers of walks."""
+    """Head and rows of a table: mean and spread of the distance in each cell, and numbers of walks.
+
+    The notes below it are those of `cell_notes`.
+    """
     lengths = {"mean Δx / m": found.mean, "s.d. / m": found.sd, "s.e. / m": found.standard_error}
+    lengths |= {"at least / m": found.at_least} if np.isfinite(found.at_least).any() else {}
     counts = {"at rest": found.count, "failed": found.failed}
     counts |= {"ended as asked": found.absent} if found.absent.any() else {}
     counts |= {"not run yet": found.missing} if found.missing.any() else {}
     rows = (
         [
             *(value_text(value) for value in cell_values(found.axes, place).values()),
-            *(f"{values[place]:.4f}".replace("nan", "–") for values in lengths.values()),
+            *(f"{values[place]:.4f}{marks.get(name, '')}".replace("nan", "–") for name, values in lengths.items()),
             *(f"{values[place]}" for values in counts.values()),
         ]
         for place in np.ndindex(*found.mean.shape)
+        for marks in [{"mean Δx / m": MARK if found.of_survivors[place] else " "}]
     )
     return [*(with_unit(axis_symbol(name), unit_text(name)) for name in found.axes), *lengths, *counts], rows
+
+
+def cell_notes(cells: Iterable["CellStatistics"]) -> list[str]:
+    """What marks, bounds and missing errors in the tables of some blocks mean; one line for each that occurs."""
+    found, notes = list(cells), list[str]()
+    if any(each.of_survivors.any() for each in found):
+        notes.append(f"{MARK} mean of the walks that came to rest only; the others of its cell have no Δx")
+    if any(np.isfinite(each.at_least).any() for each in found):
+        notes.append("at least: mean of all walks, if those still moving at distance_limit had stopped there")
+    return [*notes, *dict.fromkeys(each.why_no_error for each in found if each.why_no_error)]
 
 
 def lost_note(cells: Sequence[Mapping[str, Any]]) -> str:
@@ -150,4 +165,5 @@ def setting(walk: Walk) -> str:
 
 def headline(walk: Walk) -> str:
     """Links, frequency and, if it came to rest, how far it walked."""
-    return setting(walk) + (f": Δx = {walk.dx:.3f} m" if math.isfinite(walk.dx) else "")
+    text = "Δx = x / cos α" if walk.setup.scene.slope else "Δx"
+    return setting(walk) + (f": {text} = {walk.dx:.3f} m" if math.isfinite(walk.dx) else "")

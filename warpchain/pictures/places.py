@@ -2,10 +2,9 @@
 
 import numpy as np
 
+from warpchain.chain.sprocket_motion import sprocket_places
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.scene import link_values
-from warpchain.inputs.sprocket_motion import sprocket_places
-from warpchain.pictures.labels import Walk
+from warpchain.walks.walk_numbers import WalkNumbers as Walk
 
 
 def checked_joints(walk: Walk) -> Array:
@@ -31,7 +30,7 @@ def center_in_room(walk: Walk) -> Array:
 
 def circle_radii(walk: Walk) -> Array:
     """Radius of the circles of each link [m], shape (n,)."""
-    return link_values(walk.setup.scene, walk.setup.parameters).radius
+    return walk.setup.link_values.radius
 
 
 def sprocket_circle(walk: Walk) -> Array | None:

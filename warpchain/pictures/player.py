@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.inputs.arrays import Array
-from warpchain.pictures.labels import Walk, headline
+from warpchain.pictures.labels import headline
 from warpchain.pictures.places import (
     checked_joints,
     circle_radii,
@@ -22,6 +22,7 @@ from warpchain.pictures.places import (
     stretches,
     walk_box,
 )
+from warpchain.walks.walk_numbers import WalkNumbers as Walk
 
 INNER, OUTER, EDGE = "#9CCBE6", "#0072B2", "#00385A"
 """Colours of inner links, of outer links and of their edges."""

@@ -8,12 +8,16 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple
 
+import numpy as np
+from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure, SubFigure
+from matplotlib.lines import Line2D
+from matplotlib.text import Text
 
 from warpchain.files import write_whole
-from warpchain.inputs.validation import InputError
+from warpchain.inputs.validation import InputError, shown
 
 AnyFigure = Figure | SubFigure
 LINE_COLORS: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -64,6 +68,30 @@ def tidy(axes: Axes, *, grid: Literal["x", "y", "both"] | None = None) -> None:
         axes.set_axisbelow(True)
 
 
+_OPEN: Final[Any] = {"linestyle": "", "markerfacecolor": "white", "markersize": 5.0}
+
+
+def mark_survivors(axes: Axes, x: Any, mean: Any, partial: Any, at_least: Any, color: Any) -> None:
+    """Open symbols over means that leave out walks, and triangles at lower bounds of the whole mean, NaN for none."""
+    bounded = np.isfinite(at_least)
+    for marker, y, chosen in (("o", mean, partial), ("^", at_least, bounded)):
+        if chosen.any():
+            axes.plot(x[chosen], y[chosen], marker=marker, color=color, zorder=3.5, label="_mark", **_OPEN)
+
+
+def survivor_handles(partial: bool, bounded: bool) -> list[Line2D]:
+    """What a legend says of the marks of `mark_survivors`, of those that there are."""
+    texts = [("o", "mean of survivors only")] * partial + [("^", "at least, of all walks")] * bounded
+    return [Line2D([], [], color=FAINT, marker=marker, label=text, **_OPEN) for marker, text in texts]
+
+
+def checked_figure(figure: Any) -> AnyFigure:
+    """A figure that was given to draw into; an `InputError` if it is none."""
+    if not isinstance(figure, Figure | SubFigure):
+        raise InputError(f"figure: expected an empty matplotlib Figure or SubFigure, got {shown(figure)}")
+    return figure
+
+
 def panel_grid(
     figure: AnyFigure, count: int, columns: int, *, sharex: bool, sharey: bool = True
 ) -> tuple[list[Axes], list[Axes]]:
@@ -80,7 +108,18 @@ def panel_grid(
 
 
 class InlineFigure(Figure):
-    """A figure that a notebook shows when it is the value of a cell."""
+    """A figure that a notebook shows when it is the value of a cell.
+
+    Its texts are matplotlib's own in any case: with `text.usetex` names with an underscore would be errors of LaTeX,
+    which need not be there.
+    """
+
+    def draw(self, renderer: Any) -> None:
+        """Draw everything without LaTeX."""
+        with rc_context({"text.usetex": False}):
+            for text in self.findobj(Text):
+                text.set_usetex(False)
+            super().draw(renderer)
 
     def _repr_png_(self) -> bytes:
         """The figure as a PNG."""

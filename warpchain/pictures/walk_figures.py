@@ -18,12 +18,26 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from warpchain.inputs.arrays import Array
+from warpchain.inputs.validation import InputError, shown
 from warpchain.loop.stationary_loop import StationaryLoop
 from warpchain.pictures import chain
-from warpchain.pictures.labels import Kind, Walk, setting
+from warpchain.pictures.labels import Kind, setting
 from warpchain.pictures.places import center_in_room, checked_joints, circle_radii, stretches, walk_box
-from warpchain.pictures.style import BLUE, DASHES, DOTS, FAINT, GREEN, GROUND, INK, RED, InlineFigure, tidy
+from warpchain.pictures.style import (
+    BLUE,
+    DASHES,
+    DOTS,
+    FAINT,
+    GREEN,
+    GROUND,
+    INK,
+    RED,
+    InlineFigure,
+    checked_figure,
+    tidy,
+)
 from warpchain.status import Status
+from warpchain.walks.walk_numbers import WalkNumbers as Walk
 
 FALLEN: Final = 45.0
 """Tilt beyond which a chain has fallen over [degrees]."""
@@ -56,6 +70,10 @@ def draw(walk: Walk, kind: Kind, *, figure: Figure | None = None, ax: Axes | Non
         raise ValueError(f"ax: {kind} has several axes; give an empty figure=, or a SubFigure of yours")
     if ax is not None and figure is not None:
         raise ValueError("ax: given together with figure; leave one out")
+    if figure is not None:
+        checked_figure(figure)
+    if ax is not None and not isinstance(ax, Axes):
+        raise InputError(f"ax: expected matplotlib Axes, got {shown(ax)}")
     if kind == "film_strip":
         return film_strip(walk, figure)
     if ax is not None:
@@ -334,7 +352,7 @@ def _draw_distance(axes: Axes, walk: Walk, low: float, depth: float) -> None:
     axes.annotate("", (x[1], y[1]), (x[0], y[0]), arrowprops=arrow, zorder=4)
     axes.plot([x, x], [floor, y - 0.6 * depth], color=INK, linewidth=0.8, zorder=4)
     box = {"facecolor": GROUND, "edgecolor": "none", "pad": 2.0}
-    text = f"Δx = {walk.dx:.3f} m"
+    text = f"Δx = {'x / cos α = ' * (slope != 0)}{walk.dx:.3f} m"
     axes.text(x.mean(), y.mean(), text, rotation=-slope, ha="center", va="center", bbox=box, zorder=6)
 
 

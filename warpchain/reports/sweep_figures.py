@@ -14,24 +14,34 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from warpchain.inputs.arrays import Array
-from warpchain.inputs.distributions import random_generator
+from warpchain.inputs.arrays import AnyArray, Array
+from warpchain.inputs.starts import STARTS
 from warpchain.pictures import labels
 from warpchain.pictures.grid_figure import draw_grid
 from warpchain.pictures.labels import cell_values, quantity_name, quantity_text
-from warpchain.pictures.style import BLUE, FAINT, GREEN, INK, LINE_COLORS, RED, NothingToShow, Picture, panel_grid, tidy
+from warpchain.pictures.style import (
+    BLUE,
+    FAINT,
+    GREEN,
+    INK,
+    LINE_COLORS,
+    RED,
+    InlineFigure,
+    NothingToShow,
+    Picture,
+    mark_survivors,
+    panel_grid,
+    survivor_handles,
+    tidy,
+)
+from warpchain.results.block_result import BlockResult
+from warpchain.results.sweep_result import SweepResult
 from warpchain.status import Status
-from warpchain.store.block_result import BlockResult
-from warpchain.store.sweep_result import SweepResult
 from warpchain.sweeps.designs import sobol_indices, walks_per_sample
 from warpchain.walks.rows import quantity_of
 
-_STARTS: Final = {
-    "rest": ("started at rest", RED, "o"),
-    "ellipse": ("started as an ellipse", GREEN, "D"),
-    "spinning": ("started spinning", BLUE, "s"),
-}
-"""How the chain started → legend, colour, marker."""
+_LOOKS: Final = {"rest": (RED, "o"), "ellipse": (GREEN, "D"), "spinning": (BLUE, "s")}
+"""How the chain started → colour and marker; of other starts the first among `_OTHERS` that are left."""
 _OTHERS: Final = (*zip((BLUE, *LINE_COLORS[3:6]), "^vP*", strict=True), *[(INK, "X")] * 100)
 """Colour and marker of further blocks of the same start."""
 
@@ -85,8 +95,8 @@ def figure6(result: SweepResult) -> Picture:
     red, ellipses green. Blocks with other axes than links, frequency and start are left out. `NothingToShow`: no walk
     of the other blocks has come to rest, or none of them has several cells.
     """
-    # links → label of a series → frequency, mean, standard deviation; links → numbers of walks
-    cells: dict[int, dict[str, list[tuple[float, float, float]]]] = defaultdict(lambda: defaultdict(list))
+    # links → label of a series → frequency, mean, deviation, whether of survivors, bound; links → numbers of walks
+    cells: dict[int, dict[str, list[tuple[float, ...]]]] = defaultdict(lambda: defaultdict(list))
     lost: dict[int, list[dict[str, int]]] = defaultdict(list)
     looks: dict[str, dict[str, Any]] = {}  # label of a series → its colour and marker
     for block, given in zip(result.blocks.values(), result.sweep["blocks"], strict=True):
@@ -95,32 +105,35 @@ def figure6(result: SweepResult) -> Picture:
             of_point = {name: sets[0] for name, sets in block.planned.points.items()}  # there is one set at most
             values = {**given["scene"], **of_point, **cell_values(block.axes, place)}
             if values["start"] not in own:
-                label, color, marker = _STARTS[values["start"]]
+                label, further = STARTS[values["start"]].legend, _OTHERS[max(0, len(looks) - 1)]
+                color, marker = _LOOKS.get(values["start"], further)
                 if label in looks:  # of another block with this start
-                    label, (color, marker) = f"{block.name}, {label}", _OTHERS[len(looks) - 1]
+                    label, (color, marker) = f"{block.name}, {label}", further
                 own[values["start"]], looks[label] = label, {"color": color, "marker": marker}
-            row = values["frequency"], float(found.mean[place]), float(found.sd[place])
+            numbers = found.mean, found.sd, found.of_survivors, found.at_least
+            row = float(values["frequency"]), *(float(each[place]) for each in numbers)
             cells[values["links"]][own[values["start"]]].append(row)
             lost[values["links"]].append({name: getattr(found, name)[place] for name in labels.COUNTS})
-    rows = np.array([row for series in cells.values() for each in series.values() for row in each]).reshape(-1, 3)
+    rows = np.array([row for series in cells.values() for each in series.values() for row in each]).reshape(-1, 5)
     frequencies = np.unique(rows[:, 0])
     if not np.isfinite(rows[:, 1]).any() or len(cells) == len(frequencies) == 1:
         raise NothingToShow("Figure 6 has walks at rest over links and frequency; give such a block, or let it go on")
     gap = float(np.diff(frequencies).min()) if len(frequencies) > 1 else 1.0
     columns = {1: 1, 2: 2, 4: 2}.get(len(cells), 3)
     size = max(4.2, 3.1 * columns), 1.0 + 2.6 * -(-len(cells) // columns)
-    figure = Figure(figsize=size, layout="constrained")
+    figure = InlineFigure(figsize=size, layout="constrained")
     used, empty = panel_grid(figure, len(cells), columns, sharex=True)
     for (links, series), axes in zip(sorted(cells.items()), used, strict=True):
         for number, (label, each) in enumerate(series.items()):
             # Boxes of several series stand side by side about their frequency.
-            frequency, mean, sd = np.array(each).T
+            frequency, mean, sd, partial, at_least = np.array(each).T
             x = frequency + gap * (number - (len(series) - 1) / 2) * 0.7 / len(series)
             color, width = looks[label]["color"], gap * min(0.36, 0.6 / len(series))
             axes.vlines(x, mean - 2 * sd, mean + 2 * sd, color=color, linewidth=1.2)
             axes.bar(x, 2 * sd, width, mean - sd, color="white", zorder=2.1)
             axes.bar(x, 2 * sd, width, mean - sd, facecolor=(color, 0.2), edgecolor=color, zorder=2.2)
             axes.plot(x, mean, linestyle="", markersize=4.5, zorder=3, **looks[label])
+            mark_survivors(axes, x, mean, partial > 0, at_least, color)
         axes.set_title(f"$n$ = {links}", fontsize="medium", loc="left")
         axes.set_xlabel(labels.lost_note(lost[links]), color=RED, fontsize="small")
         tidy(axes, grid="y")
@@ -135,6 +148,7 @@ def figure6(result: SweepResult) -> Picture:
         Patch(facecolor=(FAINT, 0.2), edgecolor=FAINT, label="± 1 standard deviation"),
         Line2D([], [], color=FAINT, linestyle="", marker="|", markersize=13, label="± 2 standard deviations"),
     ]
+    handles += survivor_handles(bool((rows[:, 3] > 0).any()), bool(np.isfinite(rows[:, 4]).any()))
     if empty:
         empty[-1].legend(handles=handles, loc="center", frameon=False)
     else:
@@ -145,14 +159,14 @@ def figure6(result: SweepResult) -> Picture:
 
 
 CONFIDENCE: Final = 0.95
-"""Confidence level of bootstrap intervals."""
+"""Confidence level of intervals."""
 
 
 class Sensitivity(NamedTuple):
     """Sobol' indices of the distance in one cell, which a text describes, for d drawn quantities of some names.
 
     Indices are the share of the variance that each causes by itself, and together with others, (2, d); intervals are
-    bootstrap intervals of these, (2, d, 2). Samples have d + 2 walks each; lost are those that are not complete.
+    theirs, (2, d, 2), NaN of one randomisation. Samples have d + 2 walks each; lost are those that are not complete.
     """
 
     cell: str
@@ -166,7 +180,7 @@ class Sensitivity(NamedTuple):
 def sensitivities(result: SweepResult) -> list[Sensitivity]:
     """Sobol' indices of the distance in each cell that was sampled by ``saltelli``.
 
-    The intervals are percentiles of 1000 bootstrap resamples of the samples, from a fixed stream of random numbers.
+    The intervals are Student's, from the jackknife over the randomisations, which are independent of one another.
     `NothingToShow`: no block is sampled so, or none has a cell with two complete samples yet.
     """
     named = [given["name"] for given in result.sweep["blocks"] if given["sampler"] == "saltelli"]
@@ -179,22 +193,37 @@ def sensitivities(result: SweepResult) -> list[Sensitivity]:
             rested = block.columns["status"][place] == Status.AT_REST
             walks = np.where(rested, block.columns["dx"][place], np.nan)
             whole = walks.reshape(-1, walks_per_sample("saltelli", len(block.drawn)))
-            complete = whole[np.isfinite(whole).all(axis=1)]
+            is_complete = np.isfinite(whole).all(axis=1)
+            complete, groups = whole[is_complete], block.planned.groups[:: whole.shape[1]][is_complete]
             samples, indices = len(complete), np.array(sobol_indices(complete))
             if samples < 2 or not np.isfinite(indices).all():
                 continue
-            rng = random_generator(0)
-            draws = (rng.integers(0, samples, samples) for _ in range(1000))
-            resampled = [sobol_indices(complete[draw]) for draw in draws]
-            # The indices are NaN for a resample without variance, which repeats a single sample.
-            intervals = np.nanpercentile(resampled, (50 * (1 - CONFIDENCE), 50 * (1 + CONFIDENCE)), axis=0)
+            half = _half_interval(complete, groups)
+            intervals = np.stack([indices - half, indices + half], axis=-1)
             cell = labels.cell_text(cell_values(block.axes, place))
             text = ": ".join([*[name] * (len(named) > 1), *[cell] * bool(cell)]) or block.name
             lost = len(whole) - samples
-            found.append(Sensitivity(text, block.drawn, indices, intervals.transpose(1, 2, 0), samples, lost))
+            found.append(Sensitivity(text, block.drawn, indices, intervals, samples, lost))
     if not found:
         raise NothingToShow("no cell has two complete samples for Sobol indices yet; let the sweep go on")
     return found
+
+
+def _half_interval(samples: Array, groups: AnyArray) -> Array:
+    """Half width of the intervals of `sobol_indices`, (2, d), by leaving out each group of samples in turn.
+
+    The delete-a-group jackknife: B. Efron, C. Stein, Ann. Statist. 9 (1981) 586. Indices are no means, but smooth
+    functions of means, of which it gives the error without the bias of few samples in each group.
+    """
+    from scipy.special import stdtrit
+
+    present = np.unique(groups)
+    count = len(present)
+    if count < 2:
+        return np.full((2, samples.shape[1] - 2), np.nan)
+    without = np.array([sobol_indices(samples[groups != group]) for group in present])
+    error = np.sqrt((count - 1) * np.mean((without - without.mean(axis=0)) ** 2, axis=0))
+    return np.asarray(stdtrit(count - 1, 0.5 * (1 + CONFIDENCE)) * error)
 
 
 def sensitivity(result: SweepResult) -> Picture:
@@ -210,7 +239,7 @@ def sensitivity(result: SweepResult) -> Picture:
     names = sorted(totals, key=lambda name: -float(np.mean(totals[name])))
     columns = min(len(cells), 3)
     size = max(4.2, 2.4 + 3.2 * columns), 0.9 + (0.6 + 0.36 * len(names)) * -(-len(cells) // columns)
-    figure = Figure(figsize=size, layout="constrained")
+    figure = InlineFigure(figsize=size, layout="constrained")
     used, _ = panel_grid(figure, len(cells), columns, sharex=True)
     for axes, cell in zip(used, cells, strict=True):
         places = np.array([names.index(name) for name in cell.names])
@@ -225,11 +254,14 @@ def sensitivity(result: SweepResult) -> Picture:
         tidy(axes, grid="x")
     used[0].set_yticks(range(len(names)), [quantity_text(name) for name in names])
     used[0].set_ylim(len(names) - 0.4, -0.6)
-    figure.supxlabel(f"share of the variance of $Δx$, with {CONFIDENCE:.0%} intervals", fontsize="medium")
+    have = any(np.isfinite(cell.intervals).any() for cell in cells)
+    errors = f"with {CONFIDENCE:.0%} intervals" if have else "without intervals: one randomisation"
+    figure.supxlabel(f"share of the variance of $Δx$, {errors}", fontsize="medium")
     figure.legend(*used[0].get_legend_handles_labels(), loc="outside upper right", frameon=False, ncols=2)
     caption = (
         "Sobol indices: the share of the variance of the distance walked that a quantity causes by itself (first "
-        f"order) and takes part in (total); lines are {CONFIDENCE:.0%} bootstrap intervals. Walks are chaotic: "
+        f"order) and takes part in (total); lines are {CONFIDENCE:.0%} intervals, from the spread between independent "
+        "randomisations. Walks are chaotic: "
         "changing anything a little scatters them, which all total indices contain alike. "
         f"Samples: {', '.join(f'{cell.samples}' for cell in cells)}."
     )

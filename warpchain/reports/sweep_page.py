@@ -20,15 +20,15 @@ from matplotlib.figure import Figure
 from warpchain.files import AnyPath, Kind, checked_output, write_whole
 from warpchain.inputs.arrays import AnyArray
 from warpchain.inputs.validation import short
-from warpchain.pictures.labels import cell_table, cell_text, cell_values, unit_text
+from warpchain.pictures.labels import cell_notes, cell_table, cell_text, cell_values, unit_text
 from warpchain.pictures.style import image, png
 from warpchain.reports.sweep_figures import figures
+from warpchain.results.block_result import BlockResult
+from warpchain.results.sweep_result import SweepResult, load
+from warpchain.results.walk_result import WalkResult
 from warpchain.status import Status
-from warpchain.store.block_result import BlockResult
-from warpchain.store.sweep_result import SweepResult, load
 from warpchain.version import VERSION
 from warpchain.walks.landmarks import FAULTS
-from warpchain.walks.walk_result import WalkResult
 
 _MOST_LISTED: Final = 100
 """Greatest number of walks with the same status or fault that are listed one by one."""
@@ -102,6 +102,7 @@ def _cells(result: SweepResult) -> str:
         "<p>Mean, standard deviation (divisor count − 1) and standard error of the mean of the distance walked Δx, "
         "over the walks at rest.</p>"
     ]
+    parts += [f"<p>{escape(note)}.</p>" for note in cell_notes(result.cell_statistics().values())]
     for block in result.blocks.values():
         found = block.statistics("dx")
         head, rows = cell_table(found)

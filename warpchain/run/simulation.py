@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from warpchain.chain.resolution import takes_fields
+from warpchain.chain.setup import State
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import gpu_turn
 from warpchain.engine.tallies import LOST
@@ -15,8 +17,6 @@ from warpchain.inputs.arrays import Array, checked_array
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene, check_links_on_gpu
-from warpchain.inputs.setup import takes_fields
-from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError, checked, plain, shown, validated
 from warpchain.status import Status
 
@@ -85,7 +85,7 @@ def simulate(
         position: (n, 3): x, y [m] and θ [rad] of each link's centre; n as of :class:`State`. Link i's right end meets
             link i + 1's left end, the last link's the first one's. Links 0, 2, … are inner ones.
         velocity: (n, 3): their rates [m/s, m/s, rad/s].
-        duration: Simulated time [s], from time 0, which is that of the state.
+        duration: Simulated time [s], from time 0, which is that of the state; None: up to the last of ``times``.
         times: Instants of the trajectory [s], rising, in [0, duration]; steps land on them exactly. Default: 101
             instants evenly spread.
         floor: True (at y = 0), False (none) or what ``floor`` of a scene may be, such as points ``[x, y]`` [m] or
@@ -107,7 +107,14 @@ def simulate(
     if tolerance is not None:
         chosen["tolerance"] = tolerance
     floor, gravity = plain(floor, "floor"), checked(gravity, "gravity", bool)
-    end: float = checked(duration, "duration", Annotated[float, Field(ge=0, lt=LONGEST)], "s")
+    chosen_times = None if times is None else checked_array(times, "times", "t")
+    if duration is None and chosen_times is None:
+        raise InputError("duration: missing, and so is times; give the simulated time in s, or the instants")
+    if duration is None and chosen_times is not None and len(chosen_times):
+        duration = max(0.0, float(chosen_times[-1]))
+    end: float = checked(
+        0.0 if duration is None else duration, "duration", Annotated[float, Field(ge=0, lt=LONGEST)], "s"
+    )
     options = validated(Options, {**_UNSOFTENED, **settings, **chosen}, "options")
     for name in _UNSOFTENED:
         if getattr(options, name):
@@ -129,8 +136,8 @@ def simulate(
     chain = state.parameters if gravity else state.parameters.with_values({"gravity": 0.0})
     setup = replace(state.setup, scene=scene, parameters=chain)
     check_links_on_gpu(state.links, options.device, "position")
-    instants = np.linspace(0.0, end, 101) if times is None else checked_array(times, "times", "t")
-    is_rising = times is None or bool(np.all(np.diff(instants) > 0))
+    instants = np.linspace(0.0, end, 101) if chosen_times is None else chosen_times
+    is_rising = chosen_times is None or bool(np.all(np.diff(instants) > 0))
     if not len(instants) or instants[0] < 0 or instants[-1] > end or not is_rising:
         raise InputError(f"times: give rising instants between 0 and the duration of {end} s")
     if len(instants) * state.links > MOST_PLACES:
@@ -139,8 +146,8 @@ def simulate(
         setup.floor.check_above(state.position, chain.link_length, "position")
     with gpu_turn([options.device]):
         batch = Batch(1, state.links, options, faces=len(setup.floor.laws))
-        batch.set_up(0, setup)
-        batch.load(0, state.position, state.velocity, stop_time=instants[0], stop_status=Status.FINISHED)
+        batch.worlds[0].set_up(setup)
+        batch.worlds[0].load(state.position, state.velocity, stop_time=instants[0], stop_status=Status.FINISHED)
         return _follow(batch, "none" if floor is False else setup.floor.body, instants, end)
 
 
@@ -196,9 +203,9 @@ class Chains:
         self.time, self._links = 0.0, links
         with gpu_turn([options.device]):
             self._batch = Batch(worlds, links, options)
-            for world, state in enumerate(states):
-                self._batch.set_up(world, state.setup)
-                self._batch.load(world, state.position, state.velocity, stop_time=0.0, stop_status=Status.FINISHED)
+            for world, state in zip(self._batch.worlds, states, strict=True):
+                world.set_up(state.setup)
+                world.load(state.position, state.velocity, stop_time=0.0, stop_status=Status.FINISHED)
             self._features = self._batch.features(fixed_body="floor" if floor else "none")
             self._batch.run(range(worlds), self._features)
 
@@ -209,14 +216,16 @@ class Chains:
 
     def motions(self, chains: _Numbers | None = None) -> tuple[Array, Array]:
         """Place and angle of the links of all chains, or of some numbers, (W, n, 3); and their rates."""
-        return self._batch.motions(self._numbers(chains), self._links)
+        chosen = self._batch.several(self._numbers(chains))
+        return chosen.position, chosen.velocity
 
     def set_velocity(self, chains: _Numbers, velocity: Array) -> None:
         """Give some chains, by their numbers, other velocities, (chains, n, 3); an `InputError` if they do not fit."""
         numbers = self._numbers(chains)
         rates = checked_array(velocity, "velocity", len(numbers), self._links, 3)
         if numbers:
-            self._batch.place(numbers, self.motions(numbers)[0], rates)
+            chosen = self._batch.several(numbers)
+            chosen.place(chosen.position, rates)
 
     def run(self, until: float, chains: _Numbers | None = None, *, to_rest: bool = False) -> None:
         """Carry on all chains that can go on, or those of some numbers.
@@ -230,12 +239,12 @@ class Chains:
             InputError: A number or the time is refused.
         """
         status = self.status
-        going = [world for world in self._numbers(chains) if status[world] == Status.FINISHED]
-        now = max((self._batch.time(world) for world in going), default=0.0)
+        going = [number for number in self._numbers(chains) if status[number] == Status.FINISHED]
+        now = max((self._batch.worlds[number].time for number in going), default=0.0)
         until = checked(until, "until", Annotated[float, Field(ge=now, lt=LONGEST)], "s")
         if going:
             with gpu_turn([self._batch.options.device]):
-                self._batch.resume(going, until, Status.TIME_LIMIT if to_rest else Status.FINISHED)
+                self._batch.several(going).resume(until, Status.TIME_LIMIT if to_rest else Status.FINISHED)
                 self._batch.run(going, self._features)
         self.time = until
 
@@ -248,23 +257,23 @@ class Chains:
 
 def _follow(batch: Batch, body: str, instants: Array, end: float) -> Trajectory:
     """Carry the chain of a batch on from instant to instant until the end [s]; ``body``: its floor."""
-    features = batch.features(fixed_body=body)
+    features, world = batch.features(fixed_body=body), batch.worlds[0]
     reached, positions, velocities = [], [], []
     for instant in instants:
-        batch.resume(0, instant, Status.FINISHED)
+        world.resume(instant, Status.FINISHED)
         batch.run([0], features)
-        reached.append(batch.time(0))
-        positions.append(batch.position(0))
-        velocities.append(batch.velocity(0))
-        if batch.status(0) != Status.FINISHED:
+        reached.append(world.time)
+        positions.append(world.position)
+        velocities.append(world.velocity)
+        if world.status != Status.FINISHED:
             break
-    if batch.status(0) == Status.FINISHED and instants[-1] < end:
-        batch.resume(0, end, Status.FINISHED)
+    if world.status == Status.FINISHED and instants[-1] < end:
+        world.resume(end, Status.FINISHED)
         batch.run([0], features)
-    counts, extremes, losses = batch.counts(0), batch.extremes(0), batch.losses(0)
+    counts, extremes, losses = world.counts, world.extremes, world.losses
     kinds = ("floor", "self")
     return Trajectory(
-        status=batch.status(0),
+        status=world.status,
         time=np.array(reached),
         position=np.array(positions),
         velocity=np.array(velocities),

@@ -1,14 +1,16 @@
 """One walk, from a user's few words to its result."""
 
-from typing import Any, Literal
+from typing import Any
 
+from warpchain.chain.resolution import continued, resolve, takes_fields
+from warpchain.chain.setup import DEFAULT_PRESET, Setup, State
 from warpchain.inputs.distributions import Seed
-from warpchain.inputs.setup import DEFAULT_PRESET, Setup, continued, resolve, takes_fields
-from warpchain.inputs.state import State
+from warpchain.inputs.starts import StartWord
 from warpchain.inputs.validation import InputError, by_name, by_section, checked, shown
+from warpchain.results.one_walk import OnProgress, run_walk
+from warpchain.results.walk_result import WalkResult
 from warpchain.run.progress_bar import changing_line, walk_progress_text
-from warpchain.walks.one_walk import OnProgress, run_walk
-from warpchain.walks.walk_result import WalkResult
+from warpchain.sweeps.block import refuse_axes
 
 
 @takes_fields("parameters", "scene", "options")
@@ -19,7 +21,7 @@ def walk(
     preset: str | None = None,
     method: str | None = None,
     tolerance: float | None = None,
-    start: Literal["rest", "spinning", "ellipse"] | State | None = None,
+    start: StartWord | State | None = None,
     setup: Setup | None = None,
     seed: int | None = None,
     frame_interval: float | None = 2e-3,
@@ -33,7 +35,7 @@ def walk(
     Args:
         links: Number of links n, even where two kinds alternate; None: 60.
         frequency: Turns of the sprocket per second [Hz]; None: 15.
-        preset: None or ``"paper"`` (Table 1), or ``"soft"`` (softer joints, with ``reference`` 10 to 15
+        preset: None or ``"paper"`` (Table 1), or ``"soft"`` (softer joints, with ``reference`` 15 to 19
             times fewer steps).
         method: None or ``"standard"`` (``"hybrid"`` at 3e-3, with joints softened on the sprocket and in the pile; on a
             GPU, and with ``record_loads``, the next), ``"explicit"`` (``"os32"`` at 3e-3, softened likewise),
@@ -70,6 +72,7 @@ def walk(
     """
     named = {"links": links, "frequency": frequency, "method": method, "tolerance": tolerance, "start": start}
     given = by_name({**{name: value for name, value in named.items() if value is not None}, **settings})
+    refuse_axes(given)
     loads, seed = checked(record_loads, "record_loads", bool), checked(seed, "seed", Seed | None)
     if isinstance(start, State) and setup is None:
         for name, value in {"preset": preset, "seed": seed}.items():

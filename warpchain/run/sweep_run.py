@@ -20,11 +20,12 @@ from typing import Annotated, Any, Final
 import numpy as np
 from pydantic import Field
 
+from warpchain.chain.resolution import Values, takes_fields
+from warpchain.chain.setup import DEFAULT_PRESET, Setup
 from warpchain.engine.devices import gpu_turn, has_gpu_turn, start_device
-from warpchain.engine.processors import processors
+from warpchain.engine.processors import free_memory, processors
 from warpchain.files import AnyPath
 from warpchain.inputs.options import Options, on_gpu
-from warpchain.inputs.setup import DEFAULT_PRESET, Setup, Values, takes_fields
 from warpchain.inputs.validation import (
     SECTION_OF,
     InputError,
@@ -37,13 +38,13 @@ from warpchain.inputs.validation import (
     shown,
     validated,
 )
+from warpchain.results.sweep_result import SweepResult, load
 from warpchain.run import progress_bar
 from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text
 from warpchain.run.workers import Pulse, losses_named, pulsing_threads
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
-from warpchain.store.shards import Part, Shard, opened_shard, rows_of, stamp, write_shard
-from warpchain.store.sweep_result import SweepResult, load
+from warpchain.store.shards import Part, Shard, check_numerics, opened_shard, rows_of, stamp, write_shard
 from warpchain.sweeps.block import is_axis
 from warpchain.sweeps.plan import PlannedWalk, Source, Sweep, load_sweep
 from warpchain.sweeps.sweep_file import VERSION, BlockKeys
@@ -57,6 +58,8 @@ KEYS: Final = (*BlockKeys.model_fields, "same_samples_along", "record", "name", 
 """Keys of a sweep file that are keywords."""
 OF_WALKS: Final = ("links", "frequency", "start", "method", "tolerance")
 """Fields of which None is the default, as of `warpchain.walk`."""
+BYTES_OF_WALK = 1500
+"""Memory that each walk of a sweep takes in the end, about: its row of some 700 bytes, read and put into columns."""
 SHARD_WALKS = 256
 """Most walks in a shard."""
 GPU_TASK_WALKS = 262144
@@ -98,6 +101,7 @@ def sweep(
             ``point``, beside the grid.
         samples: Samples in each cell of the grid; beside a source instead of those at the top of it.
         sampler: ``"random"`` (the default), ``"sobol"``, ``"latin_hypercube"`` or ``"saltelli"``.
+        randomisations: Independent randomisations of such a design, by default 8; errors of means come from them.
         preset: As of :func:`walk`.
         scene: Fields of :class:`Scene` that differ from their defaults.
         parameters: Fields of :class:`Parameters` that differ from the preset.
@@ -105,6 +109,7 @@ def sweep(
         distributions: Quantity → what samples draw: ``"fixed"``, ``"table"`` (Table 1), ``{"uniform": [lower, upper]}``
             or ``{"gaussian": {"mean":, "sigma":}}``; ``"all"`` is any that is not named, by default ``"table"``.
         same_samples_along: Axes along which the same samples are used.
+        independent: Drawn quantities of which every cell has its own values, even along such axes.
         record: What is kept of motions, such as ``{"series": True, "frames": {"samples": [0]}}``.
         name: Of the sweep; by default that of the folder.
         seed: Of all random numbers, by default 0; beside a source instead of its own.
@@ -125,6 +130,9 @@ def sweep(
         OSError: The folder cannot be read or written.
         LostWorkersError: Worker processes were killed, or the scheduler of a Dask client was closed.
     """
+    if executor is not None and not hasattr(executor, "submit"):
+        wanted = "one with submit, such as concurrent.futures.ProcessPoolExecutor(), or a Dask client"
+        raise InputError(f"executor: expected {wanted}; got {shown(executor)}")
     planned, folder, own, count = _checked_call(source, out, settings, device, workers, part)
     if hasattr(executor, "get_executor"):
         count = count or sum(executor.nthreads().values())
@@ -202,8 +210,7 @@ def _run_in_folder(
     planned: Sweep, folder: Path, executor: Any, workers: int | None, fresh: bool, part: Part, report: OnProgress
 ) -> None:
     """Run what is missing in a folder."""
-    axes = (*Options.model_fields, "links", "start", "plane")  # along them kernels may differ
-    kinds = [setup for block in planned.blocks for setup in block.fixed_in(block.cells_along(axes))]
+    kinds = kinds_of_kernels(planned)
     pulse, at_once = None, workers or processors()
     if executor is None:
         devices = {setup.options.device for setup in kinds}
@@ -213,6 +220,10 @@ def _run_in_folder(
             start_device(device)  # refuses one that is not there before anything is written
         if all(map(on_gpu, devices)):
             at_once = 1  # the others would wait for it
+    needed = BYTES_OF_WALK * planned.walk_count
+    if needed > (free := free_memory()):
+        problem = f"{planned.walk_count:,} walks take {needed / 1e9:.2g} GB of memory, and {free / 1e9:.2g} GB are free"
+        raise InputError(f"samples: {problem}; give fewer samples or cells, or a machine with more memory")
     size = max(1, min(SHARD_WALKS, planned.walk_count // SHARDS))  # by the sweep only: equal sweeps leave equal files
     with SweepFolder.open(folder, planned, fresh=fresh, shard_size=size, part=part) as store, ExitStack() as held:
         missing = store.missing()
@@ -233,6 +244,22 @@ def _run_in_folder(
             _follow(submitted, 2 * at_once, pulse or Pulse(), store, progress, report)
         counts = counts_text(progress) or "nothing to do"
         store.log(f"complete after {progress.seconds:.1f} s: {counts}")
+
+
+def kinds_of_kernels(planned: Sweep) -> list[Setup]:
+    """A setup of each cell along the axes by which kernels may differ."""
+    axes = (*Options.model_fields, "links", "start", "plane")
+    return [setup for block in planned.blocks for setup in block.fixed_in(block.cells_along(axes))]
+
+
+def compile_sweep(source: Source, device: str | None = None) -> Sweep:
+    """Put the kernels of a sweep's walks into the cache, for a device or that of the sweep; errors as of `sweep`."""
+    planned = load_sweep(source) if device is None else on_device(load_sweep(source), device)
+    kinds = kinds_of_kernels(planned)
+    for name in {setup.options.device for setup in kinds}:
+        start_device(name)
+    compile_kernels(kinds, planned.walk_count)
+    return planned
 
 
 def on_device(planned: Sweep, device: str) -> Sweep:
@@ -259,6 +286,7 @@ def run_shards(planned: Sweep, directory: str, seal: str, shards: Sequence[Shard
     The seal is the `stamp` that the folder has to have. The pulse counts the walks that are over, and stops the
     work: unfinished shards are not written.
     """
+    check_numerics(directory)  # of a worker with another version of warpchain
     stop = None if pulse is None else pulse.stop
     walks = list(planned.undrawn(index for shard in shards for index in shard.walks.tolist()))
     setups, keeps = [walk.setup for walk in walks], [planned.keep(walk) for walk in walks]
@@ -279,7 +307,7 @@ def run_shards(planned: Sweep, directory: str, seal: str, shards: Sequence[Shard
                 pulse.beat()
             fill_row(rows[shard][row], run.outcome(), under_way.pop(number).drawn)
             if keeps[number].series_every is not None:
-                motions[shard][row] = run.recorder.motion(run.datum)
+                motions[shard][row] = run.motion()
             if (rows[shard]["status"] != MISSING).all():
                 write_shard(directory, seal, shard, rows.pop(shard), motions.pop(shard))
 
@@ -309,7 +337,7 @@ def _follow(
                         future.result()
             for name in left.keys() & there:
                 shard = left.pop(name)
-                with opened_shard(store.directory, name, shard.digest) as file:
+                with opened_shard(store.directory, name, shard.digest, store.manifest.numerics_version) as file:
                     rows = rows_of(file, shard.kind)
                 columns = {name: rows[name] for name in rows.dtype.names or ()}
                 own = {name: values[shard.walks % blocks[0].stride] for name, values in lengths.items()}

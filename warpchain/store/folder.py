@@ -4,7 +4,7 @@
     DIR/sweep.yaml     the resolved sweep, for people and to run again
     DIR/shards/        000003.h5 holds the rows of some walks, and what is kept of their motion
     DIR/log.txt        what the runs of the sweep did, with times
-    DIR/lock           locked by the process that runs the sweep; the system unlocks it when that ends
+    DIR/lock           locked by the process that runs the sweep, see `warpchain.store.folder_lock`
 
 None of these is a symbolic link when a sweep is run: nothing is written or deleted outside of the folder. A damaged
 shard is deleted, named in log.txt and by a warning, and computed again.
@@ -14,12 +14,9 @@ between two of these lines, the next `SweepFolder.open` goes on from there.
 """
 
 import datetime
-import fcntl
-import os
 import re
-import shutil
-import socket
 import warnings
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import partial
@@ -31,16 +28,16 @@ import yaml
 from numpy.typing import NDArray
 
 from warpchain.files import AnyPath, given_path, make_folder, naming, remove_output, write_whole
-from warpchain.inputs.validation import DamagedFileError, InputError, InputWarning
+from warpchain.hdf5_files import claims_to_be
+from warpchain.inputs.validation import ChangedFileError, DamagedFileError, InputError, InputWarning
 from warpchain.store import shards
+from warpchain.store.folder_lock import locked
 from warpchain.store.shards import Manifest, Part, Shard, read_manifest
 from warpchain.sweeps.designs import EXTENSIBLE
 from warpchain.sweeps.plan import Sweep
-from warpchain.version import NUMERICS_VERSION
 from warpchain.walks.rows import KEYS, MISSING, Rows, missing_rows
 
 _PART: Final = re.compile(r"\.(?:sweep|\d{6,})\.[0-9a-f]{8}\.part\.(?:yaml|h5)")
-_HOLDER: Final = re.compile(r"process \d+ on \S*")
 
 _YAML_HEAD: Final = """\
 # The sweep of this folder with all its values. A copy with more samples adds them to this folder; a copy that is
@@ -53,13 +50,13 @@ _YAML_HEAD: Final = """\
 class SweepFolder(AbstractContextManager["SweepFolder"]):
     """The folder of a sweep, locked against other processes until `close` or the end of this process.
 
-    `lock` is the descriptor of the lock; `found` says of each walk in the order of `Manifest.keys` whether it was there
-    when the folder was opened.
+    `unlock` lets other processes have it; `found` says of each walk in the order of `Manifest.keys` whether it was
+    there when the folder was opened.
     """
 
     directory: Path
     manifest: Manifest
-    lock: int
+    unlock: Callable[[], None]
     found: NDArray[np.bool_]
 
     @classmethod
@@ -82,13 +79,13 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
                 kind = "a symbolic link" if own.is_symlink() else "a pipe or a device"
                 raise InputError(f"{own}: {kind}, where a sweep writes and deletes; remove it, or give another folder")
         is_new = not (path / "lock").exists()
-        lock = _locked(path)
+        unlock = locked(path)
         try:
             manifest = _prepared(path, sweep, Manifest(sweep, shard_size, part), fresh)
             damaged: dict[str, str] = {}
             rows, _ = read_rows(path, manifest, damaged)
             found = np.concatenate([block["status"].ravel() for block in rows]) != MISSING
-            folder = cls(path, manifest, lock, found)
+            folder = cls(path, manifest, unlock, found)
             for name, problem in damaged.items():
                 remove_output(path / "shards" / name)
                 folder.log(f"{problem}; deleted, its walks are computed again")
@@ -102,7 +99,7 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         except BaseException as error:
             if is_new and isinstance(error, InputError):
                 (path / "lock").unlink(missing_ok=True)
-            _unlock(lock)
+            unlock()
             raise
         return folder
 
@@ -120,7 +117,7 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
 
     def close(self) -> None:
         """Let other processes have the folder."""
-        _unlock(self.lock)
+        self.unlock()
 
     def __exit__(self, *problem: object) -> None:
         """Close."""
@@ -143,14 +140,17 @@ def read_rows(
         motions.append(np.full(tables[-1].shape, None))
     for name in shards.shard_files(directory):
         try:
-            with shards.opened_shard(directory, name, manifest.digest) as file:
+            with shards.opened_shard(directory, name, manifest.digest, manifest.numerics_version) as file:
                 rows, kept = shards.rows_of(file, manifest.row_type), [int(row) for row in file.get("motion", ())]
         except DamagedFileError as error:
-            if damaged is None:
+            if damaged is None or isinstance(error, ChangedFileError):
                 raise
+            if not claims_to_be(path := Path(directory) / "shards" / name, shards.SHARD.kind):
+                raise InputError(f"{path}: not a shard of this sweep; move it out of this folder") from None
             damaged[name] = str(error).partition("; ")[0]
             continue
-        opened = partial(shards.opened_shard, Path(directory).absolute(), name, manifest.digest)
+        place = Path(directory).absolute(), name, manifest.digest, manifest.numerics_version
+        opened = partial(shards.opened_shard, *place)
         numbers, cells, samples = (rows[key] for key in KEYS.names or ())
         try:
             for number, table in enumerate(tables):
@@ -169,35 +169,73 @@ def _prepared(folder: Path, sweep: Sweep, manifest: Manifest, fresh: bool) -> Ma
     What comes back is the manifest that the folder is to have; a grown one is not written yet.
     """
     _clear_leftovers(folder)
-    named = folder / "sweep.h5"
-    if not named.exists():
+    named, has_shards = folder / "sweep.h5", any(shards.own_shards(folder))
+    if not (named.exists() or has_shards):
         for name in (*shards.OWN, shards.EARLIER, "walk.h5"):
             if (folder / name).exists():
-                raise InputError(f"{folder / name}: in the way of a sweep; delete it, or give another folder")
+                raise InputError(f"{folder / name}: in the way of a sweep; move it away, or give another folder")
         write_whole(named, manifest.image())
-    elif fresh:  # the shards go first; nothing goes if there is a foreign file among them
-        read_manifest(folder)
-        shards.shard_files(folder)
-        with naming(folder):
-            if (folder / "shards").exists():
-                shutil.rmtree(folder / "shards")
-            for name in ("sweep.yaml", "log.txt"):
-                (folder / name).unlink(missing_ok=True)
+    elif fresh:
+        if not has_shards:
+            _is_whole(folder)  # refuses what is not of a sweep
+        _clear(folder)
         write_whole(named, manifest.image())
+    elif not _is_whole(folder):
+        _rebuild(folder, manifest)
     else:
         manifest = _continued(folder, sweep, manifest)
     make_folder(folder / "shards")
     return manifest
 
 
+def _clear(folder: Path) -> None:
+    """Delete what a sweep has written, shards first; nothing, if there is something else among them."""
+    own, place = [*shards.own_shards(folder)], folder / "shards"
+    there = sorted(place.iterdir()) if place.is_dir() else []
+    if others := [path for path in there if path not in own]:
+        raise InputError(f"{others[0]}: no sweep has written this; move it out of this folder")
+    with naming(folder):
+        for path in (*own, folder / "sweep.yaml", folder / "log.txt"):
+            path.unlink(missing_ok=True)
+
+
+def _is_whole(folder: Path) -> bool:
+    """Whether sweep.h5 is there and undamaged; an `InputError` if it is of something else or of another version."""
+    try:
+        read_manifest(folder)
+    except DamagedFileError:
+        return False
+    return True
+
+
+def _rebuild(folder: Path, manifest: Manifest) -> None:
+    """Write a lost or damaged sweep.h5 anew, if the shards are those of this sweep; else an `InputError`."""
+    path, damaged = folder / "sweep.h5", dict[str, str]()
+    problem = f"{path}: is lost or damaged, and the shards are"
+    try:
+        read_rows(folder, manifest, damaged)
+    except InputError as error:
+        if shards.FOREIGN not in str(error):
+            raise
+        remedy = "give the sweep that began this folder, with as many samples, or another folder"
+        raise InputError(f"{problem} of another sweep; {remedy}") from None
+    parts = set()
+    for name in {*shards.shard_files(folder)} - damaged.keys():
+        with shards.opened_shard(folder, name, manifest.digest, manifest.numerics_version) as shard:
+            parts.add(tuple(shard.attrs["part"].tolist()))
+    if len(parts) == 1 and manifest.part not in parts:
+        raise InputError(f"{problem} of one part of the sweep; give --part {{}}/{{}}".format(*parts.pop()))
+    write_whole(path, manifest.image())
+    given = folder / "sweep.yaml"
+    if given.exists() and given.read_text("utf-8").startswith(_YAML_HEAD):
+        given.unlink()  # it may be of fewer samples
+    warnings.warn(f"{path}: was lost or damaged; written anew, all shards are kept", InputWarning, stacklevel=4)
+
+
 def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
     """The manifest of a folder that is to go on with a sweep of this manifest; an `InputError` if it holds another."""
     found = read_manifest(folder)
-    if found.numerics_version != NUMERICS_VERSION:
-        raise InputError(
-            f"{folder}: its walks are of numerics {found.numerics_version}, but this warpchain has "
-            f"{NUMERICS_VERSION}; use the version that began it, give another folder, or start anew with fresh"
-        )
+    shards.check_numerics_of(folder, found.numerics_version)
     if found.part != manifest.part:
         own, wanted = ("{}/{}".format(*part) if part[1] > 1 else "1/1 (all)" for part in (found.part, manifest.part))
         remedy = f"give --part {own}" if found.part[1] > 1 else "leave --part out"
@@ -225,48 +263,3 @@ def _clear_leftovers(folder: Path) -> None:
             for path in place.iterdir() if place.is_dir() else ():
                 if _PART.fullmatch(path.name) and (path.is_symlink() or not path.is_dir()):
                     path.unlink(missing_ok=True)
-
-
-_held: set[int] = set()
-"""Descriptors of the locks of this process. A forked child shares them, and would keep the folder of a killed run
-locked; so a child closes them at once."""
-
-
-def _give_up() -> None:
-    while _held:
-        os.close(_held.pop())
-
-
-os.register_at_fork(after_in_child=_give_up)
-
-
-def _locked(folder: Path) -> int:
-    """Lock a folder and say in the lock file who has it; the descriptor of the lock."""
-    path = folder / "lock"
-    with naming(path):
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-    try:
-        holder = os.pread(descriptor, 200, 0).decode(errors="replace").strip()
-        if holder and not _HOLDER.fullmatch(holder):
-            raise InputError(f"{path}: in the way of a sweep; give another folder")
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise InputError(
-                f"{folder}: in use by {holder or 'another process'}; wait for it to end, or give another folder"
-            ) from None
-        if not path.exists():  # by a process that was refused the folder
-            raise InputError(f"{path}: was deleted at this moment; try again")
-        os.ftruncate(descriptor, 0)
-        os.pwrite(descriptor, f"process {os.getpid()} on {socket.gethostname()}\n".encode(), 0)
-    except BaseException:
-        os.close(descriptor)
-        raise
-    _held.add(descriptor)
-    return descriptor
-
-
-def _unlock(descriptor: int) -> None:
-    if descriptor in _held:
-        _held.remove(descriptor)
-        os.close(descriptor)

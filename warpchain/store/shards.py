@@ -3,9 +3,9 @@
 A shard is an immutable HDF5 file with the rows of some ended walks, each keyed by its block, cell and sample; no list
 says which they are. A sweep that is given more samples gets further shards, for those of its walks that are not there.
 
-It has the attributes `name`, `digest` and `numerics_version`, the dataset `rows`, one row for each walk with the
-columns of `warpchain.walks.rows`, and in the group `motion` one for each walk whose motion is kept, named by its row,
-with the arrays of a saved walk.
+It has the attributes `name`, `digest`, `numerics_version` and `part`. The dataset `rows` has one row for each walk with
+the columns of `warpchain.walks.rows`; the group `motion` has one group for each walk whose motion is kept, named by its
+row, with the arrays of a saved walk.
 
 A file appears whole or not at all. Its content depends only on the sweep and on the numerics, not on when and where it
 was computed: a sweep leaves the same bytes however often it was killed.
@@ -27,14 +27,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.files import AnyPath, naming, write_whole
-from warpchain.hdf5_files import hdf5_image, open_regular, reading_hdf5
-from warpchain.inputs.validation import InputError
+from warpchain.hdf5_files import Format, claims_to_be, hdf5_image, open_regular, reading_hdf5
+from warpchain.inputs.validation import DamagedFileError, InputError
 from warpchain.sweeps.designs import EXTENSIBLE
 from warpchain.sweeps.plan import Sweep
 from warpchain.sweeps.sweep_file import fields_of
 from warpchain.version import NUMERICS_VERSION, package_versions
-from warpchain.walks.rows import KEYS, MISSING, Rows, row_type
-from warpchain.walks.walk_result import write_motion
+from warpchain.walks.rows import KEYS, MISSING, STORED_COLUMNS, Rows, row_type
+from warpchain.walks.walk_numbers import MOTION, write_motion
 
 if TYPE_CHECKING:
     import h5py
@@ -45,10 +45,11 @@ OWN: Final = ("sweep.h5", "sweep.yaml", "shards", "log.txt")
 """What a sweep has in its folder, beside the lock."""
 EARLIER: Final = "sweep.json"
 """What earlier versions have there instead of sweep.h5."""
-MANIFEST: Final = "warpchain sweep"
-KIND: Final = "warpchain shard"
+MANIFEST: Final = Format.of("warpchain sweep")
+SHARD: Final = Format.of("warpchain shard", STORED_COLUMNS, MOTION, dict(KEYS.fields or {}))
 _NAME: Final = re.compile(r"\d{6,}\.h5")
 FOREIGN: Final = "a shard of another sweep; move it out of this folder"
+REBUILT: Final = "run the sweep in this folder again, which writes the file anew and keeps all shards"
 
 FIRST_SHARDS: Final = 32
 """Most walks in each of the first four shards."""
@@ -58,13 +59,15 @@ FIRST_SHARDS: Final = 32
 class Shard:
     """Some walks of a sweep that are computed together and kept in one file.
 
-    `kind` is the type of the rows; `keys` of type `KEYS` and `walks` are of each walk its place and its number.
+    `kind` is the type of the rows; `keys` of type `KEYS` and `walks` are of each walk its place and its number; `part`
+    is that of the folder which the shard was computed for.
     """
 
     digest: str
     kind: np.dtype[np.void]
     keys: Rows
     walks: NDArray[np.int64]
+    part: Part = (1, 1)
 
     def __len__(self) -> int:
         """Number of walks."""
@@ -122,7 +125,7 @@ class Manifest:
         for start, stop in itertools.pairwise(_bounds(len(own), self.shard_size)):
             places = own[start:stop][~done[own[start:stop]]]
             if len(places):
-                found.append(Shard(self.digest, self.row_type, self.keys[places], walks[places]))
+                found.append(Shard(self.digest, self.row_type, self.keys[places], walks[places], self.part))
         return found
 
     def image(self) -> bytes:
@@ -161,9 +164,11 @@ def read_manifest(directory: AnyPath) -> Manifest:
             raise InputError(f"{directory}: is not there; give the folder of a sweep, or a merged file")
         if (Path(directory) / EARLIER).exists():
             raise InputError(f"{directory}: holds a sweep of an earlier warpchain; read it with that version")
+        if any(own_shards(directory)):
+            raise DamagedFileError(f"{path}: is lost; {REBUILT}")
         there = "a saved walk, no sweep" if (Path(directory) / "walk.h5").exists() else "no sweep"
         raise InputError(f"{directory}: {there} in this folder; give the folder of one, or a merged file")
-    with reading_hdf5(path, MANIFEST, "give the folder of a sweep, put a copy there, or delete the folder") as file:
+    with reading_hdf5(path, MANIFEST, REBUILT) as file:
         return Manifest(
             stored_sweep(path, json.loads(file.attrs["sweep"])),
             int(file.attrs["shard_size"]),
@@ -207,12 +212,13 @@ def write_shard(
             rows[column][np.isnan(rows[column])] = np.nan
 
     def fill(file: "h5py.File") -> None:
-        file.attrs.update(name=shard.name, digest=shard.digest, numerics_version=NUMERICS_VERSION)
+        numbers = {"numerics_version": NUMERICS_VERSION, "part": shard.part}
+        file.attrs.update(name=shard.name, digest=shard.digest, **numbers)
         file.create_dataset("rows", data=rows)
         for row in sorted(motions):
             write_motion(file.create_group(f"motion/{row}", track_order=True), motions[row], np.float32)
 
-    write_whole(Path(directory) / "shards" / shard.name, hdf5_image(KIND, fill))
+    write_whole(Path(directory) / "shards" / shard.name, hdf5_image(SHARD, fill))
 
 
 def rows_of(file: "h5py.File", kind: np.dtype[np.void]) -> Rows:
@@ -237,10 +243,42 @@ def shard_files(directory: AnyPath) -> list[str]:
 
 
 @contextmanager
-def opened_shard(directory: AnyPath, name: str, digest: str) -> "Iterator[h5py.File]":
-    """The shard of this name and digest; an `OSError` if it is unreadable, an `InputError` if damaged or foreign."""
+def opened_shard(directory: AnyPath, name: str, digest: str, numerics: int) -> "Iterator[h5py.File]":
+    """The shard of this name, of a sweep with this digest and of these numerics.
+
+    An `OSError` says that it cannot be read, an `InputError` that it is damaged or belongs elsewhere.
+    """
     path = Path(directory) / "shards" / name
-    with reading_hdf5(path, KIND, "delete it and run the sweep again, which computes only its walks") as file:
+    with reading_hdf5(path, SHARD, "move it out of this folder and run the sweep again, for its walks only") as file:
         if (file.attrs["name"], file.attrs["digest"]) != (name, digest):
             raise InputError(f"{path}: {FOREIGN}")
+        if (own := int(file.attrs["numerics_version"])) != numerics:
+            remedy = "move it out of this folder, and run the sweep again for its walks"
+            raise InputError(f"{path}: its walks are of numerics {own}, those of this folder of {numerics}; {remedy}")
         yield file
+
+
+def own_shards(directory: AnyPath) -> Iterator[Path]:
+    """The files in a folder of shards that a sweep has written there, of any sweep and damaged or not."""
+    folder = Path(directory) / "shards"
+    with naming(folder, "read"):
+        there = sorted(folder.iterdir()) if folder.is_dir() else []
+    for path in there:
+        if _NAME.fullmatch(path.name) and path.is_file() and not path.is_symlink() and claims_to_be(path, SHARD.kind):
+            yield path
+
+
+def check_numerics(directory: AnyPath) -> None:
+    """What a worker does before it computes: an `InputError` if the folder's walks are of other numerics than ours."""
+    path = Path(directory) / "sweep.h5"
+    with reading_hdf5(path, MANIFEST, REBUILT) as file:
+        check_numerics_of(directory, int(file.attrs["numerics_version"]))
+
+
+def check_numerics_of(directory: AnyPath, version: int) -> None:
+    """An `InputError` if the walks of a folder, of this version of the numerics, cannot be gone on with here."""
+    if version != NUMERICS_VERSION:
+        raise InputError(
+            f"{directory}: its walks are of numerics {version}, but this warpchain has {NUMERICS_VERSION}; "
+            "use that version for all workers, give another folder, or start anew with fresh"
+        )

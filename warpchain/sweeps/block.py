@@ -15,13 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, Field, ValidationError, ValidationInfo, WrapValidator
 
+from warpchain.chain.resolution import SECTIONS
+from warpchain.chain.setup import Setup
 from warpchain.inputs import validation
 from warpchain.inputs.distributions import Distribution, Gaussian
+from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset as parameter_preset
 from warpchain.inputs.scene import COMPOUND, Scene
-from warpchain.inputs.setup import SECTIONS, Setup, combined, options_beside
 from warpchain.inputs.validation import FIELDS, SECTION_OF, InputError, checked, json_value, path_of, shown, validated
-from warpchain.sweeps.designs import walks_per_sample
+from warpchain.sweeps.designs import independent_groups, walks_per_sample
 from warpchain.walks.landmarks import least
 
 Value = float | int | str | tuple[Any, ...] | None
@@ -53,7 +55,9 @@ class Block:
         named: name of each axis that has names for values, such as `floor` → name → value of the field.
         points: name of each quantity that parameter sets have → its value in each, along the axis `point`.
         distributions: name → distribution, in the order of drawing.
+        independent: names of those that each cell draws by itself, also along axes with the same samples.
         sampler: one of `warpchain.sweeps.designs.SAMPLERS`.
+        randomisations: number of independent randomisations of designed samples; random ones need none.
         samples_given: samples per cell, as the file says.
         first_cell: number of the block's first cell among all cells of the sweep.
         stride: number of all cells of the sweep.
@@ -68,7 +72,9 @@ class Block:
     named: Mapping[str, Mapping[str, Value]]
     points: Mapping[str, tuple[Value, ...]]
     distributions: Mapping[str, Distribution]
+    independent: tuple[str, ...]
     sampler: str
+    randomisations: int
     samples_given: int
     first_cell: int = 0
     stride: int = 0
@@ -83,6 +89,11 @@ class Block:
     def samples(self) -> int:
         """Walks in each cell; for `saltelli` all walks of all samples."""
         return self.samples_given * walks_per_sample(self.sampler, len(self.distributions))
+
+    @property
+    def groups(self) -> NDArray[np.int64]:
+        """Number of the group of each walk of a cell, see `independent_groups`."""
+        return independent_groups(self.sampler, self.samples, len(self.distributions), self.randomisations)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -115,7 +126,7 @@ class Block:
         axes = self.axes | {name: tuple(values.values()) for name, values in self.named.items()}
         kept = lru_cache(2**14)  # more than an axis has values
         scene = kept(lambda at: validated(Scene, {**sections["scene"], **dict(at)}, "scene"))
-        options = kept(lambda plane, at: options_beside(plane, {**sections["options"], **dict(at)}))
+        options = kept(lambda tilts, at: Options.chosen({**sections["options"], **dict(at)}, tilts=tilts))
         changed = kept(lambda name, at: parameter_preset(name).with_values({**sections["parameters"], **dict(at)}))
         for cell in cells:
             at: dict[str, _Place] = dict.fromkeys(SECTIONS, ())
@@ -129,7 +140,7 @@ class Block:
                     at[SECTION_OF[field]] += ((field, column[place]),)
             try:
                 own, parameters = scene(at["scene"]), changed(preset, at["parameters"])
-                yield combined(preset, parameters, own, options(own.plane, at["options"]))
+                yield Setup(preset, parameters, own, options(own.plane == "tilting", at["options"])).checked()
             except InputError as error:
                 raise InputError(self._located(error, cell)) from None
 
@@ -157,8 +168,12 @@ class Block:
 
         They lie along the axes, one for all samples, shape (…, 1).
         """
-        cells, section = list(self.cells_along((name, "preset"))), SECTION_OF[name]
-        values = [least(getattr(getattr(setup, section), name)) for setup in self.fixed_in(cells)]
+        return self.over_cells((name, "preset"), lambda setup: least(getattr(getattr(setup, SECTION_OF[name]), name)))
+
+    def over_cells(self, names: Container[str], value_of: Callable[[Setup], float]) -> NDArray[Any]:
+        """A number of the `fixed` setup of each cell, which depends on some quantities only, shape (…, 1)."""
+        cells = list(self.cells_along(names))
+        values = [value_of(setup) for setup in self.fixed_in(cells)]
         sizes = [1 + max(places) for places in zip(*cells, strict=True)]
         return np.broadcast_to(np.reshape(values, (*sizes, 1)), (*self.shape[:-1], 1))
 
@@ -181,8 +196,10 @@ class Block:
             **({} if self.preset is None else {"preset": self.preset}),
             "samples": self.samples_given,
             "sampler": self.sampler,
+            **({} if self.sampler == "random" else {"randomisations": self.randomisations}),
             **{section: getattr(first, section).model_dump(exclude=replaced) for section in SECTIONS},
             "distributions": {"all": "fixed"} | {name: each.canonical() for name, each in self.distributions.items()},
+            **({"independent": list(self.independent)} if self.independent else {}),
             **({"points": {name: list(values) for name, values in self.points.items()}} if self.points else {}),
             "grid": {n: json_value(self.named.get(n)) or list(values) for n, values in self.axes.items() if n != POINT},
         }
@@ -252,6 +269,14 @@ def named_axis(kind: Any) -> Any:
     """Annotation of the values of an axis whose values may be lists: name → value."""
     named = Annotated[dict[Name, kind], Field(min_length=1, max_length=AXIS_LIMIT)]
     return Annotated[named, BeforeValidator(_with_names, json_schema_input_type=named)]
+
+
+def refuse_axes(values: Mapping[str, object]) -> None:
+    """Refuse values of a walk, by names of fields, that are axes of a sweep, in one line that names `sweep`."""
+    for name, value in validation.by_name(values).items():
+        if name in FIELDS and is_axis(name, given := validation.plain(value, name)):
+            problem = f"{shown(given)} is several values, and a walk has one"
+            raise InputError(f"{SECTION_OF[name]}.{name}: {problem}; use warpchain.sweep or a sweep file for a grid")
 
 
 def is_axis(name: str, given: object) -> bool:

@@ -4,25 +4,33 @@ A design is a matrix of points in the unit cube, one row for each sample of a ce
 quantity; a sample's values are the quantiles of the distributions at its row. `saltelli` rows have twice as many
 columns and give several walks each, which Sobol indices are estimated from.
 
+The points of one design depend on one another, so their spread does not tell the error of their mean. A cell therefore
+has several designs of fewer points, randomised independently of one another, and the spread of the means of these
+groups tells the error. The samples of a cell belong to the groups in turn, so that more samples move none.
+
 Sources: I. M. Sobol', USSR Comput. Math. Math. Phys. 7 (1967) 86; A. B. Owen, J. Complexity 14 (1998) 466
-(scrambling); M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21 (1979) 239 (latin hypercubes);
-A. Saltelli et al., Comput. Phys. Commun. 181 (2010) 259 (A, B and AB).
+(scrambling, independent replicates); M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21 (1979) 239 (latin
+hypercubes); A. Saltelli et al., Comput. Phys. Commun. 181 (2010) 259 (A, B and AB).
 """
 
 import functools
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.validation import InputError
 
 SAMPLERS: Final = ("random", "sobol", "latin_hypercube", "saltelli")
-"""Independent samples; a scrambled Sobol' sequence; a latin hypercube; a Sobol' sequence of twice the dimension, each
-row of which becomes two points and their crossings."""
+"""Independent samples; scrambled Sobol' sequences; latin hypercubes; Sobol' sequences of twice the dimension, each row
+of which becomes two points and their crossings."""
 
 EXTENSIBLE: Final = ("random", "sobol", "saltelli")
 """Samplers whose samples stay the same when more follow; a latin hypercube of another size has other points."""
+
+RANDOMISATIONS: Final = 8
+"""Independent randomisations of a design unless a sweep says otherwise: seven degrees of freedom for its error."""
 
 DESIGN_LIMIT: Final = 2**24
 """Most numbers of the design of a cell, 128 MiB: it is made as a whole, and those of four cells are kept."""
@@ -36,8 +44,17 @@ def walks_per_sample(sampler: str, dimensions: int) -> int:
     return dimensions + 2 if sampler == "saltelli" else 1
 
 
-def check_design(sampler: str, samples: int, dimensions: int, path: str) -> None:
-    """Check that a sampler can make a number of samples of so many drawn quantities.
+def independent_groups(sampler: str, walks: int, dimensions: int, randomisations: int) -> NDArray[np.int64]:
+    """Number of the group of each walk of a cell; walks of different groups are independent of one another.
+
+    Every random sample is a group of its own. Designed ones belong to the randomisations in turn, with all their walks.
+    """
+    samples = np.arange(walks) // walks_per_sample(sampler, dimensions)
+    return samples if sampler == "random" else samples % randomisations
+
+
+def check_design(sampler: str, samples: int, dimensions: int, randomisations: int, path: str) -> None:
+    """Check that a sampler can make a number of samples of so many drawn quantities, in so many randomisations.
 
     An `InputError`, which begins with `path`, says that samples would be equal, too many, or no balanced sequence.
     """
@@ -53,26 +70,36 @@ def check_design(sampler: str, samples: int, dimensions: int, path: str) -> None
     if samples * columns > DESIGN_LIMIT:
         most = 1 << (DESIGN_LIMIT // columns).bit_length() - 1
         raise InputError(f"{path}.samples: {samples} are too many; give at most {most}, or sampler: random")
+    if sampler in ("sobol", "saltelli") and randomisations & (randomisations - 1):
+        problem = f"{randomisations} is not a power of 2, as {sampler} needs"
+        raise InputError(f"{path}.randomisations: {problem}; use {1 << randomisations.bit_length() - 1}")
     if sampler in ("sobol", "saltelli") and samples & (samples - 1):
         lower = 1 << (samples.bit_length() - 1)
         raise InputError(f"{path}.samples: {samples} is no power of 2, as {sampler} needs; give {lower} or {2 * lower}")
 
 
 @functools.lru_cache(maxsize=4)
-def design_points(sampler: str, seed: int, cell: int, samples: int, dimensions: int) -> Array:
+def design_points(
+    sampler: str, seed: int, cell: int, samples: int, dimensions: int, randomisations: int = RANDOMISATIONS
+) -> Array:
     """Points inside (0, 1) of N samples of d quantities in a cell, given its stream: (N, d), for `saltelli` (N, 2d).
 
-    They are read-only, the same for every caller; the last few cells are kept.
+    Row i is of the randomisation i modulo their number. The points are read-only, the same for every caller; the last
+    few cells are kept.
     """
     from scipy.stats import qmc  # takes longer to import than all else
 
     # A spawn key of one number names no sample, so a design shares its stream with none.
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(cell,)))
-    if sampler == "latin_hypercube":
-        engine = qmc.LatinHypercube(dimensions, seed=rng)
-    else:
-        engine = qmc.Sobol(dimensions * (2 if sampler == "saltelli" else 1), scramble=True, seed=rng)
-    points: Array = np.clip(engine.random(samples), _END, 1 - _END)
+    columns = dimensions * (2 if sampler == "saltelli" else 1)
+    points: Array = np.empty((samples, columns))
+    for group in range(min(randomisations, samples)):
+        own = points[group::randomisations]
+        if sampler == "latin_hypercube":
+            engine = qmc.LatinHypercube(columns, seed=rng)
+        else:  # takes equally many random numbers for any number of points, so that groups can grow
+            engine = qmc.Sobol(columns, scramble=True, seed=rng)
+        own[:] = np.clip(engine.random(len(own)), _END, 1 - _END)
     points.flags.writeable = False
     return points
 

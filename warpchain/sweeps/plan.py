@@ -13,24 +13,26 @@ import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.chain.keep import Keep
+from warpchain.chain.resolution import SECTIONS
+from warpchain.chain.setup import Setup
 from warpchain.files import AnyPath
-from warpchain.inputs.distributions import DRAW_LIMIT, Distribution, draw, placed, random_generator
+from warpchain.inputs.distributions import DRAW_LIMIT, Distribution, draw, random_generator
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS
 from warpchain.inputs.scene import Scene
-from warpchain.inputs.setup import SECTIONS, Setup
+from warpchain.inputs.unit_slips import check_units
 from warpchain.inputs.validation import InputError
 from warpchain.sweeps.block import Block
 from warpchain.sweeps.designs import design_points, walks_per_sample
 from warpchain.sweeps.recording import Recording
 from warpchain.sweeps.sweep_file import VERSION, read_sweep
-from warpchain.walks.motion import Keep
 
 Point = dict[str, float]
 """Drawn values by name."""
@@ -100,13 +102,13 @@ class Sweep:
         if not block.drawn:
             return walk
         row, member = divmod(walk.sample, walks_per_sample(block.sampler, len(block.drawn)))
-        distributions, designed = placed(block.distributions, fixed), block.sampler != "random"
+        distributions, designed = fixed.placed(block.distributions), block.sampler != "random"
         points, setups = self._first_possible(block, walk.cell, fixed, distributions, row, designed=designed)
         return replace(walk, setup=setups[member], drawn=points[member])
 
     def undrawn(self, indices: Iterable[int]) -> Iterator[PlannedWalk]:
         """Walks without their draws, which take most of the time; options and number of links never depend on them."""
-        before: tuple[int, Cell] | None = None
+        fixed = lru_cache(2**12)(lambda number, cell: self.blocks[number].fixed(cell))  # for all samples of a cell
         for index in map(int, indices):
             sample, place = divmod(index, self.blocks[0].stride)
             number = bisect.bisect_right(self.blocks, place, key=lambda block: block.first_cell) - 1
@@ -114,16 +116,11 @@ class Sweep:
             if not 0 <= sample < block.samples:
                 raise IndexError(f"walk {index} of a sweep of {self.walk_count} walks")
             cell = tuple(map(int, np.unravel_index(place - block.first_cell, block.shape[:-1])))
-            if (number, cell) != before:
-                before, fixed = (number, cell), block.fixed(cell)
-            yield PlannedWalk(index, number, cell, sample, fixed, {})
+            yield PlannedWalk(index, number, cell, sample, fixed(number, cell), {})
 
     def keep(self, walk: PlannedWalk) -> Keep:
         """What is kept of the motion of a walk."""
-        chosen = {name: choice for name, choice in self.recording.choices.items() if choice.includes(walk.sample)}
-        every = {name: choice.steps(walk.setup.options, f"sweep.record.{name}") for name, choice in chosen.items()}
-        before = getattr(chosen.get("frames"), "before", None) or 0.0
-        return Keep(series_every=every.get("series"), frame_every=every.get("frames"), before=before)
+        return self.recording.keep(walk.sample, walk.setup.options)
 
     def check(self) -> None:
         """Check every cell: its fixed values, its distributions, and that a random sample makes a possible walk."""
@@ -140,11 +137,13 @@ class Sweep:
                 if fixed.options is not before:
                     before = fixed.options
                     self._check_options(block, first, before)
-                distributions = placed(block.distributions, fixed)
+                distributions = fixed.placed(block.distributions)
                 for name, distribution in distributions.items():
                     if distribution != checked.get(name) and distribution.share() < LEAST_SHARE:
                         path, law = f"{block.path}.distributions.{name}", distribution.canonical()
                         raise InputError(f"{path}: less than {LEAST_SHARE:.0%} of {law} is physical; give uniform")
+                    if distribution != checked.get(name) and not fixed.options.unusual_values:
+                        check_units({name: distribution.quantile(0.5)}, f"{block.path}.distributions")
                 checked = distributions
                 self._first_possible(block, cell, fixed, distributions, 0, designed=False)
 
@@ -163,7 +162,8 @@ class Sweep:
     ) -> tuple[list[Point], list[Setup]]:
         """Points for the walks of sample `row` of a cell, the first that make possible walks only, and their setups.
 
-        The designed ones are tried first, then random ones; if all are impossible, an `InputError` says so.
+        The designed ones are tried first, then random ones; if all are impossible, an `InputError` says so. What is
+        independent of the other cells is always random, from a generator of the cell's own.
         """
         number = 0  # of the cell's random stream among those of the block
         for (name, values), place in zip(block.axes.items(), cell, strict=True):
@@ -171,15 +171,18 @@ class Sweep:
                 number = number * len(values) + place
         stream = block.first_stream + number
         rng, problem = random_generator(self.seed, stream, row), ""
+        own = {name: laws[name] for name in block.independent}
+        of_cell = random_generator(self.seed, stream, row, 1, *cell) if own else rng
         makers: list[Callable[[], Point]] = [lambda: draw(laws, rng)] * DRAW_LIMIT
         if designed:
-            matrix = design_points(block.sampler, self.seed, stream, block.samples_given, len(laws))
+            given = block.samples_given, len(laws), block.randomisations
+            matrix = design_points(block.sampler, self.seed, stream, *given)
             fractions = iter(matrix[row].tolist())
             makers = [lambda: {name: each.quantile(next(fractions)) for name, each in laws.items()}, *makers]
         for point in makers:
-            points = [point()]
+            points = [point() | draw(own, of_cell)]
             if block.sampler == "saltelli":  # rows of A and B, and A with one value of B, of each quantity in turn
-                first, second = points[0], point()
+                first, second = points[0], point() | draw(own, of_cell)
                 points = [first, second, *({**first, name: second[name]} for name in first)]
             try:
                 return points, [fixed.with_drawn(point) for point in points]

@@ -4,9 +4,9 @@ from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Discriminator, Field, Strict, Tag, model_validator
 
+from warpchain.chain.keep import LONGEST_INTERVAL, Keep
 from warpchain.inputs.options import Options
 from warpchain.inputs.validation import STRICT, InputError, number_field
-from warpchain.walks.motion import LONGEST_INTERVAL
 
 SERIES_INTERVAL: Final = 1e-3
 """Default time [s] between two samples of a series."""
@@ -96,6 +96,13 @@ class Recording(BaseModel):
     def choices(self) -> dict[str, Series]:
         """The choices that are made, by their keys in a sweep file."""
         return {name: choice for name, choice in (("series", self.series), ("frames", self.frames)) if choice}
+
+    def keep(self, sample: int, options: Options) -> Keep:
+        """What is kept of a sample of a cell with these options."""
+        chosen = {name: choice for name, choice in self.choices.items() if choice.includes(sample)}
+        every = {name: choice.steps(options, f"sweep.record.{name}") for name, choice in chosen.items()}
+        before = self.frames.before if self.frames and "frames" in chosen else None
+        return Keep(series_every=every.get("series"), frame_every=every.get("frames"), before=before or 0.0)
 
     def canonical(self) -> dict[str, Any]:
         """Its form in a sweep file."""

@@ -16,16 +16,16 @@ from typing import Annotated, Any, Final, Literal, Self
 import pydantic
 from pydantic import AfterValidator, BaseModel, Field, ValidationError, ValidationInfo, model_validator
 
+from warpchain.chain.resolution import SECTIONS
 from warpchain.files import AnyPath, write_whole
 from warpchain.inputs import validation
 from warpchain.inputs.distributions import DRAWABLE, TABLE, Distribution, Gaussian, Seed, Uniform
 from warpchain.inputs.parameters import PRESETS
 from warpchain.inputs.scene import COMPOUND
-from warpchain.inputs.setup import SECTIONS
 from warpchain.inputs.validation import FIELDS, SECTION_OF, STRICT, SYMBOL_OF, InputError, ModelT, shown
 from warpchain.inputs.yaml_files import read_yaml
 from warpchain.sweeps.block import CELL_LIMIT, POINT, Block, Name, Sections, Value, axis, list_of, named_axis
-from warpchain.sweeps.designs import SAMPLERS, check_design
+from warpchain.sweeps.designs import RANDOMISATIONS, SAMPLERS, check_design
 from warpchain.sweeps.recording import Frames, Recording
 
 VERSION: Final = 1
@@ -179,9 +179,15 @@ class BlockKeys(WalkKeys):
         None, description="samples in each cell of the grid"
     )
     sampler: _Sampler | None = Field(None, description="how samples are drawn, see below; default: random")
+    randomisations: Annotated[int, Field(ge=1, le=1024), validation.WHOLE] | None = Field(
+        None, description=f"independent randomisations of designed samples, see below; default: {RANDOMISATIONS}"
+    )
     distributions: Annotated[
         dict[str, Any], _mapping_of("distributions", {"all": _Word, **dict.fromkeys(DRAWABLE, _Drawn)})
     ] = Field({}, description="what samples draw, see below")
+    independent: list[str] = Field(
+        [], description="drawn quantities that every cell draws by itself, even along axes with the same samples"
+    )
     grid: Annotated[
         dict[str, list[Value] | dict[str, Value]], _mapping_of("grid", {"preset": axis(_Preset), **_AXES})
     ] = Field({}, description="axes of the grid, see below; not in a file with blocks")
@@ -324,9 +330,16 @@ def _block(name: str, path: str, outer: BlockKeys | None, inner: BlockKeys) -> B
     if samples is None:
         raise InputError(f"{path}.samples: missing; give the number of samples per cell")
     drawn = _drawn(merged("distributions"), sections, varied, f"{path}.distributions")
-    check_design(sampler or "random", samples, len(drawn), path)
-    fixed = None if "preset" in axes else preset
-    return Block(path, name, fixed, sections, axes, named, points, drawn, sampler or "random", samples)
+    sampler, randomisations = sampler or "random", either("randomisations") or RANDOMISATIONS
+    if inner.randomisations is not None and sampler == "random":
+        raise InputError(f"{path}.randomisations: random samples are independent anyway; leave it out")
+    check_design(sampler, samples, len(drawn), randomisations, path)
+    own = {*map(validation.full_name, either("independent") or ())}
+    for quantity in own - drawn.keys():
+        remedy = validation.suggestion(quantity, sorted(drawn))
+        raise InputError(f"{path}.independent: {shown(quantity)} is not drawn; {remedy}")
+    independent, fixed = tuple(each for each in drawn if each in own), None if "preset" in axes else preset
+    return Block(path, name, fixed, sections, axes, named, points, drawn, independent, sampler, randomisations, samples)
 
 
 def _drawn(given: Mapping[str, Any], sections: Sections, varied: set[str], path: str) -> dict[str, Distribution]:

@@ -2,13 +2,12 @@
 
 import math
 
-from warpchain.engine.control import SOFT, SOFT_MASS, SOFTEST
+from warpchain.chain.link_values import LinkValues, mean_value
+from warpchain.chain.setup import Setup
+from warpchain.chain.softened_joints import SOFT, SOFT_MASS, SOFTEST, Joints
+from warpchain.chain.start_shapes import lay_chain, stadium
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.link_values import LinkValues, mean_value
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.scene import joint_radius, loop_speed, settling_time
-from warpchain.inputs.setup import Setup
-from warpchain.inputs.start_shapes import lay_chain, stadium
 
 HOLD_STRAIN = 3e-4
 """Greatest strain of a held loop on softened joints by its speed."""
@@ -32,11 +31,11 @@ BY_ITSELF = -1.0
 """As `steady_time` means: the kernel chooses how long to watch, see :mod:`warpchain.kernels.events.release`."""
 
 
-def drive_of(setup: Setup, links: LinkValues) -> tuple[tuple[Array, Array], dict[str, float]]:
+def drive_of(setup: Setup) -> tuple[tuple[Array, Array], dict[str, float]]:
     """Position and velocity (n, 3) of a chain on its sprocket, about the origin, and fields of `Drive` by name."""
-    scene, parameters, options = setup.scene, setup.parameters, setup.options
+    scene, parameters, options, links = setup.scene, setup.parameters, setup.options, setup.link_values
     from_rest = scene.start == "rest"
-    radius = joint_radius(scene, parameters)
+    radius = setup.joint_radius
     speed = 2 * math.pi * scene.frequency * radius
     density = mean_value(links.mass) / parameters.link_length
     tension = density * speed**2
@@ -57,13 +56,13 @@ def drive_of(setup: Setup, links: LinkValues) -> tuple[tuple[Array, Array], dict
     if not alternates:  # the loop swings as it turns: only over whole turns does its mean stay
         window = period * math.ceil(SHORTEST_WINDOW / period)
     longest_step = max(options.contact_step, options.soft_contact_step if options.soften_drive else 0.0)
-    settled, spin_up = settling_time(scene), scene.spin_up_time if from_rest and speed > 0 else 0.0
+    settled, spin_up = setup.settling_time, scene.spin_up_time if from_rest and speed > 0 else 0.0
     drive = {
         "sprocket_speed": -2 * math.pi * scene.frequency,  # clockwise, so that the walk goes towards +x
         "spin_up_start": settled,
         "spin_up_time": spin_up,
         "hold_start": settled + spin_up,
-        "loop_speed": loop_speed(scene, parameters),
+        "loop_speed": setup.loop_speed,
         "loop_period": period,
         "load_factor": load_factor,
         "steady_window": window,
@@ -78,10 +77,10 @@ def drive_of(setup: Setup, links: LinkValues) -> tuple[tuple[Array, Array], dict
     return lay_chain(stadium(radius), scene.links, parameters.link_length, 0.0 if from_rest else speed), drive
 
 
-def _as_soft_as(joints: Parameters, own: float, links: LinkValues) -> float:
+def _as_soft_as(joints: Joints, own: float, links: LinkValues) -> float:
     """Stiffness [N/m] of a chain's joints that are as soft as these; none becomes stiffer than its own."""
     heavier = mean_value(links.mass) / SOFT_MASS
-    return min(own, (heavier if heavier > 2 else 1.0) * joints.joint_stiffness)
+    return min(own, (heavier if heavier > 2 else 1.0) * joints.stiffness)
 
 
 def _softness(own: float, soft: float, softest: float, wanted: float) -> float:

@@ -6,10 +6,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpchain.chain.floor import slope_points
+from warpchain.chain.setup import Setup
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.floor import slope_points
-from warpchain.inputs.scene import link_values
-from warpchain.inputs.setup import Setup
 from warpchain.inputs.validation import InputError
 
 RELEASE: Final = {
@@ -53,7 +52,7 @@ def bounces(time: Array, velocity: Array, setup: Setup) -> dict[str, Array]:
         raise InputError("bounces: the plane tilts, or the floor is a profile; give a walk on a flat floor or a slope")
     free = time >= (scene.release[-1][0] if scene.release else 0.0)  # of a sprocket that moves on after the release
     time, speed = time[free], np.abs(velocity).max(initial=0.0)
-    mass = link_values(scene, parameters).total_mass
+    mass = setup.link_values.total_mass
     gained = mass * (velocity[free] + np.outer(time, [0.0, parameters.gravity]))
     impulse, (along_x, along_y) = np.diff(gained, axis=0), slope_points(scene.slope)[1]
     pushed, pressed = impulse @ [along_x, along_y], impulse @ [-along_y, along_x]

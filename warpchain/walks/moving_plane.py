@@ -9,9 +9,8 @@ import math
 
 import numpy as np
 
+from warpchain.chain.setup import Setup
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.scene import link_values
-from warpchain.inputs.setup import Setup
 from warpchain.kernels import layout
 
 
@@ -22,7 +21,7 @@ def released_plane(setup: Setup, position: Array) -> Array:
     stays above z = 0 and moves sideways at the scene's lateral speed. The position, (n, 3), is in the upright plane.
     """
     scene, parameters = setup.scene, setup.parameters
-    links = link_values(scene, parameters)
+    links = setup.link_values
     masses = links.mass
     center_x, center_y, _ = masses @ position / masses.sum()
     ends = position[:, 1] - parameters.link_length / 2 * np.abs(np.sin(position[:, 2]))  # the lower ones of all links

@@ -11,11 +11,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from warpchain.engine.batch import Batch, Recorded
+from warpchain.chain.keep import Keep
+from warpchain.chain.setup import Setup
+from warpchain.engine.world import Recorded, World
 from warpchain.inputs.arrays import Array
 from warpchain.kernels import layout
 from warpchain.loop.stationary_loop import BEFORE, BeforeRelease
-from warpchain.walks.motion import Keep
 from warpchain.walks.moving_plane import angles, frame_axes
 
 SERIES: Final[dict[str, int | list[int]]] = {
@@ -34,25 +35,26 @@ SERIES: Final[dict[str, int | list[int]]] = {
 class Recorder:
     """Samples and frames of one walk since its release, and of the last moments before if they are to be kept."""
 
-    def __init__(self, batch: Batch, world: int, keep: Keep, tilts: bool = False) -> None:
-        """Begin with nothing; how often samples and frames are taken, and whether planes are, the batch has decided."""
+    def __init__(self, world: World, keep: Keep, setup: Setup) -> None:
+        """Begin with nothing; how often samples and frames are taken, the batch of the world has decided."""
         self.before: BeforeRelease | None = None
-        self._batch, self._world, self.keep, self._tilts = batch, world, keep, tilts
+        self._world, self.keep, self._tilts = world, keep, setup.scene.plane == "tilting"
+        self._interval = (keep.series_every or 1) * setup.options.record_interval
         self._drive: list[tuple[float, Recorded]] = []  # with the time at which the launch ended [s]
         self._pieces: list[Recorded] = []
         self._after: float | None = None
 
     def drain(self, released: bool) -> None:
         """Take what the last launch wrote; before the release only what `release` may want is kept."""
-        if not self._batch.records:
+        if not self._world.records:
             return
-        piece, keep = self._batch.drain(self._world), self.keep
+        piece, keep = self._world.drain(), self.keep
         if released:
             series, frames = keep.series_every is not None, keep.frame_every is not None
             wanted = zip(piece, (series, frames, frames, keep.loads, frames and self._tilts), strict=True)
             self._pieces.append(Recorded(*(rows if is_kept else rows[:0].copy() for rows, is_kept in wanted)))
         elif keep.before > 0:
-            until = self._batch.time(self._world)
+            until = self._world.time
             self._drive = [*(each for each in self._drive if each[0] >= until - keep.before), (until, piece)]
 
     def latest_frames(self) -> tuple[Array, Array]:
@@ -65,7 +67,7 @@ class Recorder:
 
     def _joined(self, pieces: list[Recorded]) -> Recorded:
         """All pieces, one behind the other; nothing has been recorded since."""
-        return Recorded(*map(np.concatenate, zip(*pieces, self._batch.drain(self._world), strict=True)))
+        return Recorded(*map(np.concatenate, zip(*pieces, self._world.drain(), strict=True)))
 
     def release(self, moment: float, raised: float, earliest: float) -> None:
         """Keep what was recorded in the last moments of the drive, all of which has been drained.
@@ -93,14 +95,14 @@ class Recorder:
     def go_on(self, last: Array, time: float) -> None:
         """Begin within a walk at a time [s], with the sample before, (columns,)."""
         if last[layout.TIME] >= 0 and self.keep.series_every is not None:
-            nothing = self._batch.drain(self._world)
+            nothing = self._world.drain()
             self._pieces.append(nothing._replace(samples=last[None, : nothing.samples.shape[1]].copy()))
             self._after = time
 
     def motion(self, datum: float = 0.0) -> dict[str, Any]:
         """The arrays of a `WalkResult` by name, and its `before_release`; `datum`: of potential energies [J]."""
         samples, times, frames, loads, planes = self._joined(self._pieces)
-        samples = even_rows(samples, (self.keep.series_every or 1) * self._batch.options.record_interval, self._after)
+        samples = even_rows(samples, self._interval, self._after)
         samples[:, layout.GRAVITATIONAL] -= datum
         tilting = samples if self._tilts else np.empty((0, layout.ALL_COLUMNS))
         tilt, yaw = angles(tilting[:, layout.PLANE_COLUMN :])

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.engine.tallies import CONTACTS, LOST
+from warpchain.hdf5_files import stored_fields
 from warpchain.inputs.distributions import DRAWABLE
 from warpchain.inputs.validation import FIELDS, field_unit
 from warpchain.walks.landmarks import MOST_ENERGY_ERROR, energy_error, faults
-from warpchain.walks.walk_result import NUMBERS, WalkResult
+from warpchain.walks.outcome import Outcome
 
 Rows = NDArray[np.void]
 Columns = Mapping[str, NDArray[Any]]
@@ -31,7 +32,7 @@ _DRAWN: Final = "_drawn"
 class Column:
     """A column of a sweep: its type in NumPy's notation, SI unit ("1" for pure numbers) and meaning.
 
-    The path is the field of `WalkResult` that it is of, and the key in a field that is a dictionary; others have none.
+    The path is the field of `Outcome` that it is of, and the key in a field that is a dictionary; others have none.
     """
 
     kind: str
@@ -39,13 +40,16 @@ class Column:
     meaning: str
     path: tuple[str, ...] = ()
 
+    @property
+    def digested(self) -> list[object]:
+        """What a file depends on, see `Stored.digested`."""
+        return [self.kind, self.unit, self.path]
+
 
 def _stored_columns() -> Iterator[tuple[str, Column]]:
-    """The columns of the fields of `WalkResult`."""
-    types = {item.name: get_args(item.type) for item in fields(WalkResult)}
-    for name, stored in NUMBERS.items():
-        if name == "wall_time":  # a number of a sweep is the same however its walk was computed
-            continue
+    """The columns of the fields of `Outcome`."""
+    types = {item.name: get_args(item.type) for item in fields(Outcome)}
+    for name, stored in stored_fields(Outcome).items():
         kind = "<i8" if types[name][0] in (int, dict[str, int]) else "<f8"
         for key, meaning in (stored.keys or {"": stored.meaning}).items():
             prefix = "loss" if name == "energy" and key in LOST else name.removeprefix("greatest_") if key else name
@@ -88,11 +92,11 @@ def missing_rows(kind: np.dtype[np.void], keys: Rows) -> Rows:
     return rows
 
 
-def fill_row(row: Any, outcome: Mapping[str, Any], drawn: Mapping[str, float]) -> None:
-    """Write the `WalkRun.outcome` of a walk, and what was drawn for it, into one of `missing_rows`."""
-    row["status"] = outcome["status"]
+def fill_row(row: Any, outcome: Outcome, drawn: Mapping[str, float]) -> None:
+    """Write the numbers of a walk, and what was drawn for it, into one of `missing_rows`."""
+    row["status"] = outcome.status
     for name, column in STORED_COLUMNS.items():
-        row[name] = reduce(getitem, column.path, outcome)
+        row[name] = reduce(getitem, column.path, vars(outcome))
     for name, value in drawn.items():
         row[drawn_column(name)] = value
 

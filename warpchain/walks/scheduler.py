@@ -4,17 +4,18 @@ import threading
 import time
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from functools import partial
 
+from warpchain.chain.keep import NOTHING, Keep
+from warpchain.chain.setup import Setup
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import Gpu, gpu_turn, start_device
 from warpchain.engine.kernel_choice import block_threads, load_kernels, resident_blocks
+from warpchain.engine.world import World
 from warpchain.inputs.options import Options, on_gpu
-from warpchain.inputs.setup import Setup
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.status import Status
-from warpchain.walks.motion import NOTHING, Keep
 from warpchain.walks.walk_phases import WalkRun, phase_features
 
 WORLDS_OF_BLOCK = 2
@@ -62,9 +63,9 @@ def run_setups(
         watch: Called after each launch of each walk.
     """
 
-    def begin(place: int, batch: Batch, world: int) -> WalkRun:
+    def begin(place: int, world: World) -> WalkRun:
         setup = setups[place] if draw is None else draw(place)
-        return WalkRun(batch, world, setup, NOTHING if keeps is None else keeps[place])
+        return WalkRun(world, setup, NOTHING if keeps is None else keeps[place])
 
     def group(places: list[int]) -> list[BatchRun]:
         kept = [] if keeps is None else [keeps[place] for place in places]
@@ -94,35 +95,29 @@ def _groups(setups: Sequence[Setup], walks: int) -> list[list[int]]:
 def _batches(setups: Sequence[Setup], keeps: Sequence[Keep], slots: int | None) -> tuple[list[Batch], int]:
     """Batches for walks of equal options, on a CPU one, on a GPU several; and how many chains would fill the device."""
     options, scenes = setups[0].options, [setup.scene for setup in setups]
-    intervals = {keep.frame_interval for keep in keeps if keep.frame_interval > 0}
-    if len(intervals) > 1:
-        raise ValueError(f"keeps: frame intervals {sorted(intervals)} s; walks that run together have one")
     # Every batch keeps what any walk wants, although most may want nothing: separate batches would each wait for their
     # own slowest walk.
-    kept: dict[str, Any] = {
-        "longest": max(scene.links for scene in scenes),
-        "options": options,
-        "keeps_samples": any(keep.series_every for keep in keeps),
-        "keeps_loads": any(keep.before > 0 or keep.loads for keep in keeps),
-        "frame_every": next((keep.frame_every for keep in keeps if keep.frame_every), None),
-        "frame_interval": max(intervals, default=0.0),
-        "tilts": any(scene.plane == "tilting" for scene in scenes),
-        "faces": max(len(setup.floor.laws) for setup in setups),
-    }
+    batch_of = partial(
+        Batch,
+        longest=max(scene.links for scene in scenes),
+        options=options,
+        keep=Keep.union(keeps),
+        tilts=any(scene.plane == "tilting" for scene in scenes),
+        faces=max(len(setup.floor.laws) for setup in setups),
+    )
     if not on_gpu(options.device):
-        return [Batch(slots or 1, **kept)], slots or 1
-    capacity = slots or most_worlds(**kept)
+        return [batch_of(slots or 1)], slots or 1
+    capacity = slots or most_worlds(batch_of(1))
     count = min(capacity, len(setups))
     worlds = -(-count // BATCHES_PER_GPU)
-    return [Batch(min(worlds, count - first), **kept) for first in range(0, count, worlds)], capacity
+    return [batch_of(min(worlds, count - first)) for first in range(0, count, worlds)], capacity
 
 
-def most_worlds(longest: int, **kept: Any) -> int:
-    """Chains that a GPU should carry on together: enough to fill it that fit into half of the free memory.
+def most_worlds(one: Batch) -> int:
+    """Chains like that of a batch which a GPU should carry on together: enough to fill it, in half of the free memory.
 
     The other half is left to others, such as batches of other threads.
     """
-    one = Batch(1, longest, **kept)
     assert isinstance(one.device, Gpu)
     filling = WORLDS_OF_BLOCK * resident_blocks(one.threads) * one.device.multiprocessors
     return max(1, min(filling, one.device.free_memory // 2 // one.bytes))
@@ -147,13 +142,13 @@ class BatchRun:
         batch: Batch,
         waiting: deque[int],
         capacity: int,
-        begin: Callable[[int, Batch, int], WalkRun],
+        begin: Callable[[int, World], WalkRun],
         watch: Callable[[WalkRun], None] | None,
     ) -> None:
         """Prepare to run waiting walks, of which `capacity` would fill the device; those that begin are taken away."""
         self.batch, self.waiting = batch, waiting
         self._capacity, self._begin, self._watch = capacity, begin, watch
-        self._free = list(reversed(range(len(batch.links))))
+        self._free = list(reversed(range(len(batch.worlds))))
         self._running: dict[int, tuple[int, WalkRun, Iterator[Features]]] = {}
         self._features: dict[int, Features] = {}
 
@@ -166,7 +161,7 @@ class BatchRun:
         """Give some waiting walks free worlds and begin a launch; False if there is nothing to carry on."""
         for _ in range(min(len(self._free), len(self.waiting), BEGUN_AT_ONCE)):
             place, world = self.waiting.popleft(), self._free.pop()
-            run = self._begin(place, self.batch, world)
+            run = self._begin(place, self.batch.worlds[world])
             phases = run.phases()
             self._running[world], self._features[world] = (place, run, phases), next(phases)
         together: dict[Features, list[int]] = defaultdict(list)

@@ -14,14 +14,12 @@ from warpchain.kernels.contacts.fixed_body import BODIES, link_and_body
 from warpchain.kernels.contacts.impulse import Touching
 from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.contacts.tilting_floor import greatest_across_speed
-from warpchain.kernels.layout import LEFT_X, LEFT_Y, LOST_FIXED, OMEGA, RADIUS, RIGHT_X, RIGHT_Y, SINE, U, V, X, Y
+from warpchain.kernels.layout import GAP, LEFT_X, LEFT_Y, LOST_FIXED, OMEGA, RADIUS, RIGHT_X, RIGHT_Y, SINE, U, V, X, Y
 from warpchain.kernels.physics.elementary import ONE, TWO, ZERO, from_order_key, order_bits, order_key
 from warpchain.kernels.physics.geometry import LANES, put, two, whole_lanes
 from warpchain.kernels.types import Chain, Ground, Row, Rows, with_circles
 
 FURTHEST = wp.constant(wp.int64(2**63 - 1))
-GAP = layout.ERROR
-"""Row of the links' gaps to the fixed body [m]. Between attempts nothing else uses it."""
 
 
 @wp.func

@@ -10,25 +10,24 @@ centre of mass and gravitational energy do not change, and angular momentum chan
 """
 
 import functools
+from dataclasses import replace
 
 import warp as wp
 
 from warpchain.kernels import layout
 from warpchain.kernels.cpu.contacts.time_to_contact import FLIGHT_SKIN, LEAST_SLACK
-from warpchain.kernels.cpu.explicit import place_ends
 from warpchain.kernels.cpu.implicit import rigid
 from warpchain.kernels.cpu.implicit.rigid import GREATEST_RINGING, GREATEST_STRETCHING, RIGHT
 from warpchain.kernels.cpu.implicit.rigid_flight import flight_method
-from warpchain.kernels.cpu.implicit.rigid_layout import BASE, FORCE, segment_rows
+from warpchain.kernels.cpu.implicit.rigid_layout import BASE, BASE_RATE, FORCE, segment_rows
 from warpchain.kernels.cpu.implicit.solver import end_column, link_at
-from warpchain.kernels.cpu.joints import Joints, springs
+from warpchain.kernels.cpu.joints import Joints
+from warpchain.kernels.cpu.placing import place_ends
 from warpchain.kernels.events.tallies import book_loss
 from warpchain.kernels.methods.controller import classical_controller
-from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.methods.w_tableaus import ERROR_ORDER
 from warpchain.kernels.physics.elementary import ONE, TWO, ZERO
 from warpchain.kernels.physics.geometry import put, two
-from warpchain.kernels.physics.load import weight
 from warpchain.kernels.types import Chain, Control, Rows, State
 
 QUIET_TIME = wp.constant(wp.float64(5e-5))
@@ -114,13 +113,13 @@ def swap_models(K: Rows, chain: Chain, state: State, world: int, is_rigid: int, 
 
 
 @functools.cache
-def rigid_in_flight(name: str, columns: int) -> Joints:
-    """A method's steps on springs and, from one impulse to the next, on rigid joints."""
-    first_row = layout.scratch_rows(find_method(name).tableau.stages)
+def rigid_in_flight(on_springs: Joints, columns: int) -> Joints:
+    """Steps on springs and, from one impulse to the next, on rigid joints."""
+    first_row = layout.SCRATCH_ROWS
+    rows = segment_rows(columns, first_row)
     attempt_flight, commit_flight = flight_method(columns, first_row)
     close_joints, open_joints = joint_switch(columns, first_row)
     growth, shrink = classical_controller(ERROR_ORDER)
-    on_springs = springs(name, weight)
 
     @wp.func
     def settle(K: Rows, chain: Chain, state: State, world: int):
@@ -156,6 +155,7 @@ def rigid_in_flight(name: str, columns: int) -> Joints:
         if state.is_rigid[world] == 0:
             return on_springs.accept(K, chain, state, control, world, h, error)
         may_stay = commit_flight(K, chain, h)
+        place_ends(K, chain)
         return growth(error, state.last_error[world], control.proportional), may_stay
 
     @wp.func
@@ -171,4 +171,25 @@ def rigid_in_flight(name: str, columns: int) -> Joints:
         if state.is_rigid[world] != 0:
             swap_models(K, chain, state, world, 0, open_joints(K, chain))
 
-    return Joints(settle, first_stage, attempt, shrinkage, accept, margins, react)
+    @wp.func
+    def rates_are_finite(K: Rows, chain: Chain, state: State, world: int):
+        if state.is_rigid[world] == 0:
+            return on_springs.rates_are_finite(K, chain, state, world)
+        S = rows(K)
+        finite = bool(True)
+        for c in range(8, end_column(chain)):
+            for k in range(3):
+                finite = finite and wp.isfinite(S[BASE_RATE + k, c])
+        return finite
+
+    return replace(
+        on_springs,
+        settle=settle,
+        first_stage=first_stage,
+        attempt=attempt,
+        shrinkage=shrinkage,
+        accept=accept,
+        margins=margins,
+        react=react,
+        rates_are_finite=rates_are_finite,
+    )

@@ -22,7 +22,7 @@ from warpchain.kernels import layout
 from warpchain.kernels.cpu.implicit import rigid_layout as at
 from warpchain.kernels.cpu.implicit.rigid_layout import BASE, COSINE, FREE, INVERSE_INERTIA, INVERSE_MASS, SINE, SPIN
 from warpchain.kernels.cpu.implicit.solver import cyclic_solver, end_column, link_at, segment_places
-from warpchain.kernels.layout import STAGES, X
+from warpchain.kernels.layout import X
 from warpchain.kernels.physics.elementary import HALF, ONE, ZERO, cos_sin, order_bits
 from warpchain.kernels.physics.geometry import Link, put, three, two
 from warpchain.kernels.physics.joint import friction_torque
@@ -70,14 +70,12 @@ def load(S: Rows, K: Rows, chain: Chain):
 
 @wp.func
 def store(S: Rows, K: Rows, chain: Chain):
-    """Copies the state to the scratch K, and accelerations to where the step loop checks them."""
+    """Copies the state to the scratch K."""
     c = int(8)
     while c < end_column(chain):
         i, _is_copy = link_at(c, chain.link_count)
         for k in range(6):
             K[X + k, i] = S[BASE + k, c]
-        for k in range(3):
-            K[STAGES + k, i] = S[at.BASE_RATE + k, c]
         c += 1
 
 

@@ -10,6 +10,7 @@ import warp as wp
 
 from warpchain.kernels import layout
 from warpchain.kernels.cpu.implicit.solver import SegmentLayout, segment_columns, segment_places
+from warpchain.kernels.cpu.stage_rows import doubles_of_stages
 from warpchain.kernels.methods import w_tableaus
 from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.types import Chain, Rows
@@ -35,12 +36,18 @@ FORCES = SegmentLayout(size=2, matrix=STAGE + 6 * w_tableaus.STAGES)
 FRICTION = SegmentLayout(size=3, matrix=FORCES.end)
 
 
-def scratch_rows(name: str, columns: int) -> int:
-    """Rows of a chain's scratch of this width, for a method; those of a flight lie behind those of its springs."""
+def scratch_rows(name: str, columns: int, is_mixed: bool) -> int:
+    """Rows of a chain's scratch of this width, for a method: those of a flight, then those of stages on springs."""
     method = find_method(name)
-    rows = layout.scratch_rows(method.tableau.stages)
+    return first_stage_row(name, columns) + -(
+        -doubles_of_stages(method.tableau, columns, 4 if is_mixed else 8) // columns
+    )
+
+
+def first_stage_row(name: str, columns: int) -> int:
+    """Row from which on those of stages lie."""
     of_flight = -(-FRICTION.end * segment_columns(columns) // columns)
-    return rows + of_flight if method.has_rigid_flight else rows
+    return layout.SCRATCH_ROWS + (of_flight if find_method(name).has_rigid_flight else 0)
 
 
 @functools.cache

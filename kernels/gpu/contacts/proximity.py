@@ -14,8 +14,14 @@ from warpchain.kernels.gpu.board import ends_of
 from warpchain.kernels.gpu.stage import Proximity, Run, constants, felt_plane, read_link, vec5d
 from warpchain.kernels.gpu.threads import block_maxima, vec4i
 from warpchain.kernels.layout import COSINE, INVERSE_INERTIA, INVERSE_MASS, RADIUS, SINE, U
-from warpchain.kernels.methods.controller import quick_quotient, quick_root
-from warpchain.kernels.physics.elementary import TWO, from_order_key_single, order_bits_single, order_key_single
+from warpchain.kernels.methods.controller import quick_root
+from warpchain.kernels.physics.elementary import (
+    TWO,
+    from_order_key_single,
+    order_bits_single,
+    order_key_single,
+    quick_quotient,
+)
 from warpchain.kernels.physics.geometry import Link, put
 from warpchain.kernels.types import Chain, Control, Drive, with_circles
 

@@ -114,15 +114,15 @@ def run_pile(parameters, position, velocity, duration, *, poison=False, **settin
     """A run on the floor through `Batch`: final state (n, 6), counts, losses and extremes."""
     n = len(position)
     batch = Batch(1, n, Options(method="bs32", **settings))
-    batch.set_chain(0, parameters, n)
-    batch.load(0, position, velocity, stop_time=duration, stop_status=Status.FINISHED)
+    batch.worlds[0].set_chain(parameters, n)
+    batch.worlds[0].load(position, velocity, stop_time=duration, stop_status=Status.FINISHED)
     if poison:
         batch.scratch.fill_(np.nan)
         batch.lists.fill_(2**30)
     batch.run([0], batch.features(fixed_body="floor"))
-    assert batch.status(0) == Status.FINISHED
-    state = np.hstack([batch.position(0), batch.velocity(0)])
-    return state, batch.counts(0), batch.losses(0), batch.extremes(0)
+    assert batch.worlds[0].status == Status.FINISHED
+    state = np.hstack([batch.worlds[0].position, batch.worlds[0].velocity])
+    return state, batch.worlds[0].counts, batch.worlds[0].losses, batch.worlds[0].extremes
 
 
 def assert_same_run(run, other):

@@ -10,7 +10,7 @@ from tests.support.arrays import Array
 from tests.support.presets import SOFT
 from tests.support.rigid_chains import PAPER, exact_rigid_flight, loop, projected, rigid_motion
 from warpchain import Parameters, Status, preset
-from warpchain.inputs.start_shapes import ellipse, lay_chain
+from warpchain.chain.start_shapes import ellipse, lay_chain
 
 SMOOTH = PAPER.with_values({"friction_smoothing": 20.0})
 LENGTHS = (4, 6, 8, 10, 12, 14, 16, 22, 60)

@@ -14,6 +14,7 @@ from tests.oracle_model.circular_loop import circular_loop
 from tests.oracle_model.tilting_plane import tilted_plane
 from tests.support.blocks_under_test import run_recorded
 from tests.support.tilting_under_test import end_of, tilting_batch
+from warpchain.chain.keep import Keep
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
 from warpchain.kernels import layout
@@ -48,9 +49,11 @@ def standing(parameters, tilt):
 def let_go(start, parameters, duration, longest_step=None):
     """Times [s] and tilts [rad] of samples until the end, the loop's shape still being what it was."""
     options = Options(method="dp5", tolerance=1e-6, rest_time=100.0)
-    batch = tilting_batch([start], [parameters], options, duration, longest_step=longest_step, keeps_samples=True)
+    batch = tilting_batch(
+        [start], [parameters], options, duration, longest_step=longest_step, keep=Keep(series_every=1)
+    )
     pieces = run_recorded(batch, batch.features(fixed_body="floor", tilts=True))
-    assert batch.status(0) == Status.FINISHED
+    assert batch.worlds[0].status == Status.FINISHED
     position, _, plane = end_of(batch)
     assert_allclose(position[:, 2], start[0][:, 2], atol=0.02)
     assert abs(plane.turn[1]) < 0.02

@@ -10,10 +10,9 @@ import warpchain
 from tests.support.presets import SOFT
 from tests.support.setups import setup_walk
 from warpchain import InputError, Status
+from warpchain.chain.link_values import alternating
 from warpchain.engine.batch import ATTEMPTS
-from warpchain.inputs.link_values import alternating
 from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL
-from warpchain.inputs.scene import Scene, fewest_links
 from warpchain.walks import scheduler
 
 CELL = {"links": 60, "frequency": 15.0}
@@ -75,7 +74,8 @@ def test_a_drive_depends_neither_on_its_launches_nor_on_its_neighbours(monkeypat
         found = {}
         for place, run in scheduler.run_setups(setups, slots=slots):
             assert run.status == Status.TIME_LIMIT
-            found[place] = (run.outcome()["hold_time"], run.drift, run.counts, run.energy(), run.raised)
+            outcome = run.outcome()
+            found[place] = outcome.hold_time, str(vars(outcome))
         return found
 
     whole = outcomes(20_000, 1)
@@ -94,7 +94,7 @@ def test_loops_do_not_sink_into_their_sprocket(links: int, frequency: float) -> 
 # --- hard cases ---
 
 
-FEWEST = fewest_links(Scene(), SOFT)
+FEWEST = setup_walk("soft", {}).fewest_links
 TENTH, TENFOLD = (
     {name: part * getattr(SOFT, name) for name in ("inner_inertia", "outer_inertia")} for part in (0.1, 10.0)
 )

@@ -61,11 +61,11 @@ class Watched:
     def __post_init__(self) -> None:
         """Make a world whose loop is held from 0.5 s on."""
         self.batch = Batch(1, 4, Options())
-        self.batch.set_chain(0, SOFT, 4)
-        self.batch.load(0, np.zeros((4, 3)), np.zeros((4, 3)), stop_time=30.0, stop_status=Status.NOT_STEADY)
+        self.batch.worlds[0].set_chain(SOFT, 4)
+        self.batch.worlds[0].load(np.zeros((4, 3)), np.zeros((4, 3)), stop_time=30.0, stop_status=Status.NOT_STEADY)
         drive = {"hold_start": 0.5, "loop_speed": SPEED, "loop_period": 0.25, "load_factor": 16.0}
         drive |= {"steady_window": 0.125, "steady_time": -1.0, "steady_tolerance": 0.01}
-        self.batch.set_drive(0, **drive | self.drive)
+        self.batch.worlds[0].set_drive(**drive | self.drive)
         self.time = STEP * np.arange(round(self.duration / STEP) + 1)
         self.loads = np.full(len(self.time), np.nan)
 
@@ -93,7 +93,7 @@ class Watched:
     @property
     def drift(self) -> float:
         """DRIFT of the watch."""
-        return self.batch.watched(0, layout.DRIFT)
+        return self.batch.worlds[0].watched(layout.DRIFT)
 
 
 def crossing(load: float, gravity: float = SOFT.gravity) -> float:

@@ -36,7 +36,7 @@ def piles() -> Batch:
     batch.control.soften_area = 0.998
     batch.control.soft_stiffness, batch.control.soft_damping, batch.control.soft_smoothing = 1e6, 10.0, 1.0
     batch.control.pile_push = 20.0  # circles of these heaps overlap by millimetres
-    batch.set_chain(0, SOFT.with_values({"link_length": SOFT.link_length * (1 + 1e-4)}), LINKS)
+    batch.worlds[0].set_chain(SOFT.with_values({"link_length": SOFT.link_length * (1 + 1e-4)}), LINKS)
     batch.state.step.numpy()[:] = FIXED_STEP
     return batch
 
@@ -46,7 +46,7 @@ def everything(batch: Batch, world: int) -> dict[str, NDArray[np.generic]]:
     found = {name: getattr(batch.state, name).numpy()[world].copy() for name in State.vars}
     found["board"] = batch.scratch.numpy()[world, layout.BOARD_LOST_SELF : layout.BOARD_VALUES, :LINKS].copy()
     found["pairs"] = np.array(sorted(listed_pairs(batch, world)))
-    found["samples"] = batch.drain(world).samples
+    found["samples"] = batch.worlds[world].drain().samples
     return found
 
 
@@ -54,7 +54,7 @@ def run(factory: Callable[[Features, int], wp.Kernel], attempts: int) -> list[di
     """Both piles to their end, in launches of so many attempts."""
     batch = piles()
     kernel = factory(batch.features(fixed_body="floor"), LINKS)
-    while batch.status(0) == Status.RUNNING or batch.status(1) == Status.RUNNING:
+    while batch.worlds[0].status == Status.RUNNING or batch.worlds[1].status == Status.RUNNING:
         launch_kernel(batch, kernel, [0, 1], attempts, block_dim=LINKS)
     return [everything(batch, world) for world in (0, 1)]
 

@@ -19,9 +19,9 @@ from tests.kernels.methods.test_flight import FLIGHTS, exact_flight, greatest
 from tests.run.test_sweep_run import brief_setup, data_of, outcomes
 from tests.support.blocks_under_test import FIXED_STEP, HILLS, SOFT, floor_with, heap
 from warpchain import simulate, sweep, walk
+from warpchain.chain.sprocket_motion import motion_rows
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
-from warpchain.inputs.sprocket_motion import motion_rows
 from warpchain.run.workers import gpu_workers
 from warpchain.status import Status
 from warpchain.walks import scheduler
@@ -38,20 +38,20 @@ def fixed_steps(device: str, method: str, fixed_body: str) -> dict[str, np.ndarr
         position, velocity = heap(LINKS, 3 + world, tilt=0.3 + world)
         if fixed_body == "sprocket":
             position[:, 1] += 0.9 * SOFT.sprocket_radius
-        batch.set_chain(world, SOFT, LINKS)
+        batch.worlds[world].set_chain(SOFT, LINKS)
         points = HILLS if fixed_body == "terrain" else HILLS[[0, -1]]
-        batch.set_floor(world, floor_with(points, SOFT))
-        batch.load(world, position, velocity, stop_time=STEPS * FIXED_STEP, stop_status=Status.FINISHED)
-        batch.set_drive(world, sprocket_speed=-50.0)
-        batch.set_drive(world, motion=motion_rows(((0.01, 0.002, -0.01, 5.0),), 8.0, 0.02))
-        batch.set_state(world, step=FIXED_STEP)
+        batch.worlds[world].set_floor(floor_with(points, SOFT))
+        batch.worlds[world].load(position, velocity, stop_time=STEPS * FIXED_STEP, stop_status=Status.FINISHED)
+        batch.worlds[world].set_drive(sprocket_speed=-50.0)
+        batch.worlds[world].set_drive(motion=motion_rows(((0.01, 0.002, -0.01, 5.0),), 8.0, 0.02))
+        batch.worlds[world].set_state(step=FIXED_STEP)
     moves = fixed_body == "floor and sprocket"
     batch.run(range(2), batch.features(fixed_body="floor" if moves else fixed_body, moving_sprocket=moves))
     worlds = range(2)
     return {
-        "position": np.array([batch.position(world) for world in worlds]),
-        "velocity": np.array([batch.velocity(world) for world in worlds]),
-        "counts": np.array([list(batch.counts(world).values()) for world in worlds]),
+        "position": np.array([batch.worlds[world].position for world in worlds]),
+        "velocity": np.array([batch.worlds[world].velocity for world in worlds]),
+        "counts": np.array([list(batch.worlds[world].counts.values()) for world in worlds]),
     }
 
 

@@ -24,9 +24,9 @@ from tests.support.blocks_under_test import (
     launch_chains,
 )
 from tests.support.unlike_links import unlike_links
+from warpchain.chain.start_shapes import ellipse, lay_chain
 from warpchain.engine.batch import Batch
 from warpchain.engine.kernel_choice import most_registers
-from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu import functions
@@ -50,7 +50,7 @@ def test_fixed_steps_equal_a_cpu_kernel(method: str, fixed_body: str, self_conta
     ours, theirs = (batch_of(chains, method=method, self_contact=self_contact) for _ in range(2))
     for batch in (ours, theirs):
         for world in range(2):
-            batch.set_floor(world, floor_with(HILLS, SOFT))
+            batch.worlds[world].set_floor(floor_with(HILLS, SOFT))
     features = ours.features(fixed_body=fixed_body)
     launch_blocks(ours, features, 40, block_dim=block_dim)
     launch_chains(theirs, features, 40)
@@ -58,7 +58,7 @@ def test_fixed_steps_equal_a_cpu_kernel(method: str, fixed_body: str, self_conta
         assert counts["accepted"] == 40
         assert counts["sprocket" if fixed_body == "sprocket" else "floor"] > 10
         assert (counts["self"] > 10) == self_contact
-    assert (theirs.counts(1)["strands"] > 0) == self_contact
+    assert (theirs.worlds[1].counts["strands"] > 0) == self_contact
     assert_same(ours, theirs)
 
 
@@ -68,12 +68,12 @@ def test_unlike_links_equal_a_cpu_kernel(links: int) -> None:
     position, velocity = heap(links + links % 2)
     ours, theirs = (batch_of([(position[:links], velocity[:links])], method="os32") for _ in range(2))
     for batch in (ours, theirs):
-        batch.set_chain(0, SOFT, links, own=unlike_links(links, SOFT).own)
+        batch.worlds[0].set_chain(SOFT, links, own=unlike_links(links, SOFT).own)
     features = ours.features(fixed_body="floor")
     launch_blocks(ours, features, 40, block_dim=LINKS + 4)
     launch_chains(theirs, features, 40)
-    assert theirs.counts(0)["self"] > 10
-    assert theirs.counts(0)["floor"] > 10
+    assert theirs.worlds[0].counts["self"] > 10
+    assert theirs.worlds[0].counts["floor"] > 10
     assert_same(ours, theirs)
 
 
@@ -87,8 +87,8 @@ def test_chains_too_long_for_shared_memory_equal_a_cpu_kernel(block_dim: int, mo
     launch_blocks(ours, features, 20, block_dim=block_dim)
     make_advance_block.cache_clear()
     launch_chains(theirs, features, 20)
-    assert theirs.counts(0)["self"] > 10
-    assert theirs.counts(0)["list_builds"] > 10
+    assert theirs.worlds[0].counts["self"] > 10
+    assert theirs.worlds[0].counts["list_builds"] > 10
     assert_same(ours, theirs)
 
 
@@ -102,10 +102,10 @@ def test_free_flight_equals_a_cpu_kernel() -> None:
     features = ours.features(fixed_body="none")
     launch_blocks(ours, features, 60, block_dim=LINKS)
     launch_chains(theirs, features, 60)
-    assert ours.counts(0) == theirs.counts(0)
-    assert theirs.counts(0)["rejected"] > 0
-    assert ours.time(0) == pytest.approx(theirs.time(0), rel=1e-5)
-    assert np.allclose(ours.position(0), theirs.position(0), rtol=0, atol=1e-4)
+    assert ours.worlds[0].counts == theirs.worlds[0].counts
+    assert theirs.worlds[0].counts["rejected"] > 0
+    assert ours.worlds[0].time == pytest.approx(theirs.worlds[0].time, rel=1e-5)
+    assert np.allclose(ours.worlds[0].position, theirs.worlds[0].position, rtol=0, atol=1e-4)
 
 
 def bounded_heaps(count: int) -> Batch:
@@ -127,12 +127,12 @@ def test_samples_frames_and_rest_equal_a_cpu_kernel() -> None:
     features = ours.features(fixed_body="floor")
     launch_blocks(ours, features, 100, block_dim=LINKS)
     launch_chains(theirs, features, 100)
-    assert theirs.status(0) == Status.AT_REST
+    assert theirs.worlds[0].status == Status.AT_REST
     assert_same(ours, theirs)
     for name in ("first_sample", "last_sample"):
         expected = getattr(theirs.state, name).numpy()
         assert np.array_equal(getattr(ours.state, name).numpy(), expected)
-    recorded, expected = ours.drain(1), theirs.drain(1)
+    recorded, expected = ours.worlds[1].drain(), theirs.worlds[1].drain()
     assert len(recorded.times) > 1 and recorded.loads.shape == (len(recorded.times), LINKS, 3)
     assert all(map(np.array_equal, recorded, expected))
 
@@ -148,7 +148,7 @@ def test_frames_between_samples_equal_a_cpu_kernel() -> None:
         batch.control.frame_interval = 2.5 * FIXED_STEP
         batch.state.next_frame.numpy()[1] = 0 if len(runs) < 2 else -1
         features = batch.features(fixed_body="floor")
-        while batch.status(1) == Status.RUNNING:
+        while batch.worlds[1].status == Status.RUNNING:
             if launch is launch_blocks:
                 launch_blocks(batch, features, attempts, block_dim=LINKS)
             else:
@@ -157,7 +157,7 @@ def test_frames_between_samples_equal_a_cpu_kernel() -> None:
     ours, theirs, coarse = runs
     assert_same(ours, theirs)
     assert_same(theirs, coarse)
-    recorded, expected, few = (batch.drain(1) for batch in runs)
+    recorded, expected, few = (batch.worlds[1].drain() for batch in runs)
     assert np.array_equal(recorded.loads, expected.loads)
     assert np.array_equal(recorded.times, expected.times) and np.array_equal(recorded.frames, expected.frames)
     marks = np.floor(recorded.times / (2.5 * FIXED_STEP) + 1e-9)
@@ -176,21 +176,21 @@ def test_failures_stop_one_chain_and_leave_the_others() -> None:
     features = batch.features(fixed_body="floor")
     for each in (batch, alone):
         launch_blocks(each, features, 10, block_dim=LINKS)
-    assert [batch.status(world) for world in range(3)] == [Status.RUNNING, Status.NOT_FINITE, Status.RUNNING]
+    assert [batch.worlds[world].status for world in range(3)] == [Status.RUNNING, Status.NOT_FINITE, Status.RUNNING]
     for world in (0, 2):
-        assert np.array_equal(batch.velocity(world), alone.velocity(0))
+        assert np.array_equal(batch.worlds[world].velocity, alone.worlds[0].velocity)
 
     limited = batch_of([good], method="dp5", fixed_step=False)
     limited.control.step_limit = 4
     launch_blocks(limited, features, 10, block_dim=LINKS)
-    assert limited.status(0) == Status.STEP_LIMIT
-    counts = limited.counts(0)
+    assert limited.worlds[0].status == Status.STEP_LIMIT
+    counts = limited.worlds[0].counts
     assert counts["accepted"] + counts["rejected"] == 4
 
     stiff = batch_of([good], method="dp5", fixed_step=False, tolerance=1e-13)
     stiff.control.smallest_step = 1e-8
     launch_blocks(stiff, features, 50, block_dim=LINKS)
-    assert stiff.status(0) == Status.STEP_TOO_SMALL
+    assert stiff.worlds[0].status == Status.STEP_TOO_SMALL
 
 
 SHARED_MEMORY = 163 * 1024

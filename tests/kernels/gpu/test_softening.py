@@ -5,9 +5,9 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from tests.support.blocks_under_test import FIXED_STEP, assert_same, batch_of, heap, launch_blocks, launch_chains
+from tests.support.presets import SOFT
+from warpchain.chain.start_shapes import ellipse, lay_chain
 from warpchain.engine.batch import Batch
-from warpchain.engine.control import SOFT
-from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels import layout
 from warpchain.status import Status
 
@@ -40,7 +40,7 @@ def released() -> Batch:
     batch.control.sample_interval = 4 * FIXED_STEP
     batch.control.stiffening_time = 40 * FIXED_STEP
     batch.control.soften_area = -np.inf
-    batch.set_drive(0, hold_softness=1.25)
+    batch.worlds[0].set_drive(hold_softness=1.25)
     batch.state.softness.numpy()[0] = 1.25
     return soften_much(batch)
 
@@ -55,9 +55,11 @@ def driven(load_factor: float) -> Batch:
     batch.control.sample_interval = 4 * FIXED_STEP
     batch.control.stiffening_time = 30 * FIXED_STEP
     times = {"spin_up_start": 12 * FIXED_STEP, "spin_up_time": 58 * FIXED_STEP, "hold_start": 70 * FIXED_STEP}
-    batch.set_drive(0, **times, loop_speed=3.0, loop_period=12 * FIXED_STEP, load_factor=load_factor, push_rate=1e4)
-    batch.set_drive(0, steady_window=12 * FIXED_STEP, steady_time=-1.0, steady_tolerance=1.0, further_hold=1.0)
-    batch.set_drive(0, hold_softness=1.25, loaded_softness=1.1)
+    batch.worlds[0].set_drive(
+        **times, loop_speed=3.0, loop_period=12 * FIXED_STEP, load_factor=load_factor, push_rate=1e4
+    )
+    batch.worlds[0].set_drive(steady_window=12 * FIXED_STEP, steady_time=-1.0, steady_tolerance=1.0, further_hold=1.0)
+    batch.worlds[0].set_drive(hold_softness=1.25, loaded_softness=1.1)
     if load_factor > 1:
         batch.state.watch.numpy()[0, layout.UNLOADED_SINCE] = 90 * FIXED_STEP
     batch.state.softness.numpy()[0] = 1.25
@@ -69,7 +71,7 @@ def assert_same_bits(ours: Batch, theirs: Batch) -> None:
     """States, moments and samples agree to the bit, losses to the order of their sums."""
     assert_same(ours, theirs)
     for world in range(len(ours.links)):
-        assert_array_equal(ours.drain(world).samples, theirs.drain(world).samples)
+        assert_array_equal(ours.worlds[world].drain().samples, theirs.worlds[world].drain().samples)
 
 
 def launch_both(ours: Batch, theirs: Batch, fixed_body: str, launches: int, block_dim: int = LINKS) -> None:
@@ -85,11 +87,13 @@ def test_a_gpu_kernel_softens_a_pile_as_a_cpu_kernel_does(area: float, softness:
     """The GPU kernel softens at the same samples, frees the same energy, and ends in the same bits, however cut."""
     ours, theirs = heaps(area), heaps(area)
     launch_both(ours, theirs, "floor", 9)
-    first, second = (theirs.watched(world, layout.SOFTENED_AT) for world in range(2))
-    assert 0 < first <= second < theirs.time(0)
+    first, second = (theirs.worlds[world].watched(layout.SOFTENED_AT) for world in range(2))
+    assert 0 < first <= second < theirs.worlds[0].time
     assert theirs.state.softness.numpy().tolist() == [softness, softness]
     assert np.all(theirs.state.losses.numpy()[:, layout.LOSS_SOFTENING] > 0)
-    assert all(theirs.watched(world, layout.SELF_CONTACT_AT) > 0 for world in range(2))  # its bits are compared, too
+    assert all(
+        theirs.worlds[world].watched(layout.SELF_CONTACT_AT) > 0 for world in range(2)
+    )  # its bits are compared, too
     assert_same_bits(ours, theirs)
 
 
@@ -107,12 +111,12 @@ def test_a_gpu_kernel_drives_under_load_as_a_cpu_kernel_does(load_factor: float)
     """In the GPU kernel loads and softness change in the same steps of the drive, however cut: on, falling, off."""
     ours, theirs = driven(load_factor), driven(load_factor)
     launch_both(ours, theirs, "sprocket", 12, block_dim=5 * LINKS)
-    assert theirs.counts(0)["sprocket"] > 10
+    assert theirs.worlds[0].counts["sprocket"] > 10
     load, softness = theirs.state.load_factor.numpy()[0], theirs.state.softness.numpy()[0]
     if load_factor > 1:
         assert 1 < load < 15 and 1.1 < softness < 1.25
     else:
         assert load == 1 and softness == 1.25
         assert theirs.state.watch.numpy()[0, layout.DRIFT] > 0  # a window of the free loop has ended
-    assert theirs.counts(0)["accepted"] < theirs.time(0) / (1.1 * FIXED_STEP)
+    assert theirs.worlds[0].counts["accepted"] < theirs.worlds[0].time / (1.1 * FIXED_STEP)
     assert_same_bits(ours, theirs)

@@ -10,9 +10,9 @@ import pytest
 
 import warpchain
 from tests.oracle_model.motion_equations import acceleration
+from warpchain.chain.start_shapes import ellipse, lay_chain
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
-from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels.methods.explicit_tableaus import TABLEAUS, Tableau, register
 
 EACH = pytest.mark.parametrize("tableau", TABLEAUS.values(), ids=list(TABLEAUS))

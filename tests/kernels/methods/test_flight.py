@@ -11,9 +11,9 @@ from tests.oracle_model import motion_equations
 from tests.oracle_model.circular_loop import circular_loop, circular_loop_force
 from tests.support.presets import PAPER, SOFT
 from warpchain import Status, preset
+from warpchain.chain.start_shapes import ellipse, lay_chain
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
-from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels.methods.method import find_method, method_names
 
 METHODS = [name for name in method_names() if not find_method(name).has_rigid_flight]
@@ -105,7 +105,7 @@ def test_error_falls_with_the_order_of_the_method(method, order, steps):
     errors = []
     for step in steps:
         # a skin beyond the floor makes the whole flight "near a contact", and the loose tolerance leaves the bound
-        near = {"tolerance": 0.1, "contact_step": step, "skin": 5.0}
+        near = {"tolerance": 0.1, "precision": "double", "contact_step": step, "skin": 5.0}
         flight = warpchain.simulate(SMOOTH, *start, duration, times=[duration], method=method, **near)
         assert flight.steps_rejected == 0
         # the first steps grow from 0.1 µs to h, each at most fivefold
@@ -214,21 +214,21 @@ def dropped_batch(links, options, duration):
     position, velocity = spinning_ellipse(SOFT, links)
     ends = position[:, 1] - SOFT.link_length / 2 * np.abs(np.sin(position[:, 2]))
     position[:, 1] -= ends.min() - SOFT.circle_radius - 1e-4
-    batch.set_chain(0, SOFT, links)
-    batch.load(0, position, velocity - [0.0, 2.0, 0.0], stop_time=duration, stop_status=Status.FINISHED)
+    batch.worlds[0].set_chain(SOFT, links)
+    batch.worlds[0].load(position, velocity - [0.0, 2.0, 0.0], stop_time=duration, stop_status=Status.FINISHED)
     return batch
 
 
 def outcome(batch):
     """Everything that a run leaves."""
     return {
-        "status": batch.status(0),
-        "time": batch.time(0),
-        "position": batch.position(0),
-        "velocity": batch.velocity(0),
-        **{f"count {key}": value for key, value in batch.counts(0).items()},
-        **{f"extreme {key}": value for key, value in batch.extremes(0).items()},
-        **{f"loss {key}": value for key, value in batch.losses(0).items()},
+        "status": batch.worlds[0].status,
+        "time": batch.worlds[0].time,
+        "position": batch.worlds[0].position,
+        "velocity": batch.worlds[0].velocity,
+        **{f"count {key}": value for key, value in batch.worlds[0].counts.items()},
+        **{f"extreme {key}": value for key, value in batch.worlds[0].extremes.items()},
+        **{f"loss {key}": value for key, value in batch.worlds[0].losses.items()},
     }
 
 
@@ -238,7 +238,7 @@ def test_launch_size_does_not_change_a_bit(method):
     outcomes = []
     for attempts in (1, 7, 1000):
         batch = dropped_batch(20, Options(method=method), 0.01)
-        while batch.status(0) == Status.RUNNING:
+        while batch.worlds[0].status == Status.RUNNING:
             batch.launch([0], batch.features(fixed_body="floor"), attempts)
         outcomes.append(outcome(batch))
     assert outcomes[0]["status"] == Status.FINISHED

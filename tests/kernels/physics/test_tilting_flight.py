@@ -45,7 +45,7 @@ def test_flight_equals_scipy(truth, method, tolerance):
     """In steps of 0.5 µs positions, velocities and the plane agree with DOP853 to 1e-8."""
     parameters, start, expected = truth
     flight = fly(start, parameters, TUMBLING, method=method, tolerance=tolerance, longest_step=5e-7)
-    assert flight.counts(0)["accepted"] >= TUMBLING / 5e-7 - 1
+    assert flight.worlds[0].counts["accepted"] >= TUMBLING / 5e-7 - 1
     assert np.abs(row_of(expected[2]) - row_of(start[2])).max() > 0.1
     assert max(greatest_errors(end_of(flight), expected)) < 1e-8
 
@@ -56,7 +56,7 @@ def test_error_of_the_splitting_falls_with_the_square_of_the_step(truth):
     errors = []
     for step in (8e-6, 4e-6, 2e-6, 1e-6):
         flight = fly(start, parameters, TUMBLING, tolerance=0.1, longest_step=step)
-        assert flight.counts(0)["accepted"] == pytest.approx(TUMBLING / step, abs=2)
+        assert flight.worlds[0].counts["accepted"] == pytest.approx(TUMBLING / step, abs=2)
         errors.append(greatest_errors(end_of(flight), expected))
     slopes = np.log2(np.array(errors[:-1]) / errors[1:])
     assert_allclose(slopes, 2.0, atol=0.05)
@@ -95,7 +95,7 @@ def test_flight_keeps_energy_and_momenta_in_the_room(gravity):
     expected = turning(start) + np.cross(path, weight)
     assert_allclose(turning(end), expected, atol=1e-9 * np.linalg.norm(expected), rtol=0)
     # what the kernel's own sample says
-    sample = flight.last_sample(0)
+    sample = flight.worlds[0].last_sample
     assert sample[[layout.KINETIC, layout.GRAVITATIONAL, layout.SPRING]].sum() == pytest.approx(energy(end), rel=1e-13)
     room = mass @ tilting_plane.room_position(end[0], end[2]) / mass.sum()
     assert_allclose(sample[[layout.CENTER_X, layout.CENTER_Y, layout.CENTER_Z]], room, atol=1e-15)

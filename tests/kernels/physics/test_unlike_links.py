@@ -15,20 +15,20 @@ from tests.support.presets import PAPER, SOFT
 from tests.support.rigid_chains import exact_rigid_flight, loop
 from tests.support.unlike_links import UnlikeLinks, unlike_links
 from warpchain import Status
+from warpchain.chain.link_values import LinkValues, alternating
+from warpchain.chain.start_shapes import ellipse, lay_chain
 from warpchain.engine.batch import Batch
-from warpchain.inputs.link_values import LinkValues, alternating
 from warpchain.inputs.options import Options
-from warpchain.inputs.start_shapes import ellipse, lay_chain
 
 
 def fly(chain: UnlikeLinks, start: tuple[Array, Array], duration: float, fixed_body: str, **options: Any) -> Batch:
     """Carry a chain on; a batch of one world."""
     links = len(start[0])
     batch = Batch(1, links, Options(**options))
-    batch.set_chain(0, chain.parameters, links, own=chain.own)
-    batch.load(0, *start, stop_time=duration, stop_status=Status.FINISHED)
+    batch.worlds[0].set_chain(chain.parameters, links, own=chain.own)
+    batch.worlds[0].load(*start, stop_time=duration, stop_status=Status.FINISHED)
     batch.run([0], batch.features(fixed_body=fixed_body))
-    assert batch.status(0) == Status.FINISHED
+    assert batch.worlds[0].status == Status.FINISHED
     return batch
 
 
@@ -43,11 +43,11 @@ def test_flights_agree_with_scipy(links: int) -> None:
     velocity[:, 2] += np.random.default_rng(1).normal(size=links)
     batch = fly(chain, (position, velocity), duration, "none", method="dp5", tolerance=1e-10)
     places, speeds = motion_equations.solve_flight(position, velocity, duration, chain)
-    assert_allclose(batch.position(0), places, atol=1e-8 * np.abs(places).max())
-    assert_allclose(batch.velocity(0), speeds, atol=1e-8 * np.abs(speeds).max())
+    assert_allclose(batch.worlds[0].position, places, atol=1e-8 * np.abs(places).max())
+    assert_allclose(batch.worlds[0].velocity, speeds, atol=1e-8 * np.abs(speeds).max())
     before = motion_equations.total_energy(position, velocity, chain)
-    after = motion_equations.total_energy(batch.position(0), batch.velocity(0), chain)
-    assert before - after == pytest.approx(sum(batch.losses(0).values()), rel=1e-7)
+    after = motion_equations.total_energy(batch.worlds[0].position, batch.worlds[0].velocity, chain)
+    assert before - after == pytest.approx(sum(batch.worlds[0].losses.values()), rel=1e-7)
 
 
 @pytest.mark.parametrize("links", [7, 16, 61])
@@ -59,9 +59,9 @@ def test_flights_on_rigid_joints_agree_with_scipy(links: int) -> None:
     duration = 2e-4
     flight = fly(chain, (position, velocity), duration, "floor", method="hybrid", flight_tolerance=1e-8)
     places, speeds = exact_rigid_flight(position, velocity, chain, duration)
-    assert flight.losses(0)["joint_damping"] == 0.0
-    assert np.abs(flight.position(0) - places).max() < 1e-6 * np.abs(places).max()
-    assert np.abs(flight.velocity(0) - speeds).max() < 1e-6 * np.abs(speeds).max()
+    assert flight.worlds[0].losses["joint_damping"] == 0.0
+    assert np.abs(flight.worlds[0].position - places).max() < 1e-6 * np.abs(places).max()
+    assert np.abs(flight.worlds[0].velocity - speeds).max() < 1e-6 * np.abs(speeds).max()
 
 
 @pytest.mark.parametrize("method", ["dp5", "hybrid"])
@@ -72,15 +72,15 @@ def test_collisions_keep_momentum_and_the_ledger_of_energy(method: str) -> None:
     position += [0.0, 1.0, 0.0]
     velocity += [1.0, 0.5, 0.0]
     batch = fly(chain, (position, velocity), 2e-2, "floor", method=method, tolerance=1e-5)
-    assert batch.counts(0)["self"] > 100 and batch.counts(0)["floor"] == 0
-    gained = motion_equations.linear_momentum(batch.velocity(0), chain) - motion_equations.linear_momentum(
+    assert batch.worlds[0].counts["self"] > 100 and batch.worlds[0].counts["floor"] == 0
+    gained = motion_equations.linear_momentum(batch.worlds[0].velocity, chain) - motion_equations.linear_momentum(
         velocity, chain
     )
-    gained[1] += chain.masses.sum() * SOFT.gravity * batch.time(0)
+    gained[1] += chain.masses.sum() * SOFT.gravity * batch.worlds[0].time
     assert_allclose(gained, 0, atol=1e-12)
     before = motion_equations.total_energy(position, velocity, chain)
-    after = motion_equations.total_energy(batch.position(0), batch.velocity(0), chain)
-    assert before - after == pytest.approx(sum(batch.losses(0).values()), rel=1e-3)
+    after = motion_equations.total_energy(batch.worlds[0].position, batch.worlds[0].velocity, chain)
+    assert before - after == pytest.approx(sum(batch.worlds[0].losses.values()), rel=1e-3)
 
 
 # --- impulses ---

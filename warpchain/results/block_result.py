@@ -5,28 +5,37 @@ import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.chain.setup import Setup
 from warpchain.inputs.arrays import AnyArray
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.setup import Setup
 from warpchain.inputs.validation import InputError, InputWarning, by_name, checked, plain, shown, suggestion
+from warpchain.results.walk_result import WalkResult
 from warpchain.status import Status
-from warpchain.store.cell_statistics import CellStatistics
 from warpchain.sweeps.block import POINT, Block
 from warpchain.sweeps.plan import Sweep
 from warpchain.walks import rows
+from warpchain.walks.cell_statistics import CellStatistics
 from warpchain.walks.landmarks import LENGTHS
 from warpchain.walks.rows import COLUMNS, MISSING, Column, quantity_of
-from warpchain.walks.walk_result import WalkResult, read_motion
+from warpchain.walks.walk_numbers import read_motion
 
 if TYPE_CHECKING:
     import h5py
     import pandas
     import xarray
+
+RANDOMISATION: Final = "randomisation"
+_NUMBERED: Final = {
+    "sample": "number of the sample in its cell",
+    POINT: "number of the parameter set",
+    RANDOMISATION: "number of the randomisation; the spread between the means of several tells the error of a mean",
+}
+"""Coordinates that number something → their meaning."""
 
 _Variables = dict[str, tuple[tuple[str, ...], AnyArray, dict[str, Any]]]
 """Name → axes, values and attributes, as xarray takes them."""
@@ -99,9 +108,8 @@ class BlockResult:
         return self._column(name).meaning
 
     def _column(self, name: str) -> Column:
-        if name in ("sample", POINT):
-            of = "sample in its cell" if name == "sample" else "parameter set"
-            return Column("<i8", "1", f"number of the {of}")
+        if name in _NUMBERED:
+            return Column("<i8", "1", _NUMBERED[name])
         if not any(name in known for known in (self.columns, self.axes, self.planned.points)):
             raise KeyError(f"{shown(name)}: {suggestion(name, (*self.columns, *self.axes))}")
         return COLUMNS[name] if name in COLUMNS else rows.field_column(name)
@@ -195,7 +203,7 @@ class BlockResult:
             raise InputError(f"{', '.join(words)}: given together with index; leave one out")
         else:
             _, place = located([self], index)
-        from warpchain.walks.one_walk import run_walk
+        from warpchain.results.one_walk import run_walk
 
         recording = {"frame_interval": frame_interval, "record_before": record_before, "record_loads": record_loads}
         walk = run_walk(self.setup_at(place), seed=self.origin.seed, **recording)  # type: ignore[arg-type]
@@ -253,12 +261,31 @@ class BlockResult:
         """Statistics of a column in each cell, over the walks at rest that have a number there.
 
         NaN and −1 stand for none, such as `bounces_before_collapse` of a loop that never collapsed: such walks are in
-        no mean, and `absent` counts them.
+        no mean, and `absent` counts them. Designed samples have a standard error if they are of several randomisations.
 
         Raises:
             KeyError: there is no such column.
         """
-        return CellStatistics.of(self.axes, self.unit(name), self.columns[name], self.columns["status"])
+        unit, column, status = self.unit(name), self.columns[name], self.columns["status"]
+        is_bounded = name == "dx" and (status == Status.DISTANCE_LIMIT).any()
+        farthest = self._farthest() if is_bounded else np.array(np.nan)
+        return CellStatistics.of(self.axes, unit, column, status, self.planned.groups, farthest)
+
+    def _farthest(self) -> NDArray[np.float64]:
+        """Distance [m] that walks which ended by it had come, in each cell; NaN where the floor may rise ahead.
+
+        On such a floor a chain may slide back, and end behind the sprocket.
+        """
+        if {"slope", "distance_limit"} & {*self.drawn}:
+            return np.array(np.nan)
+
+        def limit(setup: Setup) -> float:
+            scene = setup.scene
+            heights = [0.0] if scene.floor == "flat" else [row[1] for row in scene.floor]
+            falls = scene.slope >= 0 and bool((np.diff(heights) <= 0).all())
+            return scene.distance_limit if scene.distance_limit is not None and falls else math.nan
+
+        return self.planned.over_cells(("slope", "distance_limit", "floor"), limit)[..., 0]
 
     def design(self) -> "xarray.DataArray":
         """What differs between the walks beside the axes, as one array with the names along its last axis, `quantity`.
@@ -292,6 +319,8 @@ class BlockResult:
         along = {name: (name, values) for name, values in self.axes.items()}
         along |= {"sample": ("sample", np.arange(self.shape[-1]))}
         along |= {name: (POINT, np.array(values)) for name, values in self.planned.points.items()}
+        if self.planned.sampler != "random":
+            along[RANDOMISATION] = "sample", self.planned.groups
         coordinates: _Variables = {
             name: ((dim,), values.astype(float) if values.dtype.kind == "O" else values, self.notes(name))
             for name, (dim, values) in along.items()

@@ -1,12 +1,16 @@
 """Chains laid along curves: closed joints, velocities that keep them closed, sense of rotation, errors."""
 
+from typing import get_args
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from tests.oracle_model import motion_equations
 from tests.support.presets import PAPER
-from warpchain.inputs.start_shapes import ellipse, lay_chain, stadium
+from warpchain.chain.start_shapes import ellipse, lay_chain, stadium
+from warpchain.chain.starts import SHAPES
+from warpchain.inputs.starts import STARTS, StartWord
 
 LENGTH = PAPER.link_length
 RADIUS = PAPER.sprocket_radius + PAPER.circle_radius
@@ -98,3 +102,9 @@ def test_phase_is_a_fraction_of_the_turn():
     assert_allclose(first[0], [0.0, RADIUS], atol=1e-12)
     assert_allclose(half[0], [0.0, first[:, 1].min()], atol=1e-12)
     assert_allclose(turn, first, atol=1e-12)
+
+
+def test_every_start_has_a_shape_or_a_sprocket() -> None:
+    """The words that a user may write, and the shapes that chains without a sprocket are laid along, are one table."""
+    assert {word for word, start in STARTS.items() if not start.on_sprocket} == SHAPES.keys()
+    assert set(get_args(StartWord)) == STARTS.keys()

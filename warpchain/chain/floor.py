@@ -1,76 +1,25 @@
-"""The floor of a scene: how it is given, and its kinds: flat, an endless slope, or a profile given by points.
+"""The floor of a walk and its kinds: flat, an endless slope, or a profile given by points.
 
-No other module knows the kinds. A new one is a branch of `FloorField`, a subclass of `Floor`, a line of `floor_from`.
+No other module knows the kinds. A new one is a branch of `FloorField` in `warpchain.inputs.compound_fields`, a subclass
+of `Floor`, a line of `floor_from`.
 """
 
-import itertools
 import math
-from typing import Annotated, Any, Final, Literal
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Strict, Tag
 
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.parameters import FRACTION, FRICTION
-from warpchain.inputs.validation import InputError, shown
+from warpchain.inputs.validation import InputError
 from warpchain.kernels import layout
 
-MOST_POINTS: Final = 256
-"""Most points of a profile; each takes time where a chain is near it."""
-SHORTEST: Final = 1e-5
-"""Least length of a face [m], a thousandth of a link of Table 1."""
-FARTHEST: Final = 1e4
-"""Greatest coordinate of a point, where numbers still tell a thousandth of a nanometre [m]."""
 EXACT: Final = 1e-11
 """Clearances are met to this [m]."""
 STEPS: Final = 200
 """Most steps, each by the room that is left, to a clearance; Table 1's chain takes 114 on the steepest slope."""
 ENDLESS: Final = 1e9
 """How far the first and the last cell of a profile reach [m]."""
-
-
-def _without_overhang(points: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
-    """The points of a profile, if they make a floor."""
-    if len(points) < 2:
-        raise ValueError("a profile has 2 points at least; give more, such as [[0, 0], [1, 0], [1, -0.1], [2, -0.1]]")
-    if len(points[-1]) > 2:
-        raise ValueError(f"point {len(points) - 1} begins no line that could have e and μ; give x and y")
-    for number, ((x, y, *_), (next_x, next_y, *_)) in enumerate(itertools.pairwise(points), start=1):
-        if next_x < x:
-            raise ValueError(f"point {number} lies behind the one before it; let x rise from point to point")
-        if math.hypot(next_x - x, next_y - y) < SHORTEST:
-            raise ValueError(f"point {number} is less than {SHORTEST} m from the one before it; leave one out")
-        if next_x == x and number in (1, len(points) - 1):
-            raise ValueError("the first and the last face go on without end; let x rise along them")
-        if number > 1 and points[number - 2][0] == next_x:
-            raise ValueError(f"point {number} is the third above one another; leave the middle one out")
-    return points
-
-
-_Coordinate = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
-_Restitution = Annotated[float, Field(**FRACTION)]
-_Friction = Annotated[float, Field(**FRICTION)]
-_Point = Annotated[
-    Annotated[tuple[_Coordinate, _Coordinate], Strict(False), Tag("(place)")]
-    | Annotated[tuple[_Coordinate, _Coordinate, _Restitution, _Friction], Strict(False), Tag("(law)")],
-    Discriminator(lambda given: "(law)" if isinstance(given, list | tuple) and len(given) > 2 else "(place)"),
-]
-Points = Annotated[tuple[_Point, ...], Strict(False), Field(max_length=MOST_POINTS), AfterValidator(_without_overhang)]
-"""A profile: points x, y [m], and e and μ of the line that begins there, if it has its own."""
-
-
-def _known_word(word: str) -> str:
-    if word != "flat":
-        raise ValueError(f"{shown(word)} is no floor; give flat, or points such as [[0, 0], [1, 0.1]]")
-    return word
-
-
-FloorField = Annotated[
-    Annotated[Literal["flat"], BeforeValidator(_known_word), Tag("(flat)")] | Annotated[Points, Tag("(points)")],
-    Discriminator(lambda given: "(flat)" if isinstance(given, str) else "(points)"),
-]
-"""What the field `floor` of a scene may be."""
 
 
 class Floor:

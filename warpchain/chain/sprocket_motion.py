@@ -3,41 +3,17 @@
 It starts at rest; between the rows of its motion it goes on monotone cubics (PCHIP), without overshoot.
 """
 
-import itertools
-from typing import Annotated, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import AfterValidator, Field, Strict
 
 from warpchain.inputs.arrays import Array
+from warpchain.inputs.compound_fields import Motion
 from warpchain.kernels import layout
 
-Motion = tuple[tuple[float, float, float, float], ...]
-
-LARGEST: Final = 1e4
-"""Greatest size of a time, a place and a frequency."""
 BEYOND: Final = 1e30
 """Time [s] of the rows for kernels behind the last."""
-
-
-def _in_order(rows: Motion) -> Motion:
-    if not rows:
-        raise ValueError("no rows; give at least one, such as [[0.1, 0, -0.02, 0]], or null")
-    for number, (before, after) in enumerate(itertools.pairwise([(0.0,), *rows])):
-        if not after[0] > before[0]:
-            raise ValueError(f"row {number}: {after[0]:g} s is not after {before[0]:g} s; let times rise from above 0")
-    return rows
-
-
-_Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
-Rows = Annotated[
-    tuple[Annotated[tuple[_Number, _Number, _Number, _Number], Strict(False)], ...],
-    Strict(False),
-    Field(max_length=16),
-    AfterValidator(_in_order),
-]
-"""A motion: rows [time, x, y, frequency]."""
 
 
 def _knots(motion: Motion) -> tuple[Array, Array, Array]:

@@ -8,16 +8,14 @@ from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import replace
 from typing import Any, Final, TypeVar
 
-from warpchain.inputs.distributions import TABLE, Seed, draw, placed, random_generator
-from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL, Options, replaced_by
+from warpchain.chain.setup import Setup, State
+from warpchain.inputs.distributions import TABLE, Seed, draw, random_generator
+from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.parameters import preset as parameter_preset
-from warpchain.inputs.scene import OF_LINKS, Scene, check_links, check_links_on_gpu, check_parity, check_scene
-from warpchain.inputs.state import DEFAULT_PRESET, Setup, State
-from warpchain.inputs.validation import InputError, Section, checked, shown, validated
-from warpchain.kernels.methods.method import find_method
-
-__all__ = ["DEFAULT_PRESET", "Setup", "Values", "combined", "continued", "options_beside", "resolve"]
+from warpchain.inputs.scene import OF_LINKS, Scene
+from warpchain.inputs.unit_slips import check_units
+from warpchain.inputs.validation import InputError, Section, checked, validated
 
 Values = Mapping[str, object]
 F = TypeVar("F", bound=Callable[..., object])
@@ -42,38 +40,12 @@ def resolve(
     """
     whole = validated(Scene, scene, "scene")
     changed = parameter_preset(preset).with_values(parameters)
-    setup = combined(preset, changed, whole, options_beside(whole.plane, options, loads))
+    chosen = Options.chosen(options, tilts=whole.plane == "tilting", loads=loads)
+    setup = Setup(preset, changed, whole, chosen).checked()
     if seed is None:
         return setup
     drawn = {name: distribution for name, distribution in TABLE.items() if name not in {*scene, *parameters}}
-    return setup.with_drawn(draw(placed(drawn, setup), random_generator(checked(seed, "seed", Seed))))
-
-
-def options_beside(plane: str, options: Values, loads: bool = False) -> Options:
-    """The checked options; `Scene.plane`, and whether joint forces are recorded, may decide what `standard` is."""
-    if (plane == "tilting" or loads) and options.get("method", "standard") == "standard":
-        options = {**options, "method": "explicit"}
-    return validated(Options, options, "options")
-
-
-def combined(preset: str, parameters: Parameters, scene: Scene, options: Options) -> Setup:
-    """The setup of these values, if they do not contradict one another; else an `InputError`."""
-    _check_can_tilt(scene, options)
-    check_scene(scene, parameters)
-    check_links_on_gpu(scene.links, options.device, "scene.links")
-    interval = options.record_interval
-    if interval > LONGEST_DRIVE_INTERVAL and scene.start != "ellipse" and scene.load_factor != 1:
-        raise InputError(
-            f"options.record_interval: loads on the sprocket change at each, and {interval} s is too long for that; "
-            f"give at most {LONGEST_DRIVE_INTERVAL} s, or scene.load_factor: 1"
-        )
-    return Setup(preset, parameters, scene, options)
-
-
-def _check_can_tilt(scene: Scene, options: Options) -> None:
-    """Check that the method carries chains whose plane tilts, if that of the scene does; else an `InputError`."""
-    if scene.plane == "tilting" and find_method(options.method).has_rigid_flight:
-        raise InputError(f"options.method: {shown(options.method)} keeps planes fixed; give explicit, or plane: fixed")
+    return setup.with_drawn(draw(setup.placed(drawn), random_generator(checked(seed, "seed", Seed))))
 
 
 def continued(state: State, sections: Mapping[str, Values]) -> Setup:
@@ -81,20 +53,19 @@ def continued(state: State, sections: Mapping[str, Values]) -> Setup:
     if early := [name for name in sections["scene"] if name not in OF_THE_WALK]:
         raise InputError(f"{', '.join(early)}: given together with a state, whose chain is released; leave it out")
     before, given = state.setup, sections["options"]
-    options = validated(Options, {**before.options.model_dump(exclude=replaced_by(given)), **given}, "options")
+    options = validated(Options, {**before.options.beside(given), **given}, "options")
     scene = validated(Scene, {**vars(before.scene), **sections["scene"]}, "scene")
     parameters = before.parameters.with_values(sections["parameters"]) if sections["parameters"] else before.parameters
-    _check_can_tilt(scene, options)
-    check_links(scene, parameters)
-    check_parity(scene, parameters)
-    check_links_on_gpu(scene.links, options.device, "start")
+    setup = Setup(before.preset, parameters, scene, options, state).checked("start")
     for name in OF_THE_WALK[:2]:
         if (end := getattr(scene, name)) is not None and end < state.time:
             raise InputError(f"{name}: {end:g} s is before the state at {state.time:g} s; give a later time")
-    setup = Setup(before.preset, parameters, scene, options)
+    if not options.unusual_values:
+        check_units({name: getattr(parameters, name) for name in sections["parameters"]}, "parameters")
+        check_units(sections["scene"], "scene")
     if scene.plane == "fixed" and not state.is_placed_as_in(setup):  # a moving sprocket may have left it in the floor
         setup.floor.check_above(state.position, state.parameters.link_length, "start")
-    return replace(setup, start=replace(state, setup=setup))
+    return replace(setup, start=replace(state, setup=replace(setup, start=None)))
 
 
 def takes_fields(*sections: str, without: Container[str] = (), beside: Iterable[str] = ()) -> Callable[[F], F]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.scene import OF_LINKS, Scene
 
 LEAST_INERTIA: Final = 0.5
 """Part of its rotary inertia that a link must keep under multiplied loads."""
@@ -66,3 +67,22 @@ def alternating(parameters: Parameters, links: int) -> LinkValues:
     mass[1::2], inertia[1::2] = parameters.outer_mass, parameters.outer_inertia
     others = parameters.viscous_friction, parameters.coulomb_friction, parameters.circle_radius
     return LinkValues(mass, inertia, *(np.full(links, value) for value in others))
+
+
+def link_values(scene: Scene, parameters: Parameters) -> LinkValues:
+    """What each link and joint of the chain of a walk has of its own."""
+    values = alternating(parameters, scene.links)
+    for row, name in zip(vars(values).values(), OF_LINKS, strict=True):
+        if (own := getattr(scene, name)) is not None:
+            row[:] = own
+    if scene.mass_gradient:
+        growth = 1 + scene.mass_gradient * np.linspace(-1.0, 1.0, scene.links)
+        values.mass[:] *= growth
+        values.inertia[:] *= growth
+    values.mass[scene.charm_link] += scene.charm_mass
+    values.inertia[scene.charm_link] += scene.charm_inertia
+    if scene.charm_radius is not None:
+        values.radius[scene.charm_link] = scene.charm_radius
+    values.viscous_friction[scene.stiff_joint] *= scene.stiff_joint_factor
+    values.coulomb_friction[scene.stiff_joint] *= scene.stiff_joint_factor
+    return values

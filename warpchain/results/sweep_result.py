@@ -11,6 +11,7 @@ each walk in a group named by the place of the walk in a flat column, as in a sa
 
 import json
 import os
+import time
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -20,17 +21,18 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from warpchain.files import AnyPath, Kind, checked_output, given_path, write_whole
-from warpchain.hdf5_files import hdf5_image, kind_of_hdf5, reading_hdf5
+from warpchain.files import AnyPath, Kind, checked_output, clear_parts, given_path, write_whole
+from warpchain.hdf5_files import Format, hdf5_image, kind_of_hdf5, reading_hdf5
 from warpchain.inputs.arrays import AnyArray
-from warpchain.inputs.validation import InputError, InputWarning, full_name, shown, suggestion
-from warpchain.store.block_result import BlockResult, counted, located, status_counts
-from warpchain.store.cell_statistics import CellStatistics
+from warpchain.inputs.validation import InputError, InputWarning, checked_path, full_name, shown, suggestion
+from warpchain.results.block_result import BlockResult, counted, located, status_counts
+from warpchain.results.walk_result import WalkResult
 from warpchain.store.folder import read_rows
-from warpchain.store.shards import read_manifest, stamp, stored_sweep
+from warpchain.store.shards import Manifest, read_manifest, stamp, stored_sweep
 from warpchain.sweeps.plan import Sweep
+from warpchain.walks.cell_statistics import CellStatistics
 from warpchain.walks.rows import COLUMNS, STORED_COLUMNS, derived_columns, drawn_column, quantity_of
-from warpchain.walks.walk_result import WalkResult
+from warpchain.walks.walk_numbers import MOTION
 
 if TYPE_CHECKING:
     import h5py
@@ -38,8 +40,10 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure, SubFigure
 
-KIND: Final = "warpchain sweep result"
+MERGED: Final = Format.of("warpchain sweep result", COLUMNS, MOTION)
 REMEDY: Final = "merge the folders again, or fetch another copy of the file"
+TRIES, PAUSE = 100, 0.02
+"""Times that a folder is read in which shards come and go, and time [s] between them."""
 WANTED: Final = "give a folder of a sweep or a merged file; a saved walk is for plot, animate and load_walk"
 
 
@@ -207,32 +211,70 @@ class SweepResult:
         }
 
 
-def load(path: AnyPath) -> SweepResult:
+def load(path: AnyPath | Sequence[AnyPath]) -> SweepResult:
     """Read the folder of a sweep, as far as the sweep is, or a file that `warpchain merge` wrote.
 
+    Args:
+        path: the folder or the file; or several, which have different walks of one sweep, such as its parts.
+
     Raises:
-        OSError: the folder or the file cannot be read.
-        InputError: there is no sweep in it, or a file is damaged, foreign or of another version.
+        OSError: a folder or a file cannot be read.
+        InputError: there is no sweep in it, a file is damaged, foreign or of another version, or several do not fit
+            together.
     """
-    return _load_merged(path) if os.path.isfile(path) else _load_folder(path)
+    if isinstance(path, Sequence) and not isinstance(path, str | bytes):
+        return _together(path)
+    given = checked_path(path, "path")
+    return _load_merged(given) if os.path.isfile(given) else _load_folder(given)
+
+
+def _together(sources: Sequence[AnyPath]) -> SweepResult:
+    """The results of several folders and merged files as one; errors as of `load`."""
+    if not sources:
+        raise InputError("path: an empty list; give the folders of a sweep")
+    first, *others = sources
+    whole = load(first)
+    for folder in others:
+        result = load(folder)
+        if any(whole.provenance[name] != result.provenance[name] for name in ("digest", "numerics_version")):
+            raise InputError(f"{folder}: is not the sweep of {first}, with the same seed and samples; give its parts")
+        blocks = {}
+        for block, other in zip(whole.blocks.values(), result.blocks.values(), strict=True):
+            there = block.is_there
+            if (there & other.is_there).any():
+                raise InputError(f"{folder}: has walks that a folder before it has; give each part of a sweep once")
+            columns = {key: np.where(there, values, other.columns[key]) for key, values in block.columns.items()}
+            blocks[block.name] = replace(block, columns=columns, motions=np.where(there, block.motions, other.motions))
+        whole = replace(whole, blocks=blocks)
+    return whole
 
 
 def _load_folder(directory: AnyPath) -> SweepResult:
-    while True:
-        manifest, begun = read_manifest(directory), stamp(directory)
+    for left in reversed(range(TRIES)):
+        begun, manifest = _seen(directory)
         try:
             rows, motions = read_rows(directory, manifest)
             break
-        except (OSError, InputError):
-            if stamp(directory) == begun:  # else a run has begun anew or added samples meanwhile
+        except (OSError, InputError) as error:
+            # A run may begin anew meanwhile, which deletes shards and then replaces sweep.h5, or add samples.
+            is_deleting = isinstance(error, FileNotFoundError)
+            if not left or not (is_deleting or stamp(directory) != begun):
                 raise
+            time.sleep(PAUSE * is_deleting)
     provenance = {"digest": manifest.sweep.digest(), "numerics_version": manifest.numerics_version}
     return _result(manifest.sweep, provenance | {"versions": manifest.versions}, rows, motions)
 
 
+def _seen(directory: AnyPath) -> tuple[str, Manifest]:
+    """Stamp and manifest of a folder."""
+    if os.path.lexists(Path(directory) / "sweep.h5"):
+        return stamp(directory), read_manifest(directory)
+    return "", read_manifest(directory)  # says what is wrong
+
+
 def _load_merged(path: AnyPath) -> SweepResult:
-    opened = partial(reading_hdf5, Path(path).absolute(), KIND, REMEDY, WANTED)
-    with reading_hdf5(path, KIND, REMEDY, WANTED) as file:
+    opened = partial(reading_hdf5, Path(path).absolute(), MERGED, REMEDY, WANTED)
+    with reading_hdf5(path, MERGED, REMEDY, WANTED) as file:
         sweep = stored_sweep(path, json.loads(file.attrs["sweep"]))
         provenance = {"digest": file.attrs["digest"], "numerics_version": int(file.attrs["numerics_version"])}
         provenance["versions"] = json.loads(file.attrs["versions"])
@@ -278,24 +320,11 @@ def merge(sources: AnyPath | Sequence[AnyPath], path: AnyPath) -> None:
         OSError: a folder cannot be read, or the file cannot be written, or is there already and no merged file.
         InputError: there is no sweep in a folder, a shard is damaged or foreign, or sweeps do not fit together.
     """
-    folders = [sources] if isinstance(sources, str | os.PathLike) else list(sources)
     target = given_path(path)
     checked_output(target, _MERGED)
-    first, *others = folders
-    whole = load(first)
-    for folder in others:
-        result = load(folder)
-        if any(whole.provenance[name] != result.provenance[name] for name in ("digest", "numerics_version")):
-            raise InputError(f"{folder}: is not the sweep of {first}, with the same seed and samples; give its parts")
-        blocks = {}
-        for block, other in zip(whole.blocks.values(), result.blocks.values(), strict=True):
-            there = block.is_there
-            if (there & other.is_there).any():
-                raise InputError(f"{folder}: has walks that a folder before it has; give each part of a sweep once")
-            columns = {key: np.where(there, values, other.columns[key]) for key, values in block.columns.items()}
-            blocks[block.name] = replace(block, columns=columns, motions=np.where(there, block.motions, other.motions))
-        whole = replace(whole, blocks=blocks)
-    write_whole(target, hdf5_image(KIND, partial(_fill, whole=whole)), _MERGED)
+    clear_parts(target)
+    whole = load(sources)
+    write_whole(target, hdf5_image(MERGED, partial(_fill, whole=whole)), _MERGED)
     if missing := whole.missing_count:
         problem = f"{missing:,} of {whole.walk_count:,} walks are missing"
         remedy = "merge again with all parts, once they have run"
@@ -305,7 +334,7 @@ def merge(sources: AnyPath | Sequence[AnyPath], path: AnyPath) -> None:
 def _is_merged(path: Path) -> bool:
     """Whether `merge` has written this file, and nothing has damaged it since; an `OSError` if it cannot be read."""
     try:
-        return not path.is_symlink() and path.is_file() and kind_of_hdf5(path, WANTED) == KIND
+        return not path.is_symlink() and path.is_file() and kind_of_hdf5(path, WANTED) == MERGED.kind
     except InputError:
         return False
 

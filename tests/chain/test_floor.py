@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpchain.inputs.floor import Floor, slope_points
+from warpchain.chain.floor import Floor, slope_points
 
 CIRCLES = 0.1 * np.array([[-1, 0], [0, -1], [1, 0], [0, -1], [1, 0], [0, 1]])
 RADIUS = np.full(6, 0.004)

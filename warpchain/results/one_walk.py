@@ -6,15 +6,15 @@ from typing import Annotated
 
 from pydantic import Field
 
+from warpchain.chain.keep import LONGEST_INTERVAL, Keep
+from warpchain.chain.setup import Setup
 from warpchain.engine.devices import gpu_turn
-from warpchain.inputs.setup import Setup
 from warpchain.inputs.validation import InputError, checked
 from warpchain.kernels.methods.method import find_method
+from warpchain.results.walk_result import WalkResult
 from warpchain.version import package_versions
-from warpchain.walks.motion import LONGEST_INTERVAL, Keep
 from warpchain.walks.scheduler import compile_kernels, run_setups
 from warpchain.walks.walk_phases import Progress
-from warpchain.walks.walk_result import WalkResult
 
 _INTERVAL = Annotated[float, Field(ge=1e-6, lt=LONGEST_INTERVAL)]  # as between two samples
 _BEFORE = Annotated[float, Field(ge=0, le=LONGEST_INTERVAL)]
@@ -41,14 +41,10 @@ def run_walk(
     method = setup.options.method
     if record_loads and find_method(method).has_rigid_flight:
         raise InputError(f"options.method: {method!r} has rigid joints, without forces; give explicit")
-    samples = 0.0 if interval is None else interval / setup.options.record_interval
-    keep = Keep(
-        series_every=1,
-        frame_every=None if interval is None else max(1, round(samples)),
-        frame_interval=interval if interval is not None and samples <= 0.999 else 0.0,
-        loads=record_loads,
-        before=(RECORD_BEFORE if before is None and interval is not None else before or 0.0) * setup.has_drive,
-    )
+    if not setup.has_drive:
+        before = 0.0
+    earlier = RECORD_BEFORE if before is None else before
+    keep = Keep.asked(interval, earlier, record_loads, setup.options.record_interval)
     report = on_progress or (lambda progress: None)
     with gpu_turn([setup.options.device]):
         report(Progress("compile", 0.0, 0.0, 0))
@@ -56,8 +52,8 @@ def run_walk(
         started = time.perf_counter()
         ((_, run),) = run_setups([setup], keeps=[keep], watch=lambda run: report(run.progress()))
         return WalkResult(
-            **run.outcome(),
-            **run.recorder.motion(run.datum),
+            **vars(run.outcome()),
+            **run.motion(),
             setup=setup,
             seed=seed,
             versions=package_versions(),

@@ -1,0 +1,286 @@
+"""One chain of a batch, as the host sees it between launches: what is set before, read behind, taken out and put back.
+
+Phases of walks, recorders, experiments with given chains and `bench` work on worlds. The names of arrays, such as
+`state/time`, are those of the structs in `warpchain.kernels.types`; no other wing knows them.
+"""
+
+import hashlib
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpchain.chain.floor import Floor
+from warpchain.chain.link_values import LinkValues, alternating
+from warpchain.chain.setup import Setup
+from warpchain.engine.tallies import COUNTS, EXTREMES, LOSSES
+from warpchain.inputs.arrays import Array
+from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.validation import InputError
+from warpchain.kernels import layout
+from warpchain.kernels.types import LOADING_TIME, Drive, State
+from warpchain.status import Status
+
+Snapshot = Mapping[str, NDArray[Any]]
+"""Name → one world's part of an array."""
+
+KEPT: Final = ("state/", "drive/")
+"""How the names of arrays begin that are kept."""
+CACHES: Final = ("scratch", "lists")
+"""What follows from the state but for rounding, and fits a chain of the same constants and options only."""
+_LAYOUT: Final = "layout"
+"""Name in a snapshot of the digest of rows and fields that it has."""
+FIRST_STEP = 1e-7  # s; it may grow fivefold per step
+
+
+def _beginning() -> dict[str, Any]:
+    """Fields of :class:`State` of a chain whose clock is at zero."""
+    watch, sample = np.full(layout.WATCH_ROWS, -1.0), np.zeros(layout.ALL_COLUMNS)
+    watch[layout.GREATEST_LEAN], watch[layout.LAST_FLOOR_IMPULSE], sample[layout.TIME] = 0.0, -np.inf, -1.0
+    zeros = ("time", "gap", "time_to_contact", "slack", "next_sample", "counts", "extremes", "losses", "closing_time")
+    ones = ("load_factor", "is_fresh", "last_error")
+    known = {"step": FIRST_STEP, "other_step": FIRST_STEP, "watch": watch, "last_sample": sample}
+    return known | dict.fromkeys((*zeros, "has_first_stage", "is_rigid"), 0) | dict.fromkeys(ones, 1)
+
+
+_BEGINNING = _beginning()
+
+
+def _layout_digest() -> NDArray[np.uint8]:
+    """What tells snapshots apart that kernels would read otherwise, as bytes: numbers of rows, fields of structs."""
+    rows = sorted((name, value) for name, value in vars(layout).items() if name.isupper() and isinstance(value, int))
+    text = repr((rows, [*State.vars], [*Drive.vars]))
+    return np.frombuffer(hashlib.sha256(text.encode()).digest(), dtype=np.uint8)
+
+
+class Recorded(NamedTuple):
+    """What launches have recorded of a chain of n links: t samples and f frames, see :mod:`warpchain.kernels.layout`.
+
+    Samples are (t, SAMPLE_COLUMNS), or ALL_COLUMNS if planes are kept; of the frames there are times [s], (f,), joints
+    x, y [m], (f, n, 2), loads: force x, y [N] and moment [N m] of each joint on the link before it, (f, n, 3), and
+    planes, (f, PLANE_VALUES). Of loads and planes that are not kept f is 0.
+    """
+
+    samples: Array
+    times: Array
+    frames: Array
+    loads: Array
+    planes: Array
+
+
+class World:
+    """One chain of a batch, or several that are set and read alike, between launches.
+
+    Values that are set may be arrays over several worlds, axis 0; what is said of one entry is for one world.
+    """
+
+    def __init__(
+        self, at: int | Sequence[int], host: Mapping[str, NDArray[Any]], caches: Mapping[str, wp.array]
+    ) -> None:
+        """See worlds by their numbers in the arrays of a batch, those on the host and those that stay on the device."""
+        self._at: Any = at
+        self._host, self._caches = host, caches
+        self.records = host["record/samples"].shape[1] > 0 or host["record/frames"].shape[1] > 0
+        """Whether samples or frames are kept."""
+        self._longest = host["state/links"].shape[2]
+
+    @property
+    def links(self) -> int:
+        """Number of links n, of several worlds the greatest."""
+        return int(np.max(self._host["model/chains"]["link_count"][self._at]))
+
+    def set_up(self, setup: Setup) -> None:
+        """Set chain and floor, which stay the same through a walk."""
+        self.set_chain(setup.parameters, setup.scene.links, setup.link_values, setup.contact_radius)
+        self.set_floor(setup.floor)
+
+    def set_chain(
+        self, parameters: Parameters, links: int, own: LinkValues | None = None, sprocket: float | None = None
+    ) -> None:
+        """Set the chain and the radius of its sprocket [m], by default its parameter; by default, links alternate."""
+        own, half, chains = (
+            own or alternating(parameters, links),
+            parameters.link_length / 2,
+            self._host["model/chains"],
+        )
+        values = vars(parameters) | {
+            "link_count": links,
+            "half_length": half,
+            "inverse_square": 1 / (half * half),
+            "mass": own.total_mass,
+            "circle_radius": own.radius.max(),
+            "inverse_smoothing": 1 / parameters.friction_smoothing,
+            "sprocket_radius": parameters.sprocket_radius if sprocket is None else sprocket,
+        }
+        for name in chains.dtype.names or ():
+            chains[name][self._at] = values.get(name, 0)
+        self._host["model/links"][self._at, :, :links] = tuple(vars(own).values())  # in the order of the layout
+
+    def set_floor(self, floor: Floor) -> None:
+        """Set the floor, after the chain, for whose size the floor's cells are made."""
+        chain = self._host["model/chains"][self._at]
+        cells = floor.cells(2 * chain["half_length"], chain["circle_radius"])
+        for name, rows in (("model/faces", floor.faces()), ("model/cells", cells)):
+            self._host[name][self._at, : len(rows)] = rows
+
+    def load(
+        self,
+        position: Array,
+        velocity: Array,
+        *,
+        stop_time: float,
+        stop_status: Status,
+        attempts_before: int = 0,
+        softness: float = 0.0,
+        has_frame_marks: bool = False,
+    ) -> None:
+        """Set the state of the chain and start its clock at zero; its statistics and watches start anew.
+
+        Position, (n, 3), is x, y [m], θ [rad], velocity their rates. The run ends exactly at the stop time [s], with
+        the stop status. Attempts of earlier phases count towards the option `step_limit`. Softness is that of joints,
+        see :mod:`warpchain.kernels.events.softening`. Frames are taken with samples, or at `frame_interval`.
+        """
+        marks = 0 if has_frame_marks else -1
+        self.set_state(**_BEGINNING, next_frame=marks, softness=softness, attempts_before=attempts_before)
+        self._host["record/sample_count"][self._at] = self._host["record/frame_count"][self._at] = 0
+        self.place(position, velocity)
+        self.resume(stop_time, stop_status)
+
+    def set_state(self, **values: float | Array) -> None:
+        """Set fields of :class:`State`."""
+        for name, value in values.items():
+            self._host[f"state/{name}"][self._at] = value
+
+    def set_drive(self, **values: float | Array) -> None:
+        """Set fields of :class:`Drive`."""
+        for name, value in values.items():
+            self._host[f"drive/{name}"][self._at] = value
+
+    def place(self, position: Array, velocity: Array) -> None:
+        """Give the chain another place and rates, (n, 3) each, of w chains (w, n, 3); losses start anew."""
+        rows = np.concatenate([position, velocity], axis=-1).swapaxes(-1, -2)
+        self._host["state/links"][self._at, :, : rows.shape[-1]] = rows
+        self.set_state(is_fresh=1)
+
+    def resume(self, stop_time: float, stop_status: Status) -> None:
+        """Let a chain that has stopped run on to a later time, as if it had not stopped there."""
+        self.set_state(stop_time=stop_time, stop_status=int(stop_status), status=int(Status.RUNNING))
+
+    def set_plane(self, plane: Array) -> None:
+        """Set the plane of the chain, which tilts: (PLANE_VALUES,), see :mod:`warpchain.kernels.layout`."""
+        rows = np.zeros(layout.PLANE_ROWS)
+        for first in (0, layout.PLANE_MID):
+            rows[first : first + layout.PLANE_VALUES] = plane
+        self.set_state(plane=rows)
+
+    @property
+    def plane(self) -> Array:
+        """The plane of the chain, if it tilts: (PLANE_VALUES,), see :mod:`warpchain.kernels.layout`."""
+        return np.array(self._host["state/plane"][self._at, : layout.PLANE_VALUES])
+
+    @property
+    def position(self) -> Array:
+        """Places of the links, (n, 3): x, y [m], θ [rad]; of w chains of equal length (w, n, 3)."""
+        return self._host["state/links"][self._at, :3, : self.links].swapaxes(-1, -2).copy()
+
+    @property
+    def velocity(self) -> Array:
+        """Their rates, of the same shape."""
+        return self._host["state/links"][self._at, 3:, : self.links].swapaxes(-1, -2).copy()
+
+    @property
+    def status(self) -> Status:
+        """Status of the chain."""
+        return Status(int(self._host["state/status"][self._at]))
+
+    @property
+    def time(self) -> float:
+        """Time [s] since loading."""
+        return float(self._host["state/time"][self._at])
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Counters since loading."""
+        return dict(zip(COUNTS, self._host["state/counts"][self._at].tolist(), strict=True))
+
+    @property
+    def extremes(self) -> dict[str, float]:
+        """Greatest joint opening and depths [m] since loading."""
+        return dict(zip(EXTREMES, self._host["state/extremes"][self._at].tolist(), strict=True))
+
+    @property
+    def losses(self) -> dict[str, float]:
+        """Energy [J] lost since loading, by cause."""
+        return dict(zip(LOSSES, self._host["state/losses"][self._at].tolist(), strict=True))
+
+    @property
+    def first_sample(self) -> Array:
+        """The sample taken when the run began: (SAMPLE_COLUMNS,), see :mod:`warpchain.kernels.layout`."""
+        return np.array(self._host["state/first_sample"][self._at])
+
+    @property
+    def last_sample(self) -> Array:
+        """The chain's latest sample: (SAMPLE_COLUMNS,), that of the final state if its run has ended."""
+        return np.array(self._host["state/last_sample"][self._at])
+
+    def watched(self, row: int) -> float:
+        """An entry of :attr:`State.watch` that is −1 until it is set, and then not negative; NaN while it is not."""
+        entry = float(self._host["state/watch"][self._at, row])
+        return entry if entry >= 0 else math.nan
+
+    @property
+    def unloaded_at(self) -> float:
+        """Time [s] since loading from which a held loop has been under its own loads; NaN if it was not watched."""
+        since = self.watched(layout.UNLOADED_SINCE) + float(LOADING_TIME)
+        return self.watched(layout.LOADED_SINCE) if math.isnan(since) else since
+
+    def drain(self) -> Recorded:
+        """Take what launches have recorded since it was last taken."""
+        n, names = self.links, ("samples", "frame_times", "frames", "frame_loads")
+        samples, times, frames, loads = (self._host[f"record/{name}"][self._at] for name in names)
+        taken, count = (int(self._host[f"record/{name}"][self._at]) for name in ("sample_count", "frame_count"))
+        self._host["record/sample_count"][self._at] = self._host["record/frame_count"][self._at] = 0
+        rows = frames[:count]
+        return Recorded(
+            samples=samples[:taken].copy(),
+            times=times[:count].copy(),
+            frames=rows[:, : 2 * n].reshape(-1, 2, n).transpose(0, 2, 1).copy(),
+            loads=loads[:count, : 3 * n].reshape(-1, 3, n).transpose(0, 2, 1).copy(),
+            planes=rows[:, 2 * self._longest :].reshape(-1, layout.PLANE_VALUES).copy(),
+        )
+
+    def snapshot(self) -> dict[str, NDArray[Any]]:
+        """All that the next launch depends on."""
+        kept = {name: np.array(values[self._at]) for name, values in self._host.items() if name.startswith(KEPT)}
+        caches = {name: np.array(array[self._at].numpy()) for name, array in self._caches.items()}
+        return kept | caches | {_LAYOUT: _layout_digest()}
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Put a snapshot back, of a chain of equal length, options and parameters; its caches may be absent.
+
+        An `InputError` says that a warpchain with other rows or fields kept it.
+        """
+        if not np.array_equal(snapshot[_LAYOUT], _layout_digest()):
+            raise InputError("start: a warpchain with other kernels kept this state; take it anew from its walk")
+        for name, values in snapshot.items():
+            if name.startswith(KEPT):
+                self._host[name][self._at] = values
+        for name, array in self._caches.items():
+            if name in snapshot:
+                own = array[self._at]
+                wp.copy(own, wp.array(snapshot[name], dtype=own.dtype, device=own.device))
+
+    def change(self, position: Array, velocity: Array) -> None:
+        """Give a chain that was restored another state, of which nothing is known; its losses and samples start anew.
+
+        Its clock, the softness of its joints, its counters and its watches go on.
+        """
+        self.place(position, velocity)
+        self.set_state(**dict.fromkeys(("has_first_stage", "gap", "time_to_contact", "slack", "losses"), 0))
+        if self._host["state/is_rigid"][self._at]:  # joints become rigid again as soon as they are quiet
+            step, other = (float(self._host[f"state/{name}"][self._at]) for name in ("step", "other_step"))
+            self.set_state(step=other, other_step=step, is_rigid=0, last_error=1.0)
+        self._host["state/last_sample"][self._at, layout.TIME] = -1.0

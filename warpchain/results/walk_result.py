@@ -1,0 +1,249 @@
+"""What a run returns, and the HDF5 file that keeps a walk.
+
+A saved walk has the groups `series` (time series), `frames` (joint positions), `summary` (numbers), `parameters` (the
+chain's quantities with their symbols) and, if that was kept, `before_release`; every dataset has its unit and meaning.
+The attributes `setup`, `seed` and `versions`, in JSON, say how to make the walk again. Shards and merged files of
+sweeps keep the motion of a walk in the same groups.
+
+Its fields are those of `warpchain.walks.walk_numbers`.
+"""
+
+import json
+import os
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from warpchain.chain.resolution import SECTIONS
+from warpchain.chain.setup import Setup, State
+from warpchain.files import write_whole
+from warpchain.hdf5_files import Format, hdf5_image, put, read_fields, reading_hdf5, write_fields
+from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.validation import InputError, checked_path, json_value, validated
+from warpchain.loop.stationary_loop import FIELDS
+from warpchain.pictures.labels import Kind
+from warpchain.status import Status
+from warpchain.walks.landmarks import MOST_ENERGY_ERROR
+from warpchain.walks.restart import state_at
+from warpchain.walks.walk_numbers import NUMBERS, STORED, WalkNumbers, read_motion, write_motion
+
+if TYPE_CHECKING:
+    import h5py
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WANTED: Final = "give a saved walk; `walk --like SWEEP --index I` saves one"
+SHOWN: Final = 12_000
+"""Joints that a notebook keeps of the frames of a walk: 200 frames of 60 links take 0.12 MB."""
+
+_GROUP: Final = "start"
+"""Group of the state that a walk began from, so that it can be run again to the bit."""
+_STATE: Final = {
+    "position": ("m, m, rad", "x, y and angle of each link"),
+    "velocity": ("m/s, m/s, rad/s", "their rates"),
+    "origin": ("m", "origin of the plane's coordinates in the room"),
+    "axes": ("1", "axes of x and y of the plane in the room"),
+    "plane_rates": ("m/s, rad/s, rad/s", "speed across the plane, and its turning rates about x and y"),
+}
+_FORMAT: Final = Format.of("warpchain walk", STORED, FIELDS, {name: unit for name, (unit, _) in _STATE.items()})
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class WalkResult(WalkNumbers):
+    """One walk, from the release to its end: t instants and f frames of a chain of n links.
+
+    Time counts from the release, x from the centre of sprocket or ellipse, y up from the floor. Units, meanings and
+    shapes stand beside the fields. Time series have a row at every `record_interval` exactly, and at the end; at an
+    impact a row of a velocity or an energy lies between the values before and after. Frames are at the ends of steps.
+    `setup` is complete; `seed` is that of the random draw, None if nothing was drawn; `versions` names the software.
+    `before_release` is the motion on the sprocket just before the release, None if it was not kept.
+    """
+
+    def __repr__(self) -> str:
+        """One line with the most important numbers."""
+        error = self.energy_error
+        warning = f", energy error {error:.1e}" if error > MOST_ENERGY_ERROR else ", inaccurate" * bool(self.warnings())
+        return (
+            f"<WalkResult {self.status.label}: dx {self.dx:.4g} m in {self.walk_time:.4g} s, "
+            f"{self.bounces} bounce{'s' * (self.bounces != 1)}, {self.setup.described}, {self.setup.preset}{warning}>"
+        )
+
+    def state(self, t: float) -> State:
+        """The chain at the end of its first step at or after a time, as samples and frames are taken.
+
+        The walk is run again until then, which takes as long as it took the first time. `warpchain.walk(start=state)`
+        goes on with it, `dataclasses.replace` perturbs it.
+
+        Args:
+            t: time since the release [s], at most `walk_time`; not before the sprocket of a `release` vanishes, of
+                which a state knows nothing.
+
+        Raises:
+            InputError: `t` is no such time, the chain was never released, or the device of the walk is not here.
+        """
+        is_released = not np.isnan(self.energy["kinetic_at_release"])
+        return state_at(self.setup, t, self.walk_time if is_released else np.nan)
+
+    def plot(
+        self, kind: Kind = "height_and_speed", *, figure: "Figure | None" = None, ax: "Axes | None" = None
+    ) -> "Figure":
+        """Draw the walk.
+
+        Args:
+            kind: `height_and_speed` of the centre of mass, `film_strip` for the chain itself, `loop` for its loop on
+                the sprocket just before the release, `energy` for its energies, `tilt` for tilt, yaw and lateral drift
+                of a plane that tilts.
+            figure: an empty matplotlib figure to draw into; by default a new one, which a notebook shows.
+            ax: where to draw `energy`, the only figure with one pair of axes.
+
+        Returns:
+            The figure, that of `ax` if it is given.
+
+        Raises:
+            ValueError: the kind is unknown, the walk does not have what it shows (frames, `before_release`,
+                energies), or `ax` does not suit the kind.
+        """
+        from warpchain.pictures.walk_figures import draw
+
+        return draw(self, kind, figure=figure, ax=ax)
+
+    def animate(self, path: str | os.PathLike[str], *, fps: float = 30.0, slow: float = 4.0) -> None:
+        """Write a moving picture of the walk; the suffix of `path` gives the format: .gif, .mp4 or .html.
+
+        Args:
+            path: the file to write, whole or not at all; an older one is replaced.
+            fps: pictures per second of playing time; in a .html file the browser decides.
+            slow: playing time per simulated time; in a .html file the value at the start.
+
+        Raises:
+            ValueError: the walk has no frames, the suffix is another, `fps` or `slow` is not positive, or a GIF or
+                MP4 would have too many pictures.
+            ImportError: an .mp4 is asked for, and imageio-ffmpeg is not installed.
+            OSError: the file cannot be written.
+        """
+        from warpchain.pictures.animation import animate
+
+        animate(self, path, fps=fps, slow=slow)
+
+    def _repr_png_(self) -> bytes | None:
+        """The film strip, or height and speed if there are no frames; None if there is nothing to draw."""
+        from warpchain.pictures.style import first_png
+
+        return first_png(partial(self.plot, kind) for kind in ("film_strip", "height_and_speed"))
+
+    def _repr_html_(self) -> str:
+        """The most important numbers, why the walk is inaccurate if it is, a player if there are frames, the picture.
+
+        What shows no frames, such as a notebook that is not trusted, shows the picture.
+        """
+        from warpchain.pictures.player import framed_player
+        from warpchain.pictures.style import fragment
+
+        shown = fragment("\n".join([repr(self), *self.warnings()]), self._repr_png_())
+        try:
+            return framed_player(self, max(60, SHOWN // self.setup.scene.links)) + shown
+        except ValueError:  # no frames, or broken ones
+            return shown
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything but time series and frames, for JSON; a number that is not finite is None."""
+        plain: dict[str, Any] = json_value(
+            {
+                "dx": self.dx,
+                "status": self.status.label,
+                "status_sentence": self.status.sentence,
+                **{name: getattr(self, name) for name in NUMBERS},
+                **{name: getattr(self, name) for name in ("sprocket_center", "sprocket_radius", "energy_error")},
+                **_setup_as_dict(self.setup),
+                "seed": self.seed,
+                "versions": self.versions,
+            }
+        )
+        return plain
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the walk to an HDF5 file, whole or not at all; an older file of that name is replaced.
+
+        Raises:
+            OSError: the file cannot be written, or something else than a regular file is there; one line that names it.
+        """
+        write_whole(path, hdf5_image(_FORMAT, self._fill))
+
+    def _fill(self, file: "h5py.File") -> None:
+        """Fill an empty file."""
+        file.attrs["status"], file.attrs["status_sentence"] = self.status.label, self.status.sentence
+        file.attrs["setup"] = json.dumps(_setup_as_dict(self.setup), allow_nan=False)
+        file.attrs["seed"], file.attrs["versions"] = json.dumps(self.seed), json.dumps(self.versions)
+        write_fields(file, vars(self), NUMBERS)
+        write_motion(file, vars(self))
+        if self.setup.start is not None:
+            write_state(file, self.setup.start)
+        for name, quantity in Parameters.quantities().items():
+            value = getattr(self.setup.parameters, name)
+            put(file, f"parameters/{name}", value, quantity.unit, quantity.meaning).attrs["symbol"] = quantity.symbol
+
+
+def load_walk(path: str | os.PathLike[str]) -> WalkResult:
+    """Read a walk that `WalkResult.save` wrote, or the `walk.h5` of a folder; every number comes back to the bit.
+
+    Raises:
+        OSError: the file cannot be read.
+        InputError: the file is no walk, or belongs to another version of warpchain. It is a `ValueError`.
+        DamagedFileError: the file is damaged, cut short or of an earlier warpchain. It is an `InputError`.
+    """
+    path = checked_path(path, "path")
+    if os.path.isdir(path):
+        record = os.path.join(path, "walk.h5")
+        if not os.path.exists(record) and os.path.exists(os.path.join(path, "sweep.h5")):
+            raise InputError(f"{path}: the folder of a sweep, not of a saved walk; {WANTED}")
+        path = record
+    remedy = "run the walk again, or fetch another copy of the file"
+    with reading_hdf5(path, _FORMAT, remedy, WANTED) as file:
+        given = json.loads(file.attrs["setup"])
+        try:
+            sections: Any = {name: validated(model, given[name], name) for name, model in SECTIONS.items()}
+            setup = Setup(preset=given["preset"], **sections)
+            setup = replace(setup, start=read_state(file, setup))
+        except InputError as error:
+            raise InputError(f"{path}: {error}; read it with the version that wrote it") from None
+        return WalkResult(
+            status=Status[file.attrs["status"].upper()],
+            setup=setup,
+            seed=json.loads(file.attrs["seed"]),
+            versions=json.loads(file.attrs["versions"]),
+            **read_fields(file, NUMBERS, setup.scene.links),
+            **read_motion(file, setup.scene.links),
+        )
+
+
+def _setup_as_dict(setup: Setup) -> dict[str, Any]:
+    models = {name: getattr(setup, name).model_dump() for name in ("parameters", "scene", "options")}
+    return {"preset": setup.preset, **models}
+
+
+def write_state(file: "h5py.File", state: State) -> None:
+    """Write a state of a walk; its setup is that of the file."""
+    put(file, f"{_GROUP}/time", state.time, "s", "time since the release")
+    for name, (unit, meaning) in _STATE.items():
+        if (values := getattr(state, name)) is not None:
+            put(file, f"{_GROUP}/{name}", values, unit, meaning)
+    for name, values in state.memory.items():
+        put(file, f"{_GROUP}/memory/{name}", values, "1", "what else the walk had then")
+
+
+def read_state(file: "h5py.File", setup: Setup) -> State | None:
+    """The state that a walk began from; None if it began as its scene says."""
+    if _GROUP not in file:
+        return None
+    group, memory = file[_GROUP], {}
+
+    def remember(name: str, node: object) -> None:
+        if hasattr(node, "dtype"):
+            memory[name] = np.array(node)
+
+    if "memory" in group:
+        group["memory"].visititems(remember)
+    arrays = {name: group[name][()] for name in _STATE if name in group}
+    return State(setup=setup, time=float(group["time"][()]), memory=memory, **arrays)

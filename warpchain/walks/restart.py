@@ -1,0 +1,65 @@
+"""States of a walk: taken by running it again until then, with all that its rest depends on.
+
+`WalkResult.state` takes one; `WalkRun` goes on from one.
+"""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpchain.chain.setup import Setup, State
+from warpchain.engine.batch import Batch
+from warpchain.engine.devices import gpu_turn
+from warpchain.inputs.validation import InputError, checked
+from warpchain.status import Status
+from warpchain.walks.moving_plane import state_of_plane
+from warpchain.walks.walk_phases import WalkRun
+
+
+def memory_of(run: WalkRun) -> dict[str, NDArray[Any]]:
+    """All that the rest of a walk, or of its outcome, depends on: a `State.memory`."""
+    return {**run.world.snapshot(), "setup": run.setup.fingerprint, **run.driven.memory}
+
+
+def state_at(setup: Setup, t: object, end: float) -> State:
+    """The state of a walk at the end of its first step at or after a time [s], see `WalkResult.state`.
+
+    Launches that go past that step are undone and shortened, down to one attempt: so the walk makes the steps that it
+    always makes, and none for this time. Its end [s] is NaN if it came before the release. An `InputError` says that
+    there is no such time, or that the walk, run again, ends before.
+    """
+    time: float = checked(t, "t", float, "s")
+    first = setup.scene.release[-1][0] if setup.scene.release is not None else 0.0  # then the sprocket vanishes
+    if setup.start is not None:
+        first = setup.start.time
+    if np.isnan(end):
+        raise InputError("t: the walk ended before its release, and has no such time; see its status")
+    if setup.start is None and 0 <= time < first:
+        remedy = "give more" if end >= first else f"but the walk ends at {end:g} s: it has no state"
+        raise InputError(f"t: {time:g} s: the sprocket is there until {first:g} s, and a state has none; {remedy}")
+    if not first <= time <= end:
+        raise InputError(f"t: {time:g} s is not in the walk; give a time from {first:g} to {end:.6g}")
+    with gpu_turn([setup.options.device]):
+        batch = Batch(1, setup.scene.links, setup.options, faces=len(setup.floor.laws))
+        world = batch.worlds[0]
+        run = WalkRun(world, setup)
+        attempts = batch.attempts_of_launch
+        for features in run.phases():
+            while not (has_come := run.is_free and world.time >= time) and world.status == Status.RUNNING:
+                before = world.snapshot() if run.is_free else None
+                batch.launch([0], features, attempts)
+                if before is not None and world.time >= time and attempts > 1:
+                    world.restore(before)
+                    attempts = max(1, attempts // 8)
+            if has_come:
+                return State(
+                    position=world.position,
+                    velocity=world.velocity,
+                    setup=replace(setup, start=None),
+                    time=world.time,
+                    memory=memory_of(run),
+                    **(state_of_plane(world.plane) if setup.scene.plane == "tilting" else {}),
+                )
+        raise InputError(f"t: run again, the walk ends as {run.status.label} at {world.time:.6g} s; give less")

@@ -1,0 +1,144 @@
+"""All that is known of one walk: its numbers, its motion, what it was, and what follows from them.
+
+Figures draw a `WalkNumbers`; `warpchain.results.walk_result` gives it to a user. The annotations of `Outcome` and
+`WalkNumbers` are the one table of a walk's quantities: files, columns of a sweep, units and the reference derive from
+them.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import numpy as np
+
+from warpchain.chain.setup import Setup
+from warpchain.hdf5_files import Stored, read_fields, stored_fields, write_fields
+from warpchain.inputs.arrays import Array
+from warpchain.loop.stationary_loop import BEFORE, FIELDS, BeforeRelease, StationaryLoop, average_loop
+from warpchain.walks.landmarks import FAULTS, LENGTHS, bounces, energy_error, faults, least
+from warpchain.walks.outcome import Outcome
+
+if TYPE_CHECKING:
+    import h5py
+
+_FIXED: Final = "if the plane is fixed"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class WalkNumbers(Outcome):
+    """All that is known of one walk, t instants and f frames of a chain of n links; units stand beside the fields."""
+
+    wall_time: Annotated[float, Stored("s", "that the computer took, without the compilation of kernels")]
+    setup: Setup
+    seed: int | None
+    versions: dict[str, str]
+    time: Annotated[Array, Stored("s", "time since the release", "t")]
+    center: Annotated[Array, Stored("m", "centre of mass x, y", "t 2")]
+    center_velocity: Annotated[Array, Stored("m/s", "velocity of the centre of mass x, y", "t 2")]
+    kinetic_energy: Annotated[Array, Stored("J", "kinetic energy", "t")]
+    gravitational_energy: Annotated[Array, Stored("J", "energy of gravity, from the floor below the release", "t")]
+    spring_energy: Annotated[Array, Stored("J", "energy of the joint springs", "t")]
+    lowest: Annotated[Array, Stored("m", "height of the lowest point of all circles", "t")]
+    rms_speed: Annotated[Array, Stored("m/s", "root mean square speed of the links", "t")]
+    frame_time: Annotated[Array, Stored("s", "time since the release", "f")]
+    frame_joints: Annotated[Array, Stored("m", "joints x, y; joint i ends link i, even links inner", "f n 2")]
+    frame_forces: Annotated[
+        Array,
+        Stored(
+            "N",
+            "force x, y in each joint on the link that it ends, with the stiffness and damping of the moment, softened "
+            "just after the release and after a collapse",
+            "f n 2",
+            empty="if not recorded",
+        ),
+    ]
+    frame_moments: Annotated[
+        Array, Stored("N m", "friction moment in each joint on the link that it ends", "f n", empty="if not recorded")
+    ]
+    center_z: Annotated[Array, Stored("m", "centre of mass z, to the right", "t", _FIXED)]
+    tilt: Annotated[Array, Stored("rad", "tilt of the plane", "t", _FIXED)]
+    yaw: Annotated[Array, Stored("rad", "heading of the plane's x axis, anticlockwise, turns counted", "t", _FIXED)]
+    frame_origin: Annotated[Array, Stored("m", "origin of the plane's coordinates in the room", "f 3", _FIXED)]
+    frame_axes: Annotated[Array, Stored("1", "axes of x and y of the plane in the room", "f 2 3", _FIXED)]
+    before_release: BeforeRelease | None = None
+
+    @property
+    def sprocket_center(self) -> Array | None:
+        """Centre of the sprocket x, y at the release [m], shape (2,); None without one."""
+        return None if np.isnan(self.sprocket_height) else np.array([0.0, self.sprocket_height])
+
+    @property
+    def sprocket_radius(self) -> float:
+        """Radius of the sprocket that links touch [m]; NaN without one."""
+        had_none = self.setup.start is not None and np.isnan(self.sprocket_height)
+        return np.nan if had_none or not self.setup.scene.is_on_sprocket else self.setup.contact_radius
+
+    @property
+    def joints_in_room(self) -> Array | None:
+        """Joints x, y, z [m] in the room, (f, n, 3), if the plane tilts; else None: `frame_joints` are in the room."""
+        if self.setup.scene.plane == "fixed":
+            return None
+        return self.frame_origin[:, None, :] + self.frame_joints @ self.frame_axes
+
+    @property
+    def energy_error(self) -> float:
+        """Size of the energy unaccounted for, relative to the energy at release; above 0.05 the walk is inaccurate."""
+        at_release = self.energy["kinetic_at_release"] + self.energy["potential_at_release"]
+        return float(energy_error(at_release, self.energy["residual"]))
+
+    def warnings(self) -> list[str]:
+        """Why the walk is inaccurate, each with what to try: energy, joints or contacts; empty if it is not."""
+        values = vars(self.setup.scene) | vars(self.setup.parameters)
+        lengths = {name: least(values[name]) for name in LENGTHS}
+        deepest = max(self.greatest_penetration.values())
+        found = faults(self.energy_error, self.greatest_opening, deepest, lengths)
+        return [FAULTS[name] for name, is_there in found.items() if is_there]
+
+    def mean_loop(self) -> StationaryLoop:
+        """The loop on its sprocket just before the release: its mean shape, the forces in it, its kink.
+
+        Raises:
+            ValueError: the walk has kept nothing of that time, or too little.
+        """
+        return average_loop(self.setup, self.before_release, self.sprocket_center)
+
+    def bounce_table(self) -> dict[str, Array]:
+        """The bounces off a flat or sloping floor: columns of equal length, for example for `pandas.DataFrame`.
+
+        `start` and `end` of contact [s], to a sample; `impulse_x`, `impulse_y` of the floor on the chain [N s];
+        `sticks_at` [s], the first sample until which not all that touched slid one way (NaN: all did). A walk without
+        series, or that was never released, has none.
+
+        Raises:
+            InputError: the plane tilts, or the floor is a profile.
+        """
+        return bounces(self.time, self.center_velocity, self.setup)
+
+    def unit(self, name: str) -> str:
+        """SI unit of a field; a `KeyError` if there is none of that name."""
+        return STORED[name].unit
+
+    def meaning(self, name: str) -> str:
+        """One line saying what a field is; a `KeyError` if there is none of that name."""
+        return STORED[name].described
+
+
+STORED: Final = stored_fields(WalkNumbers)
+"""Fields of `WalkNumbers` that a file keeps: name → unit, meaning, shape."""
+NUMBERS: Final = {name: stored for name, stored in STORED.items() if not stored.shape}
+"""Those that are numbers, or dictionaries of them."""
+MOTION: Final = {name: stored for name, stored in STORED.items() if stored.shape}
+"""Those that are arrays."""
+
+
+def write_motion(group: "h5py.Group", values: Mapping[str, Any], joints: type = np.float64) -> None:
+    """Write the arrays of a walk, and `before_release`, into a group; `joints`: precision of what each joint has."""
+    write_fields(group, values, MOTION, joints)
+    if (before := values[BEFORE]) is not None:
+        write_fields(group.create_group(BEFORE, track_order=True), vars(before), FIELDS, joints)
+
+
+def read_motion(group: "h5py.Group", links: int) -> dict[str, Any]:
+    """What `write_motion` wrote of a chain of so many links."""
+    before = BeforeRelease(**read_fields(group[BEFORE], FIELDS, links)) if BEFORE in group else None
+    return {**read_fields(group, MOTION, links), BEFORE: before}
