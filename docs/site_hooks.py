@@ -1,17 +1,21 @@
 """MkDocs hooks: studies, notebooks, and files of the repository that pages link to, become part of the site.
 
 Pages link as GitHub needs it, such as `../sweeps/figure6.yaml`. In the site files of docs/ lie at the top, studies in
-`studies/`, all others in `repository/`. Formulas become MathML, which needs no script.
+`studies/`, all others in `repository/`; `live/` has walks that are computed for it. Formulas become MathML, which needs
+no script.
 """
 
 import json
 import os
 import re
+import tempfile
 from pathlib import Path
 from typing import Any
 
 from latex2mathml.converter import convert
 from mkdocs.structure.files import File, Files
+
+from warpchain.live_page.export import export_page
 
 ROOT = Path(__file__).parents[1]
 ROLE = re.compile(r":(?:attr|class|data|func|meth|mod):(?=<code>|`)")
@@ -69,7 +73,10 @@ def on_config(config: Any) -> Any:
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Add the notebooks, the pages of the studies, and all that pages link to."""
+    """Add the page of walks without a server, the notebooks, the pages of the studies, and all that pages link to."""
+    with tempfile.TemporaryDirectory() as folder:
+        walks = export_page(Path(folder)).read_text(encoding="utf-8")
+    files.append(File.generated(config, "live/index.html", content=walks))
     for path in sorted([*ROOT.glob("docs/notebooks/*.ipynb"), *ROOT.glob("studies/*/*.ipynb")]):
         page = in_site(path.relative_to(ROOT).as_posix())
         files.append(File.generated(config, page, content=notebook_page(path)))

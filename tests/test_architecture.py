@@ -20,7 +20,7 @@ LONGEST_FILE = 450
 STOREYS = (
     ("cli",),
     ("bench",),
-    ("films", "reports"),
+    ("films", "live_page", "reports"),
     ("run",),
     ("results",),
     ("pictures", "store"),

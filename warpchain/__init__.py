@@ -13,6 +13,8 @@ To run:
     simulate(...)    the motion of any given chain, without sprocket
     Chains(...)      many given chains, whose velocities may be changed between runs
 
+    live(folder)     a page in a notebook on which sliders change a walk
+
 To read:
 
     load(folder)     results of a sweep, as far as it has run
@@ -44,6 +46,7 @@ if TYPE_CHECKING:
     from warpchain.inputs.parameters import Parameters as Parameters
     from warpchain.inputs.parameters import preset as preset
     from warpchain.inputs.validation import InputError as InputError
+    from warpchain.live_page.server import live as live
     from warpchain.results.sweep_result import SweepResult as SweepResult
     from warpchain.results.sweep_result import load as load
     from warpchain.results.walk_result import WalkResult as WalkResult
@@ -67,6 +70,7 @@ _NAMES = {
     "inputs.parameters": "Parameters preset",
     "chain.setup": "State",
     "inputs.validation": "InputError",
+    "live_page.server": "live",
     "run.simulation": "Chains Trajectory simulate",
     "run.single_walk": "walk",
     "run.sweep_run": "sweep",

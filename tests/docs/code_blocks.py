@@ -12,7 +12,14 @@ from typing import Final
 ROOT: Final = Path(__file__).parents[2]
 PAGES: Final = [ROOT / "README.md", *sorted((*ROOT.glob("docs/**/*.md"), *ROOT.glob("studies/**/*.md")))]
 
-REASONS: Final = ("needs a GPU", "needs a cluster", "takes minutes", "sets up an environment", "needs your film")
+REASONS: Final = (
+    "needs a GPU",
+    "needs a cluster",
+    "takes minutes",
+    "sets up an environment",
+    "needs your film",
+    "runs until Ctrl-C",
+)
 """Why a block may not be run."""
 
 _FENCE: Final = re.compile(

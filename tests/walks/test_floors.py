@@ -11,7 +11,7 @@ import warpchain
 from tests.kernels.contacts.test_terrain import BOX, SOFT
 from tests.support.blocks_under_test import floor_with
 from warpchain import Status
-from warpchain.pictures.animation import player
+from warpchain.pictures.player import player
 
 STEP = [[-1.0, 0.0], [0.1, 0.0], [0.1, -0.05], [1.0, -0.05]]
 

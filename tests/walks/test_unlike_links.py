@@ -11,7 +11,8 @@ from tests.support.presets import SOFT
 from tests.support.setups import setup_walk
 from warpchain import Status
 from warpchain.chain.link_values import alternating
-from warpchain.pictures.chain import circle_radii, link_outlines
+from warpchain.pictures.chain import link_outlines
+from warpchain.pictures.places import circle_radii
 
 BRIEF = {"preset": "soft", "method": "explicit", "links": 36, "frequency": 15.0}
 """A short chain, which walks for a second of one core."""

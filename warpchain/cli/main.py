@@ -17,6 +17,7 @@ import typer
 
 from warpchain.cli.input_commands import bench, parameters, schema
 from warpchain.cli.interrupts import INTERRUPTED, interrupts_heard
+from warpchain.cli.live_command import live
 from warpchain.cli.sweep_commands import compile_kernels, info, merge, plot, report, sweep
 from warpchain.cli.walk_commands import FAILED, animate, walk
 from warpchain.files import DISK_FAILURES, described
@@ -104,6 +105,6 @@ def _warpchain(
         print(context.get_help())
 
 
-for _command in (walk, sweep, info, plot, report, merge, animate, parameters, schema, bench):
+for _command in (walk, sweep, info, plot, report, merge, animate, live, parameters, schema, bench):
     app.command()(_command)
 app.command("compile")(compile_kernels)

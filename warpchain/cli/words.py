@@ -21,9 +21,9 @@ def option(metavar: str, text: str, *names: str, **more: Any) -> Any:
     return typer.Option(*names, metavar=metavar, help=text, show_default=False, **more)
 
 
-def output(metavar: str, text: str) -> Any:
-    """The option -o, what a command writes."""
-    return option(metavar, text, "-o", "--output", parser=output_path)
+def output(metavar: str, text: str, *names: str) -> Any:
+    """The option -o, or that of other names, what a command writes."""
+    return option(metavar, text, *(names or ("-o", "--output")), parser=output_path)
 
 
 def argument(metavar: str, text: str, **more: Any) -> Any:

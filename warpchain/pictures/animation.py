@@ -3,10 +3,8 @@
 A film shows a walk to one scale, from the side, or from a corner if its plane tilts.
 """
 
-import html
 import importlib
 import itertools
-import json
 import math
 import os
 import subprocess
@@ -15,7 +13,6 @@ from typing import Annotated, Any, Final, cast
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 from pydantic import Field
 from scipy.spatial.transform import Rotation
@@ -24,9 +21,10 @@ from warpchain.files import checked_output, replacing, write_whole
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.validation import InputError, checked, short
 from warpchain.pictures import chain
-from warpchain.pictures.chain import center_in_room, checked_joints
 from warpchain.pictures.labels import headline
-from warpchain.pictures.style import BLUE, GROUND, INK, InlineFigure, tidy
+from warpchain.pictures.places import center_in_room, checked_joints, circle_radii, sprocket_circle, walk_box
+from warpchain.pictures.player import EDGE, INNER, OUTER, floor_marks, player, side_box
+from warpchain.pictures.style import GROUND, INK, InlineFigure, tidy
 from warpchain.walks.walk_numbers import WalkNumbers as Walk
 
 WIDTH, TALLEST = 960, 560
@@ -35,16 +33,11 @@ DPI: Final = 100
 MOST: Final = {".gif": 1200, ".mp4": 100_000}
 """Most pictures: those of a GIF are in memory at once, up to 0.5 MB each; so many of an MP4 take an hour."""
 
-INNER, OUTER, EDGE = "#9CCBE6", BLUE, "#00385A"
-"""Colours of inner links, of outer links and of their edges."""
-
 _CORNER: Final = (-35.0, 22.0)
 """View from the front right, slightly above: angles about the vertical, then about what points to the right."""
 _PADDING: Final = np.array([[50, 50], [50, 30]])
 """Pixels to the left and below, and to the right and above."""
 
-_PLAYER: Final = Path(__file__).with_name("player.html")
-"""The page with a player, which says what its data are."""
 _HOLD: Final = 1.5
 """Time for which GIF and MP4 show their last picture [s]."""
 
@@ -134,78 +127,23 @@ def _write_mp4(walk: Walk, path: Path, fps: float, slow: float) -> None:
             raise OSError("ffmpeg ended early") from error
 
 
-def player(walk: Walk, slow: float = 4.0) -> str:
-    """A page with a player of the frames from the side: lengths in tenths of a millimetre, times in microseconds.
-
-    It starts `slow` times slower than the walk. A `ValueError` says that the walk has no frames or broken ones.
-    """
-    joints, sprocket = checked_joints(walk), walk.sprocket_center
-    count = min(len(walk.frame_time), 2000)  # with 60 links the page has about 1 MB then
-    frames = np.rint(np.linspace(0, len(walk.frame_time) - 1, count)).astype(int)
-    times, box = walk.frame_time[frames], side_box(walk, joints)
-    marks = floor_marks(*box[0])
-    center = np.stack([np.interp(times, walk.time, walk.center[:, axis]) for axis in (0, 1)], axis=1)
-    places, ends = chain.sprocket_centers(walk, times), box[0] + np.array([-3, 3]) * np.ptp(box[0])
-    data = {
-        "time": _whole(times, 1e6),
-        "joints": _whole(joints[frames, :, :2].reshape(count, -1)),
-        "center": _whole(center),
-        "radii": _whole(chain.circle_radii(walk)),
-        "sprocket": None if sprocket is None else _whole(np.array([*sprocket, walk.sprocket_radius])),
-        "places": _whole(places[~np.isnan(places[:, 0])]),
-        "view": _whole(box.ravel()),
-        "marks": marks,
-        "heights": _whole(np.array(walk.setup.floor.heights(np.array(marks)))),
-        "floor": _whole(walk.setup.floor.line(*ends)),
-        "stretches": [[color, label, _whole(faces)] for color, label, faces in chain.stretches(walk, *ends)],
-        "slow": slow,
-        "colors": {"inner": INNER, "outer": OUTER, "edge": EDGE},
-    }
-    title = html.escape(headline(walk) + ", from the side" * (walk.joints_in_room is not None))
-    content = json.dumps(data, separators=(",", ":"), allow_nan=False)
-    return _PLAYER.read_text(encoding="utf-8").replace("{{title}}", title).replace("{{data}}", content)
-
-
-def _whole(values: NDArray[np.float64], parts: float = 1e4) -> list[int] | list[list[int]]:
-    """Numbers in whole parts, as lists: lengths [m] in tenths of a millimetre."""
-    whole: list[int] | list[list[int]] = np.rint(values * parts).astype(int).tolist()
-    return whole
-
-
-def floor_marks(low: float, high: float, most: int = 9) -> list[float]:
-    """Round numbers [m] along the floor between two ends."""
-    marks = MaxNLocator(most, steps=[1, 2, 5, 10]).tick_values(low, high)
-    return [round(float(mark), 6) for mark in marks if low <= mark <= high]
-
-
-def side_box(walk: Walk, joints: Array) -> Array:
-    """Left and right, bottom and top of what is shown from the side [m], shape (2, 2), with some of the floor.
-
-    It is at least as broad as high, so that titles and marks have room.
-    """
-    low, high = chain.walk_box(walk, joints)
-    broad = max(0.0, (high[1] - low[1]) - (high[0] - low[0])) / 2
-    low[0], high[0] = low[0] - broad, high[0] + broad
-    return np.array([[low[0], low[1] - 0.045 * max(high[:2] - low[:2])], high[:2]]).T
-
-
 class Film:
     """Draws frames of a walk, dashed where the sprocket was at the release; even pixels wide and high, for video."""
 
     def __init__(self, walk: Walk) -> None:
         """Fit the walk and the floor below it into the picture; a `ValueError` if frames are none or broken."""
         self._walk, self._joints, self._center = walk, checked_joints(walk), center_in_room(walk)
-        self._radii = chain.circle_radii(walk)
+        self._radii = circle_radii(walk)
         self._tilts = walk.joints_in_room is not None
         self._view = Rotation.from_euler("yx", _CORNER, degrees=True).as_matrix() if self._tilts else chain.SIDE
-        low, high = chain.walk_box(walk, self._joints)
+        low, high = walk_box(walk, self._joints)
         if not self._tilts:
             box = side_box(walk, self._joints)
         else:  # the floor at least as broad as the chain is high
             broad = max(0.0, high[1] - (high[2] - low[2])) / 2
             low[2], high[2] = low[2] - broad, high[2] + broad
             corners = np.array([[x, 0.0, z] for z in (low[2], high[2]) for x in (low[0], high[0])])
-            circle = chain.sprocket_circle(walk)
+            circle = sprocket_circle(walk)
             shown = [corners, self._joints.reshape(-1, 3), *([] if circle is None else [circle])]
             seen = np.concatenate(shown) @ self._view[:2].T
             box = np.array([seen.min(axis=0), seen.max(axis=0)]).T

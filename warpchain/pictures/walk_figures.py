@@ -21,8 +21,8 @@ from warpchain.inputs.arrays import Array
 from warpchain.inputs.validation import InputError, shown
 from warpchain.loop.stationary_loop import StationaryLoop
 from warpchain.pictures import chain
-from warpchain.pictures.chain import center_in_room, checked_joints
 from warpchain.pictures.labels import Kind, setting
+from warpchain.pictures.places import center_in_room, checked_joints, circle_radii, stretches, walk_box
 from warpchain.pictures.style import (
     BLUE,
     DASHES,
@@ -104,7 +104,7 @@ def _height_and_speed(walk: Walk, figure: Figure) -> None:
     else:
         x, floor = walk.center[:, 0], walk.setup.floor.heights(walk.center[:, 0])
         height.plot(walk.time, floor, color=FAINT, linewidth=0.8)
-        for color, label, faces in chain.stretches(walk, x.min(), x.max()):
+        for color, label, faces in stretches(walk, x.min(), x.max()):
             is_above = ((faces[:, 0, 0, None] <= x) & (x < faces[:, 1, 0, None])).any(axis=0)
             height.plot(walk.time, np.where(is_above, floor, np.nan), color=color, linewidth=3.5, label=label)
             height.legend(frameon=False)
@@ -251,7 +251,7 @@ def film_strip(walk: Walk, figure: Figure | None = None) -> Figure:
     """
     joints = checked_joints(walk)
     tilts = walk.joints_in_room is not None
-    low, high = chain.walk_box(walk, joints)
+    low, high = walk_box(walk, joints)
     moments = [] if tilts else _moments(walk)
     size = high - low
     broad = max(size[2], 0.15 * size[0]) if tilts else 0.0
@@ -283,7 +283,7 @@ def film_strip(walk: Walk, figure: Figure | None = None) -> Figure:
     colors = colormaps["viridis"](0.9 * walk.frame_time / (walk.frame_time[-1] or 1.0))[:, :3]
     center = center_in_room(walk)
     path = np.stack([np.interp(walk.frame_time, walk.time, row) for row in center.T], axis=1)
-    radius = chain.circle_radii(walk)
+    radius = circle_radii(walk)
     shown = _instants(path, float(np.ptp(joints[0, :, 0])))
     for title, axes, view in views:
         for frame in shown:
@@ -358,7 +358,7 @@ def _draw_distance(axes: Axes, walk: Walk, low: float, depth: float) -> None:
 
 def _moments(walk: Walk) -> list[tuple[int, str, Array]]:
     """At most four frames in order of time, no frame twice, with what happens there and where, (2,)."""
-    joints, radius = walk.frame_joints, chain.circle_radii(walk).max()
+    joints, radius = walk.frame_joints, circle_radii(walk).max()
     above = walk.setup.floor.distances(joints.reshape(-1, 2)).reshape(joints.shape[:-1])
     last = len(joints) - 1
     found: dict[int, tuple[str, Array]] = {}

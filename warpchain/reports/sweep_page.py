@@ -161,18 +161,12 @@ def _walk(result: SweepResult, index: int, device: str | None) -> str:
 
 def _player(walk: WalkResult) -> str:
     """A frame with the page of the moving picture, or the reason why there is none."""
-    from warpchain.pictures.animation import player
+    from warpchain.pictures.player import framed_player
 
     try:
-        content = escape(player(walk))
+        return framed_player(walk)
     except ValueError as error:
         return f'<p class="bad">No moving picture: {escape(str(error))}</p>'
-    # Height of the drawing at the full width of the page, and of its controls [px].
-    wide, high = np.ptp(walk.frame_joints[..., 0]), walk.frame_joints[..., 1].max()
-    height = round(min(600.0, 170.0 + 960.0 * high / wide))
-    # No sandbox: browsers run sandboxed frames in another process, where the player may draw before it has a size.
-    style = f'style="height:{height}px" loading="lazy"'
-    return f'<iframe title="the walk in motion" {style} srcdoc="{content}"></iframe>'
 
 
 def _compared(walk: WalkResult, block: BlockResult, place: tuple[int, ...]) -> str:

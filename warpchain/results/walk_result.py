@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WANTED: Final = "give a saved walk; `walk --like SWEEP --index I` saves one"
+SHOWN: Final = 12_000
+"""Joints that a notebook keeps of the frames of a walk: 200 frames of 60 links take 0.12 MB."""
 
 _GROUP: Final = "start"
 """Group of the state that a walk began from, so that it can be run again to the bit."""
@@ -132,10 +134,18 @@ class WalkResult(WalkNumbers):
         return first_png(partial(self.plot, kind) for kind in ("film_strip", "height_and_speed"))
 
     def _repr_html_(self) -> str:
-        """The most important numbers, why the walk is inaccurate if it is, and the picture."""
+        """The most important numbers, why the walk is inaccurate if it is, a player if there are frames, the picture.
+
+        What shows no frames, such as a notebook that is not trusted, shows the picture.
+        """
+        from warpchain.pictures.player import framed_player
         from warpchain.pictures.style import fragment
 
-        return fragment("\n".join([repr(self), *self.warnings()]), self._repr_png_())
+        shown = fragment("\n".join([repr(self), *self.warnings()]), self._repr_png_())
+        try:
+            return framed_player(self, max(60, SHOWN // self.setup.scene.links)) + shown
+        except ValueError:  # no frames, or broken ones
+            return shown
 
     def to_dict(self) -> dict[str, Any]:
         """Everything but time series and frames, for JSON; a number that is not finite is None."""

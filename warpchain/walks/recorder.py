@@ -57,6 +57,14 @@ class Recorder:
             until = self._world.time
             self._drive = [*(each for each in self._drive if each[0] >= until - keep.before), (until, piece)]
 
+    def latest_frames(self) -> tuple[Array, Array]:
+        """Times [s] of the frames that were drained last, and their joints in the room [m], (f, n, 2), or (f, n, 3)."""
+        if not self._pieces:
+            return np.empty(0), np.empty((0, 0, 2))
+        _, times, joints, _, planes = self._pieces[-1]
+        origin = planes[:, None, layout.ORIGIN : layout.ORIGIN + 3]
+        return times, origin + joints @ frame_axes(planes) if self._tilts else joints
+
     def _joined(self, pieces: list[Recorded]) -> Recorded:
         """All pieces, one behind the other; nothing has been recorded since."""
         return Recorded(*map(np.concatenate, zip(*pieces, self._world.drain(), strict=True)))

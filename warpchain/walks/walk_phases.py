@@ -7,7 +7,7 @@ the release. `warpchain.walks.outcome` reads the numbers of a walk, `warpchain.w
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -38,12 +38,19 @@ class Progress:
         time: Simulated time [s] since the start, in phase ``"walk"`` since the release.
         speed: Speed [m/s] along the loop, in phase ``"walk"`` of the centre of mass.
         attempts: Attempted steps so far.
+        frame_time: Times [s] since the release of the frames recorded since the last call, shape (f,).
+        frame_joints: Joints in the room [m] of these frames, as in `WalkResult`: x, y, shape (f, n, 2), and z, shape
+            (f, n, 3), if the plane tilts.
+        sprocket_height: Height [m] of the sprocket's centre at the release; NaN before it, and without a sprocket.
     """
 
     phase: str
     time: float
     speed: float
     attempts: int
+    frame_time: Array = field(default_factory=lambda: np.empty(0), compare=False)
+    frame_joints: Array = field(default_factory=lambda: np.empty((0, 0, 2)), compare=False)
+    sprocket_height: float = math.nan
 
 
 def phase_features(setup: Setup) -> dict[str, Features]:
@@ -170,7 +177,10 @@ class WalkRun:
         attempts = self._attempts_before + counts["accepted"] + counts["rejected"]
         if self.is_released:
             speed = math.hypot(sample[layout.CENTER_U], sample[layout.CENTER_V])
-            return Progress("walk", now or self.driven.drive_time, speed, attempts)
+            height = self.driven.raised if self.driven.has_sprocket else math.nan
+            return Progress(
+                "walk", now or self.driven.drive_time, speed, attempts, *self.recorder.latest_frames(), height
+            )
         phase = "settle" if now < self.setup.settling_time else "spin up" if now < self.driven.full_speed_at else "hold"
         return Progress(phase, now, float(sample[layout.LOOP_SPEED]), attempts)
 
