@@ -78,7 +78,7 @@ def driven(load_factor: float) -> Batch:
 def assert_same_samples(ours: Batch, theirs: Batch) -> None:
     """States, moments and samples agree."""
     assert_same(ours, theirs)
-    for world in range(len(ours.links)):
+    for world in range(len(ours.worlds)):
         assert_close(ours.worlds[world].drain().samples, theirs.worlds[world].drain().samples, NEARLY)
 
 
