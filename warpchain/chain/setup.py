@@ -146,7 +146,7 @@ class Setup:
             sections[SECTION_OF[name]][name] = value
         parameters = validated(Parameters, {**vars(self.parameters), **sections["parameters"]}, "parameters")
         scene = validated(Scene, {**vars(self.scene), **sections["scene"]}, "scene")
-        return replace(self, parameters=parameters, scene=scene).checked(are_drawn=True)
+        return replace(self, parameters=parameters, scene=scene).checked(asks_units=False)
 
     def placed(self, distributions: Mapping[str, Distribution]) -> dict[str, Distribution]:
         """The distributions with means and bounds for this chain.
@@ -166,18 +166,19 @@ class Setup:
             complete["link_length"] = replace(complete["link_length"], bounds=room)
         return complete
 
-    def checked(self, path: str = "scene.links", *, are_drawn: bool = False) -> Self:
+    def checked(self, path: str = "scene.links", *, asks_units: bool = True) -> Self:
         """This setup, if its values do not contradict one another; else an `InputError`.
 
         Resolution and sweeps ask for it, of a state only its own checks. `path` is where the number of links was given.
-        Values that `are_drawn` are not asked about their units, since their distributions were.
+        Drawn values are not asked about their units, since their distributions were, nor is a state, which has no
+        options to insist with.
         """
         scene, options = self.scene, self.options
         if scene.plane == "tilting" and find_method(options.method).has_rigid_flight:
             raise InputError(
                 f"options.method: {shown(options.method)} keeps planes fixed; give explicit, or plane: fixed"
             )
-        if self.start is None and not options.unusual_values and not are_drawn:
+        if self.start is None and asks_units and not options.unusual_values:
             check_units(vars(self.parameters), "parameters")
             check_units(vars(scene), "scene")
         self._check_links(path)
@@ -376,4 +377,4 @@ def _setup(links: int, parameters: Parameters | str, field_name: str) -> Setup:
     name = DEFAULT_PRESET if isinstance(parameters, Parameters) else parameters
     chain = parameters if isinstance(parameters, Parameters) else preset(parameters)
     scene = validated(Scene, {"links": links, "frequency": 0.0, "start": "ellipse"}, field_name)
-    return Setup(name, chain, scene, Options()).checked(field_name)
+    return Setup(name, chain, scene, Options()).checked(field_name, asks_units=False)
