@@ -55,9 +55,14 @@ class BeforeRelease:
     center: Annotated[Array, Stored("m", "centre of mass x, y", "t 2")]
     center_velocity: Annotated[Array, Stored("m/s", "velocity of the centre of mass x, y", "t 2")]
     frame_time: Annotated[Array, Stored("s", "time of a frame since the release, negative", "f")]
-    frame_joints: Annotated[Array, Stored("m", "joints x, y; joint i ends link i, even links inner", "f n 2")]
+    frame_joints: Annotated[
+        Array,
+        Stored("m", "joint positions x, y; joint i is at the end of link i, and even links are inner links", "f n 2"),
+    ]
     frame_forces: Annotated[Array, Stored("N", "force x, y in each joint on the link that it ends", "f n 2")]
-    frame_moments: Annotated[Array, Stored("N m", "friction moment in each joint on the link that it ends", "f n")]
+    frame_moments: Annotated[
+        Array, Stored("N m", "friction moment that each joint exerts on the link that ends there", "f n")
+    ]
 
     def __repr__(self) -> str:
         """One line."""

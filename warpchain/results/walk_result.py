@@ -43,8 +43,8 @@ _GROUP: Final = "start"
 _STATE: Final = {
     "position": ("m, m, rad", "x, y and angle of each link"),
     "velocity": ("m/s, m/s, rad/s", "their rates"),
-    "origin": ("m", "origin of the plane's coordinates in the room"),
-    "axes": ("1", "axes of x and y of the plane in the room"),
+    "origin": ("m", "origin of the plane's coordinates in the laboratory frame"),
+    "axes": ("1", "x and y axes of the plane in the laboratory frame"),
     "plane_rates": ("m/s, rad/s, rad/s", "speed across the plane, and its turning rates about x and y"),
 }
 _FORMAT: Final = Format.of("warpchain walk", STORED, FIELDS, {name: unit for name, (unit, _) in _STATE.items()})

@@ -16,7 +16,7 @@ RELEASE: Final = {
     "center_y": "y of the centre of mass",
     "width": "width of the joints' outline",
     "height": "height of the joints' outline, in their plane",
-    "lowest": "y of the lowest point of all circles",
+    "lowest": "y of the lowest point of all contact circles",
 }
 """Keys of `WalkResult.release`."""
 PAUSE: Final = 0.01

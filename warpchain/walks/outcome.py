@@ -21,17 +21,17 @@ from warpchain.status import Status
 from warpchain.walks.landmarks import RELEASE
 from warpchain.walks.moving_plane import angles
 
-_SINCE_FLOOR: Final = "time since the last impulse on the floor; NaN if there was none"
+_SINCE_FLOOR: Final = "time since the last impulse on the floor (NaN if none)"
 _FIXED: Final = "if the plane is fixed"
-_NEVER: Final = "NaN if it never was"
+_NEVER: Final = "NaN if that never happened"
 
 ENERGIES: Final = {
-    "kinetic_at_release": "kinetic energy at release",
-    "potential_at_release": "energy of gravity, from the floor below the release, and joint springs at release",
+    "kinetic_at_release": "kinetic energy at the release",
+    "potential_at_release": "gravitational energy, from the floor below the release, and spring energy at the release",
     "kinetic_at_end": "kinetic energy at the end",
-    "potential_at_end": "energy of gravity and joint springs at the end",
+    "potential_at_end": "gravitational and spring energy at the end",
     **LOST,
-    "residual": "energy at release, less that at the end and all losses: the error of the integration",
+    "residual": "energy at the release minus that at the end and all losses; the error of the integration",
 }
 """Keys of `WalkResult.energy`. Losses count as positive."""
 
@@ -45,61 +45,83 @@ class Outcome:
         float,
         Stored(
             "m",
-            "x of the centre of mass from the sprocket (x = 0) on; on a slope of the angle α x / cos α, the distance "
-            "along the floor to the point vertically below it; NaN unless at rest",
+            "x of the centre of mass at rest minus x of the sprocket's centre, x = 0; on a slope of angle α, x / cos α, the "
+            "distance along the floor to the point vertically below it; NaN unless at rest",
         ),
     ]
-    walk_time: Annotated[float, Stored("s", "from the release to the end")]
-    simulated_time: Annotated[float, Stored("s", "simulated, the phases before the release included")]
-    hold_time: Annotated[float, Stored("s", "for which the loop was held at full frequency; NaN without a sprocket")]
+    walk_time: Annotated[float, Stored("s", "time from the release to the end of the walk")]
+    simulated_time: Annotated[float, Stored("s", "total simulated time, including the phases before the release")]
+    hold_time: Annotated[
+        float, Stored("s", "time for which the loop was held at full frequency; NaN without a sprocket")
+    ]
     drift: Annotated[
         float,
         Stored(
             "1",
-            "greatest change of the held loop's mean height, width or place, relative to height or width, while it was "
-            f"last watched; {_NEVER}",
+            "largest change of the held loop's mean height, width or horizontal position in the last steadiness check, "
+            f"relative to height or width; {_NEVER}",
         ),
     ]
     lateral_drift: Annotated[
-        float, Stored("m", "z of the centre of mass at rest, to the right; NaN unless the plane tilts")
+        float,
+        Stored(
+            "m", "sideways position z of the centre of mass at rest, positive to the right; NaN unless the plane tilts"
+        ),
     ]
-    final_tilt: Annotated[float, Stored("rad", f"tilt of the plane at the end, positive to the left; NaN {_FIXED}")]
-    final_yaw: Annotated[float, Stored("rad", f"heading of the plane at the end, as yaw but within ±π; NaN {_FIXED}")]
-    greatest_tilt: Annotated[float, Stored("rad", f"greatest size of the tilt in the walk; NaN {_FIXED}")]
-    fell_at: Annotated[float, Stored("s", f"from the release until the plane was first tilted by 45°; {_NEVER}")]
-    fell_over: Annotated[int, Stored("1", "1 if the plane was ever tilted by 45°, 0 if not; −1 if the plane is fixed")]
+    final_tilt: Annotated[
+        float, Stored("rad", f"tilt angle of the plane at the end, positive to the left; NaN {_FIXED}")
+    ]
+    final_yaw: Annotated[float, Stored("rad", f"yaw angle of the plane at the end, within ±π; NaN {_FIXED}")]
+    greatest_tilt: Annotated[float, Stored("rad", f"largest absolute tilt angle in the walk; NaN {_FIXED}")]
+    fell_at: Annotated[float, Stored("s", f"time from the release to the first tilt of 45°; {_NEVER}")]
+    fell_over: Annotated[int, Stored("1", "1 if the plane ever tilted by 45°, 0 if not; −1 if the plane is fixed")]
     fell_before_collapse: Annotated[
-        int, Stored("1", "1 if it fell over before its loop collapsed, 0 if not; −1 if the plane is fixed")
+        int, Stored("1", "1 if the chain fell over before its loop collapsed, 0 if not; −1 if the plane is fixed")
     ]
     self_contact_at: Annotated[
-        float, Stored("s", "from the release to the sample after the first impulse between links; or NaN")
+        float, Stored("s", "time from the release to the first record after an impulse between links; NaN if none")
     ]
-    bounces_before_self_contact: Annotated[int, Stored("1", "bounces begun at self_contact_at; −1 if it never came")]
-    flight_before_self_contact: Annotated[float, Stored("s", f"at self_contact_at, {_SINCE_FLOOR}")]
+    bounces_before_self_contact: Annotated[
+        int, Stored("1", "number of bounces that had begun at self_contact_at; −1 if there was none")
+    ]
+    flight_before_self_contact: Annotated[float, Stored("s", f"{_SINCE_FLOOR}, at self_contact_at")]
     strands_met_at: Annotated[
         float,
-        Stored("s", f"the same of strands of the loop: links {layout.STRANDS_APART} or more apart along the chain"),
+        Stored(
+            "s",
+            f"time from the release to the first impulse between strands, links {layout.STRANDS_APART} or more apart; "
+            "NaN if none",
+        ),
     ]
-    bounces_before_strands_met: Annotated[int, Stored("1", "bounces begun at strands_met_at; −1 if it never came")]
-    flight_before_strands_met: Annotated[float, Stored("s", f"at strands_met_at, {_SINCE_FLOOR}")]
+    bounces_before_strands_met: Annotated[
+        int, Stored("1", "number of bounces that had begun at strands_met_at; −1 if there was none")
+    ]
+    flight_before_strands_met: Annotated[float, Stored("s", f"{_SINCE_FLOOR}, at strands_met_at")]
     collapsed_at: Annotated[
-        float, Stored("s", "from the release until the loop enclosed less than half of its area; NaN if it never did")
+        float,
+        Stored("s", "time from the release to the collapse, when the loop encloses half of its area; NaN if none"),
     ]
-    bounces_before_collapse: Annotated[int, Stored("1", "bounces begun at collapsed_at; −1 if it never came")]
-    flight_before_collapse: Annotated[float, Stored("s", f"at collapsed_at, {_SINCE_FLOOR}")]
-    softened_at: Annotated[float, Stored("s", "from the release to the softening of the joints; NaN if they were not")]
+    bounces_before_collapse: Annotated[
+        int, Stored("1", "number of bounces that had begun at collapsed_at; −1 if there was none")
+    ]
+    flight_before_collapse: Annotated[float, Stored("s", f"{_SINCE_FLOOR}, at collapsed_at")]
+    softened_at: Annotated[
+        float, Stored("s", "time from the release to the softening of the joints; NaN if they were not softened")
+    ]
     bounces: Annotated[int, Stored("1", COUNTS["bounces"])]
     steps_accepted: Annotated[int, Stored("1", COUNTS["accepted"])]
     steps_rejected: Annotated[int, Stored("1", COUNTS["rejected"])]
-    impulses: Annotated[dict[str, int], Stored("1", "by kind of contact", keys=IMPULSES)]
+    impulses: Annotated[dict[str, int], Stored("1", "number of impulses by kind of contact", keys=IMPULSES)]
     greatest_opening: Annotated[float, Stored("m", EXTREMES["opening"])]
-    greatest_penetration: Annotated[dict[str, float], Stored("m", "by kind of contact", keys=DEPTHS)]
-    energy: Annotated[dict[str, float], Stored("J", "ledger of the walk", keys=ENERGIES)]
+    greatest_penetration: Annotated[
+        dict[str, float], Stored("m", "largest penetration by kind of contact", keys=DEPTHS)
+    ]
+    energy: Annotated[dict[str, float], Stored("J", "energy balance of the walk", keys=ENERGIES)]
     sprocket_height: Annotated[
         float, Stored("m", "height of the sprocket's centre at the release; NaN without a sprocket or a release")
     ]
-    release: Annotated[dict[str, float], Stored("m", "the loop at the release", keys=RELEASE)]
-    release_speed: Annotated[float, Stored("m/s", "mean speed of link centres along the loop at the release")]
+    release: Annotated[dict[str, float], Stored("m", "geometry of the loop at the release", keys=RELEASE)]
+    release_speed: Annotated[float, Stored("m/s", "mean speed of the link centres along the loop at the release")]
 
 
 @dataclass(kw_only=True)

@@ -28,7 +28,7 @@ _FIXED: Final = "if the plane is fixed"
 class WalkNumbers(Outcome):
     """All that is known of one walk, t instants and f frames of a chain of n links; units stand beside the fields."""
 
-    wall_time: Annotated[float, Stored("s", "that the computer took, without the compilation of kernels")]
+    wall_time: Annotated[float, Stored("s", "computing time, without the compilation of kernels")]
     setup: Setup
     seed: int | None
     versions: dict[str, str]
@@ -36,30 +36,42 @@ class WalkNumbers(Outcome):
     center: Annotated[Array, Stored("m", "centre of mass x, y", "t 2")]
     center_velocity: Annotated[Array, Stored("m/s", "velocity of the centre of mass x, y", "t 2")]
     kinetic_energy: Annotated[Array, Stored("J", "kinetic energy", "t")]
-    gravitational_energy: Annotated[Array, Stored("J", "energy of gravity, from the floor below the release", "t")]
+    gravitational_energy: Annotated[
+        Array, Stored("J", "gravitational energy, measured from the floor below the release", "t")
+    ]
     spring_energy: Annotated[Array, Stored("J", "energy of the joint springs", "t")]
-    lowest: Annotated[Array, Stored("m", "height of the lowest point of all circles", "t")]
-    rms_speed: Annotated[Array, Stored("m/s", "root mean square speed of the links", "t")]
+    lowest: Annotated[Array, Stored("m", "height of the lowest point of all contact circles", "t")]
+    rms_speed: Annotated[Array, Stored("m/s", "RMS speed of the links", "t")]
     frame_time: Annotated[Array, Stored("s", "time since the release", "f")]
-    frame_joints: Annotated[Array, Stored("m", "joints x, y; joint i ends link i, even links inner", "f n 2")]
+    frame_joints: Annotated[
+        Array,
+        Stored("m", "joint positions x, y; joint i is at the end of link i, and even links are inner links", "f n 2"),
+    ]
     frame_forces: Annotated[
         Array,
         Stored(
             "N",
-            "force x, y in each joint on the link that it ends, with the stiffness and damping of the moment, softened "
-            "just after the release and after a collapse",
+            "force x, y that each joint exerts on the link that ends there, with its present stiffness and damping, "
+            "which are softened just after the release and after a collapse",
             "f n 2",
             empty="if not recorded",
         ),
     ]
     frame_moments: Annotated[
-        Array, Stored("N m", "friction moment in each joint on the link that it ends", "f n", empty="if not recorded")
+        Array,
+        Stored(
+            "N m", "friction moment that each joint exerts on the link that ends there", "f n", empty="if not recorded"
+        ),
     ]
-    center_z: Annotated[Array, Stored("m", "centre of mass z, to the right", "t", _FIXED)]
-    tilt: Annotated[Array, Stored("rad", "tilt of the plane", "t", _FIXED)]
-    yaw: Annotated[Array, Stored("rad", "heading of the plane's x axis, anticlockwise, turns counted", "t", _FIXED)]
-    frame_origin: Annotated[Array, Stored("m", "origin of the plane's coordinates in the room", "f 3", _FIXED)]
-    frame_axes: Annotated[Array, Stored("1", "axes of x and y of the plane in the room", "f 2 3", _FIXED)]
+    center_z: Annotated[
+        Array, Stored("m", "sideways position z of the centre of mass, positive to the right", "t", _FIXED)
+    ]
+    tilt: Annotated[Array, Stored("rad", "tilt angle of the plane", "t", _FIXED)]
+    yaw: Annotated[Array, Stored("rad", "yaw angle of the plane's x axis, anticlockwise, unwrapped", "t", _FIXED)]
+    frame_origin: Annotated[
+        Array, Stored("m", "origin of the plane's coordinates in the laboratory frame", "f 3", _FIXED)
+    ]
+    frame_axes: Annotated[Array, Stored("1", "x and y axes of the plane in the laboratory frame", "f 2 3", _FIXED)]
     before_release: BeforeRelease | None = None
 
     @property
