@@ -34,6 +34,7 @@ def test_threads_take_turns_on_a_gpu(monkeypatch: pytest.MonkeyPatch, device: st
     shards = Manifest(planned, 8).wanted
     monkeypatch.setattr(runner, "compile_kernels", lambda setups: None)
     monkeypatch.setattr(runner, "run_setups", run_walks)
+    monkeypatch.setattr(runner, "check_numerics", lambda directory: None)
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
         for task in [pool.submit(run_shards, planned, "", "", [shard]) for shard in shards[:2]]:
             task.result()

@@ -89,7 +89,7 @@ def test_a_lost_manifest_is_rebuilt_of_the_shards(tmp_path: Path, harm: Callable
     run(folder)
     expected = content(folder)
     harm(folder / "sweep.h5")
-    with pytest.raises(DamagedFileError, match=r"run the sweep in this folder again, which .* keeps all shards$"):
+    with pytest.raises(DamagedFileError, match=r"run the sweep in this folder again; all shards are kept$"):
         load(folder)
     with pytest.warns(InputWarning, match=f"^{folder / 'sweep.h5'}: was lost or damaged; written anew"):
         with SweepFolder.open(folder, SWEEP, shard_size=SHARD_SIZE) as store:
@@ -106,8 +106,8 @@ def test_a_manifest_is_rebuilt_for_the_sweep_of_the_shards_only(tmp_path: Path) 
     (folder / "sweep.h5").unlink()
     before = content(folder)
     for sweep, part, problem in (
-        (other, (1, 2), "the shards are of another sweep; give the sweep that began this folder"),
-        (fewer, (1, 2), "the shards are of another sweep; give the sweep that began this folder, with as many samples"),
+        (other, (1, 2), "the shards are of another sweep; use that sweep"),
+        (fewer, (1, 2), "the shards are of another sweep; use that sweep, with as many samples"),
         (ONE_BLOCK, (1, 1), "the shards are of one part of the sweep; give --part 1/2"),
         (ONE_BLOCK, (2, 2), "the shards are of one part of the sweep; give --part 1/2"),
     ):

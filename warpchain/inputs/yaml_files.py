@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import yaml
 
-from warpchain.inputs.validation import DEEPEST, InputError, checked_path, plain, shown
+from warpchain.inputs.validation import DEEPEST, MOST_VALUES, InputError, checked_path, plain, shown
 
 LARGEST_FILE: Final = 400_000
 """Most bytes of a YAML file."""
@@ -41,6 +41,8 @@ def parse_yaml(text: str, path: str) -> Any:
     """
     try:
         content = yaml.load(text, Loader=_Loader)
+    except _TooManyValuesError:
+        raise InputError(f"{path}: more than {MOST_VALUES} values; give fewer") from None
     except yaml.MarkedYAMLError as error:
         line = f", line {error.problem_mark.line + 1}" if error.problem_mark else ""
         raise InputError(f"{path}{line}: {error.problem}; correct the YAML") from None
@@ -52,8 +54,21 @@ def parse_yaml(text: str, path: str) -> Any:
     return plain(content, path)
 
 
+class _TooManyValuesError(Exception):
+    """A text has more values than `plain` takes."""
+
+
 class _Loader(yaml.SafeLoader):
-    """PyYAML's safe loader with the numbers of YAML 1.2; a repeated key is an error."""
+    """PyYAML's safe loader with the numbers of YAML 1.2; a repeated key is an error, and so are too many values."""
+
+    values = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        """Compose a node, unless there were too many: reading all of them would take seconds."""
+        self.values += 1
+        if self.values > MOST_VALUES:
+            raise _TooManyValuesError
+        return super().compose_node(parent, index)
 
     def flatten_mapping(self, node: yaml.MappingNode) -> None:
         """Look for repeated keys; `<<`, which PyYAML merges here, is a key like any other."""

@@ -211,13 +211,13 @@ def _is_whole(folder: Path) -> bool:
 def _rebuild(folder: Path, manifest: Manifest) -> None:
     """Write a lost or damaged sweep.h5 anew, if the shards are those of this sweep; else an `InputError`."""
     path, damaged = folder / "sweep.h5", dict[str, str]()
-    problem = f"{path}: is lost or damaged, and the shards are"
+    problem = f"{path}: lost or damaged, and the shards are"
     try:
         read_rows(folder, manifest, damaged)
     except InputError as error:
         if shards.FOREIGN not in str(error):
             raise
-        remedy = "give the sweep that began this folder, with as many samples, or another folder"
+        remedy = "use that sweep, with as many samples, or another folder"
         raise InputError(f"{problem} of another sweep; {remedy}") from None
     parts = set()
     for name in {*shards.shard_files(folder)} - damaged.keys():

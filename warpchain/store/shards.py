@@ -49,7 +49,7 @@ MANIFEST: Final = Format.of("warpchain sweep")
 SHARD: Final = Format.of("warpchain shard", STORED_COLUMNS, MOTION, dict(KEYS.fields or {}))
 _NAME: Final = re.compile(r"\d{6,}\.h5")
 FOREIGN: Final = "a shard of another sweep; move it out of this folder"
-REBUILT: Final = "run the sweep in this folder again, which writes the file anew and keeps all shards"
+REBUILT: Final = "run the sweep in this folder again; all shards are kept"
 
 FIRST_SHARDS: Final = 32
 """Most walks in each of the first four shards."""
@@ -280,5 +280,5 @@ def check_numerics_of(directory: AnyPath, version: int) -> None:
     if version != NUMERICS_VERSION:
         raise InputError(
             f"{directory}: its walks are of numerics {version}, but this warpchain has {NUMERICS_VERSION}; "
-            "use that version for all workers, give another folder, or start anew with fresh"
+            "use one version for all workers, give another folder, or start anew"
         )

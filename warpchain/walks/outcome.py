@@ -45,7 +45,7 @@ class Outcome:
         float,
         Stored(
             "m",
-            "x of the centre of mass at rest minus x of the sprocket's centre, x = 0; on a slope of angle α, x / cos α, the "
+            "x of the centre of mass at rest minus x of the sprocket's centre; on a slope of angle α, x / cos α, the "
             "distance along the floor to the point vertically below it; NaN unless at rest",
         ),
     ]
