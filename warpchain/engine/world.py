@@ -52,7 +52,7 @@ _BEGINNING = _beginning()
 def _layout_digest() -> NDArray[np.uint8]:
     """What tells snapshots apart that kernels would read otherwise, as bytes: numbers of rows, fields of structs."""
     rows = sorted((name, value) for name, value in vars(layout).items() if name.isupper() and isinstance(value, int))
-    text = repr((rows, [*State.vars], [*Drive.vars]))
+    text = repr((rows, [*State.vars], [*Drive.vars]))  # type: ignore[attr-defined, unused-ignore]
     return np.frombuffer(hashlib.sha256(text.encode()).digest(), dtype=np.uint8)
 
 
