@@ -31,14 +31,6 @@ FOLDER = Path(__file__).parent / "reference"
 NOTE = "<!-- Written by docs/generate_reference.py; change the code, then run that script. -->\n"
 JSON = "--json"  # An option of most commands, which is explained once
 
-SAMPLER_MEANINGS = {
-    "random": "independent samples",
-    "sobol": "scrambled Sobol' sequences; a power of two of samples",
-    "latin_hypercube": "latin hypercubes",
-    "saltelli": "points for Sobol indices: each sample of d drawn quantities takes d + 2 walks; a power of two of "
-    "samples",
-}
-
 
 def listing(rows: Iterable[tuple[str, object]]) -> str:
     """A Markdown list of names and their meanings."""
@@ -183,7 +175,7 @@ PARTS = {
     "scene_numbers": named(name for name, field in Scene.model_fields.items() if field.annotation is float),
     "uniform": ", ".join(f"`{name}` uniformly in [{law.lower:g}, {law.upper:g}]" for name, law in EVEN.items()),
     "gaussian": named(name for name in TABLE if name not in EVEN),
-    "samplers": listing((f"`{name}`", SAMPLER_MEANINGS[name]) for name in SAMPLERS),
+    "samplers": listing((f"`{name}`", sampler.meaning) for name, sampler in SAMPLERS.items()),
     "series_interval": f"{SERIES_INTERVAL:g}",
     "frame_interval": f"{FRAME_INTERVAL:g}",
     "frames": listing(

@@ -17,9 +17,10 @@ from warpchain.inputs.validation import InputError, InputWarning, by_name, check
 from warpchain.results.walk_result import WalkResult
 from warpchain.status import Status
 from warpchain.sweeps.block import POINT, Block
+from warpchain.sweeps.designs import SAMPLERS
 from warpchain.sweeps.plan import Sweep
 from warpchain.walks import rows
-from warpchain.walks.cell_statistics import CellStatistics
+from warpchain.walks.cell_statistics import CellStatistics, known_values
 from warpchain.walks.landmarks import LENGTHS
 from warpchain.walks.rows import COLUMNS, MISSING, Column, quantity_of
 from warpchain.walks.walk_numbers import read_motion
@@ -257,6 +258,10 @@ class BlockResult:
         """Whether a walk has one of the `faults`, shape `shape`."""
         return np.asarray(np.any([*self.faults.values()], axis=0))
 
+    def values(self, name: str = "dx") -> NDArray[np.float64]:
+        """A column as numbers, shape `shape`, those of which `statistics` are; NaN of walks that are in no mean."""
+        return known_values(self.columns[name], self.columns["status"])
+
     def statistics(self, name: str = "dx") -> CellStatistics:
         """Statistics of a column in each cell, over the walks at rest that have a number there.
 
@@ -319,7 +324,7 @@ class BlockResult:
         along = {name: (name, values) for name, values in self.axes.items()}
         along |= {"sample": ("sample", np.arange(self.shape[-1]))}
         along |= {name: (POINT, np.array(values)) for name, values in self.planned.points.items()}
-        if self.planned.sampler != "random":
+        if SAMPLERS[self.planned.sampler].engine is not None:
             along[RANDOMISATION] = "sample", self.planned.groups
         coordinates: _Variables = {
             name: ((dim,), values.astype(float) if values.dtype.kind == "O" else values, self.notes(name))

@@ -33,7 +33,7 @@ from warpchain.inputs.validation import ChangedFileError, DamagedFileError, Inpu
 from warpchain.store import shards
 from warpchain.store.folder_lock import locked
 from warpchain.store.shards import Manifest, Part, Shard, read_manifest
-from warpchain.sweeps.designs import EXTENSIBLE
+from warpchain.sweeps.designs import SAMPLERS
 from warpchain.sweeps.plan import Sweep
 from warpchain.walks.rows import KEYS, MISSING, Rows, missing_rows
 
@@ -251,7 +251,7 @@ def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
         holds = f"{folder}: holds {count} samples of each cell of block {block.name}, but"
         if more < count:
             raise InputError(f"{holds} {more} are asked for; give samples: {count} or more, or another folder")
-        if more > count and block.sampler not in EXTENSIBLE:
+        if more > count and not SAMPLERS[block.sampler].grows:
             raise InputError(f"{holds} a {block.sampler} does not grow; give samples: {count}, or another folder")
     return found if there == asked else replace(manifest, versions=found.versions)
 

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from warpchain.files import AnyPath, naming, write_whole
 from warpchain.hdf5_files import Format, claims_to_be, hdf5_image, open_regular, reading_hdf5
 from warpchain.inputs.validation import DamagedFileError, InputError
-from warpchain.sweeps.designs import EXTENSIBLE
+from warpchain.sweeps.designs import SAMPLERS
 from warpchain.sweeps.plan import Sweep
 from warpchain.sweeps.sweep_file import fields_of
 from warpchain.version import NUMERICS_VERSION, package_versions
@@ -96,7 +96,7 @@ class Manifest:
     @cached_property
     def digest(self) -> str:
         """What all shards of the folder have: digest of the sweep, which is the same with more samples."""
-        return self.sweep.digest([1 if b.sampler in EXTENSIBLE else b.samples_given for b in self.sweep.blocks])
+        return self.sweep.digest([1 if SAMPLERS[b.sampler].grows else b.samples_given for b in self.sweep.blocks])
 
     @cached_property
     def row_type(self) -> np.dtype[np.void]:

@@ -331,8 +331,8 @@ def _block(name: str, path: str, outer: BlockKeys | None, inner: BlockKeys) -> B
         raise InputError(f"{path}.samples: missing; give the number of samples per cell")
     drawn = _drawn(merged("distributions"), sections, varied, f"{path}.distributions")
     sampler, randomisations = sampler or "random", either("randomisations") or RANDOMISATIONS
-    if inner.randomisations is not None and sampler == "random":
-        raise InputError(f"{path}.randomisations: random samples are independent anyway; leave it out")
+    if inner.randomisations is not None and SAMPLERS[sampler].engine is None:
+        raise InputError(f"{path}.randomisations: {sampler} samples are independent anyway; leave it out")
     check_design(sampler, samples, len(drawn), randomisations, path)
     own = {*map(validation.full_name, either("independent") or ())}
     for quantity in own - drawn.keys():
