@@ -13,6 +13,7 @@ import typer
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from warpchain.chain.keep import FRAME_INTERVAL
 from warpchain.cli.main import app
 from warpchain.inputs.distributions import TABLE, Uniform
 from warpchain.inputs.methods import METHODS, METHODS_BY_NEED
@@ -22,7 +23,7 @@ from warpchain.inputs.scene import COMPOUND, Scene
 from warpchain.inputs.validation import FIELDS, field_limits, field_unit, spelled
 from warpchain.status import Status
 from warpchain.sweeps.designs import SAMPLERS
-from warpchain.sweeps.recording import FRAME_INTERVAL, SERIES_INTERVAL, Frames
+from warpchain.sweeps.recording import SERIES_INTERVAL, Frames
 from warpchain.sweeps.sweep_file import BlockKeys, BlockOfFile, SweepFile
 from warpchain.walks.rows import COLUMNS
 from warpchain.walks.walk_numbers import STORED

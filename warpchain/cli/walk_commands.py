@@ -8,6 +8,7 @@ from typing import Annotated, Any, Final
 
 import typer
 
+from warpchain.chain.keep import FRAME_INTERVAL
 from warpchain.cli.words import JSON, argument, option, output
 from warpchain.inputs.methods import METHODS
 from warpchain.inputs.starts import STARTS
@@ -42,10 +43,12 @@ _OUTPUT: Final = (
     "draws the others, `warpchain animate` a film."
 )
 _FILM: Final = "The file to write; its name ends in .gif, .mp4 or .html. Default: walk.gif beside the walk."
-_FRAMES: Final = "Simulated time between two pictures of the chain, in s; needs a folder. Default: 0.002."
+_LOADED_FRAMES: Final = 1e-4
+"""Time [s] between two frames with loads, unless it is said otherwise."""
+_FRAMES: Final = f"Simulated time between two pictures of the chain, in s; needs a folder. Default: {FRAME_INTERVAL:g}."
 _LOADS: Final = (
-    "Record forces and moments of the joints with each picture, by default every 0.0001 s; needs a folder. standard "
-    "then is explicit: rigid joints have no forces. 60 links take 24 MB a second."
+    f"Record forces and moments of the joints with each picture, by default every {_LOADED_FRAMES:g} s; needs a "
+    "folder. standard then is explicit: rigid joints have no forces. 60 links take 24 MB a second."
 )
 
 _Text = str | None
@@ -120,7 +123,7 @@ def walk(
     if folder is None and (frame_interval is not None or record_loads):
         name = "--record-loads" if frame_interval is None else "--frame-interval"
         raise InputError(f"{name}: there is no folder to write to; add -o DIR")
-    usual = None if folder is None else 1e-4 if record_loads else 2e-3
+    usual = None if folder is None else _LOADED_FRAMES if record_loads else FRAME_INTERVAL
     interval = usual if frame_interval is None else parse_yaml(frame_interval, "frame_interval")
     if folder is not None:
         try_walk_folder(folder)
@@ -155,11 +158,11 @@ def animate(
     slow: Annotated[float, option("NUMBER", "Playing time per simulated time. Default: 4.")] = 4.0,
 ) -> None:
     """Write a film of a saved walk: GIF, MP4 or HTML with a player."""
-    from warpchain.cli.output import RECORD
+    from warpchain.hdf5_files import WALK_FILE
     from warpchain.inputs.validation import InputError, printable
     from warpchain.results.walk_result import load_walk
 
-    record = walk / RECORD if walk.is_dir() else walk
+    record = walk / WALK_FILE if walk.is_dir() else walk
     result, path = load_walk(walk), path or record.with_suffix(".gif")
     try:
         result.animate(path, fps=fps, slow=slow)

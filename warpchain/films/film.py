@@ -7,11 +7,15 @@ import numpy as np
 from pydantic import Field
 
 from warpchain.inputs.arrays import Array, checked_array
+from warpchain.inputs.parameters import preset
 from warpchain.inputs.validation import InputError, checked, shown
 from warpchain.results.walk_result import WalkResult
 
-GRAVITY: Final = 9.809
+_TABLE_1: Final = preset("paper")
+GRAVITY: Final = _TABLE_1.gravity
 """As of Table 1 [m/s²]."""
+JOINT_RADIUS: Final = _TABLE_1.sprocket_radius + _TABLE_1.circle_radius
+"""Distance of the joints from the centre of Table 1's sprocket [m]."""
 BEFORE: Final = 0.1
 """Time before the release that a film shows [s]."""
 CLOCK: Final = np.arange(0.02, 0.361, 0.02)

@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from warpchain.films.film import CAREFUL, CLOCK, GRAVITY, Camera, Film
+from warpchain.films.film import CAREFUL, CLOCK, GRAVITY, JOINT_RADIUS, Camera, Film
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.validation import InputError
 
@@ -65,7 +65,7 @@ def friction_line(film: Film, camera: Camera = CAREFUL) -> FrictionLine:
     x, y = (film.center - film.center[film.time < -2 * camera.release].mean(axis=0)).T
     time, noise = np.maximum(film.time, 0), film.error(camera)
     lift, one, none = y + GRAVITY * time**2 / 2, np.ones_like(y), np.zeros_like(y)
-    speed = film.speed or 2 * np.pi * film.frequency * 0.06  # by default that on Table 1's sprocket
+    speed = film.speed or 2 * np.pi * film.frequency * JOINT_RADIUS
     # columns: friction, place, height, delay of the release, speeds at the release, roll, clock
     prior = np.array([1e3, 1, 1, camera.release, RELEASE_SPEED, RELEASE_SPEED, camera.roll, camera.clock])
     vertical = np.column_stack([none, none, one, GRAVITY * time, none, time, none, GRAVITY * time**2])

@@ -17,7 +17,7 @@ import numpy as np
 import yaml
 from matplotlib.figure import Figure
 
-from warpchain.files import AnyPath, Kind, checked_output, write_whole
+from warpchain.files import AnyPath, FileKind, checked_output, write_whole
 from warpchain.inputs.arrays import AnyArray
 from warpchain.inputs.validation import short
 from warpchain.pictures.labels import cell_notes, cell_table, cell_text, cell_values, unit_text
@@ -44,7 +44,7 @@ def _is_report(path: Path) -> bool:
         return content.read(len(_HEAD)) == _HEAD
 
 
-REPORTS: Final = Kind("page that warpchain report has written", _is_report)
+REPORTS: Final = FileKind("page that warpchain report has written", _is_report)
 """All that a report replaces."""
 
 

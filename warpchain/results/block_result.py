@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.chain.keep import FRAME_INTERVAL
 from warpchain.chain.setup import Setup
 from warpchain.inputs.arrays import AnyArray
 from warpchain.inputs.parameters import Parameters
@@ -174,7 +175,7 @@ class BlockResult:
         index: int | None = None,
         *,
         sample: int | None = None,
-        frame_interval: float | None = 2e-3,
+        frame_interval: float | None = FRAME_INTERVAL,
         record_before: float | None = None,
         record_loads: bool = False,
         **at: Any,

@@ -19,11 +19,11 @@ import numpy as np
 from warpchain.chain.resolution import SECTIONS
 from warpchain.chain.setup import Setup, State
 from warpchain.files import write_whole
-from warpchain.hdf5_files import Format, hdf5_image, put, read_fields, reading_hdf5, write_fields
+from warpchain.hdf5_files import SWEEP_FILE, WALK_FILE, Format, hdf5_image, put, read_fields, reading_hdf5, write_fields
+from warpchain.inputs.figure_kinds import FigureWord
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import InputError, checked_path, json_value, validated
 from warpchain.loop.stationary_loop import FIELDS
-from warpchain.pictures.labels import Kind
 from warpchain.status import Status
 from warpchain.walks.landmarks import MOST_ENERGY_ERROR
 from warpchain.walks.restart import state_at
@@ -87,7 +87,7 @@ class WalkResult(WalkNumbers):
         return state_at(self.setup, t, self.walk_time if is_released else np.nan)
 
     def plot(
-        self, kind: Kind = "height_and_speed", *, figure: "Figure | None" = None, ax: "Axes | None" = None
+        self, kind: FigureWord = "height_and_speed", *, figure: "Figure | None" = None, ax: "Axes | None" = None
     ) -> "Figure":
         """Draw the walk.
 
@@ -195,8 +195,8 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
     """
     path = checked_path(path, "path")
     if os.path.isdir(path):
-        record = os.path.join(path, "walk.h5")
-        if not os.path.exists(record) and os.path.exists(os.path.join(path, "sweep.h5")):
+        record = os.path.join(path, WALK_FILE)
+        if not os.path.exists(record) and os.path.exists(os.path.join(path, SWEEP_FILE)):
             raise InputError(f"{path}: the folder of a sweep, not of a saved walk; {WANTED}")
         path = record
     remedy = "run the walk again, or fetch another copy of the file"

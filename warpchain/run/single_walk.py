@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from warpchain.chain.keep import FRAME_INTERVAL
 from warpchain.chain.resolution import continued, resolve, takes_fields
 from warpchain.chain.setup import DEFAULT_PRESET, Setup, State
 from warpchain.inputs.distributions import Seed
@@ -24,7 +25,7 @@ def walk(
     start: StartWord | State | None = None,
     setup: Setup | None = None,
     seed: int | None = None,
-    frame_interval: float | None = 2e-3,
+    frame_interval: float | None = FRAME_INTERVAL,
     record_before: float | None = None,
     record_loads: bool = False,
     on_progress: OnProgress | None = None,

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.files import AnyPath, naming, write_whole
-from warpchain.hdf5_files import Format, claims_to_be, hdf5_image, open_regular, reading_hdf5
+from warpchain.hdf5_files import SWEEP_FILE, WALK_FILE, Format, claims_to_be, hdf5_image, open_regular, reading_hdf5
 from warpchain.inputs.validation import DamagedFileError, InputError
 from warpchain.sweeps.designs import SAMPLERS
 from warpchain.sweeps.plan import Sweep
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 Part = tuple[int, int]
 """Number of a part of a sweep, and number of parts."""
-OWN: Final = ("sweep.h5", "sweep.yaml", "shards", "log.txt")
+OWN: Final = (SWEEP_FILE, "sweep.yaml", "shards", "log.txt")
 """What a sweep has in its folder, beside the lock."""
 EARLIER: Final = "sweep.json"
 """What earlier versions have there instead of sweep.h5."""
@@ -158,7 +158,7 @@ def stored_sweep(path: AnyPath, content: Mapping[str, object]) -> Sweep:
 
 def read_manifest(directory: AnyPath) -> Manifest:
     """The manifest of a folder; an `OSError` if unreadable, an `InputError` if it holds no sweep of this version."""
-    path = Path(directory) / "sweep.h5"
+    path = Path(directory) / SWEEP_FILE
     if not os.path.lexists(path):
         if not os.path.exists(directory):
             raise InputError(f"{directory}: is not there; give the folder of a sweep, or a merged file")
@@ -166,7 +166,7 @@ def read_manifest(directory: AnyPath) -> Manifest:
             raise InputError(f"{directory}: holds a sweep of an earlier warpchain; read it with that version")
         if any(own_shards(directory)):
             raise DamagedFileError(f"{path}: is lost; {REBUILT}")
-        there = "a saved walk, no sweep" if (Path(directory) / "walk.h5").exists() else "no sweep"
+        there = "a saved walk, no sweep" if (Path(directory) / WALK_FILE).exists() else "no sweep"
         raise InputError(f"{directory}: {there} in this folder; give the folder of one, or a merged file")
     with reading_hdf5(path, MANIFEST, REBUILT) as file:
         return Manifest(
@@ -181,7 +181,7 @@ def read_manifest(directory: AnyPath) -> Manifest:
 def stamp(directory: AnyPath) -> str:
     """What tells whether the folder still holds the same sweep: the SHA-256 of its sweep.h5."""
     try:
-        with open_regular(Path(directory) / "sweep.h5") as file:
+        with open_regular(Path(directory) / SWEEP_FILE) as file:
             return hashlib.sha256(file.read()).hexdigest()
     except (FileNotFoundError, NotADirectoryError):
         problem = "no sweep in this folder; give the folder of one, which every worker can reach by this path"
@@ -270,7 +270,7 @@ def own_shards(directory: AnyPath) -> Iterator[Path]:
 
 def check_numerics(directory: AnyPath) -> None:
     """What a worker does before it computes: an `InputError` if the folder's walks are of other numerics than ours."""
-    path = Path(directory) / "sweep.h5"
+    path = Path(directory) / SWEEP_FILE
     with reading_hdf5(path, MANIFEST, REBUILT) as file:
         check_numerics_of(directory, int(file.attrs["numerics_version"]))
 

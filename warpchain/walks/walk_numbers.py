@@ -95,8 +95,7 @@ class WalkNumbers(Outcome):
     @property
     def energy_error(self) -> float:
         """Size of the energy unaccounted for, relative to the energy at release; above 0.05 the walk is inaccurate."""
-        at_release = self.energy["kinetic_at_release"] + self.energy["potential_at_release"]
-        return float(energy_error(at_release, self.energy["residual"]))
+        return float(energy_error(self.energy_at_release, self.energy["residual"]))
 
     def warnings(self) -> list[str]:
         """Why the walk is inaccurate, each with what to try: energy, joints or contacts; empty if it is not."""
