@@ -121,7 +121,7 @@ def test_content_of_a_sweep(content: Any) -> None:
     sweep = taken(lambda: load_sweep(content))
     if sweep is not None:
         again, last = load_sweep(json.loads(json.dumps(sweep.canonical()))), int(sweep.indices[-1])
-        assert again.digest() == sweep.digest() and again.planned(last) == sweep.planned(last)
+        assert again.digest() == sweep.digest() and again.walk(last) == sweep.walk(last)
 
 
 @hostile_inputs

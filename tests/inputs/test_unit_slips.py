@@ -41,7 +41,7 @@ def test_who_insists_gets_the_value() -> None:
     grid = {"links": [60], "inner_mass": [30.0]}
     with pytest.raises(InputError, match=r"^sweep\.grid\.inner_mass\[0\]: 30 kg is 8110 times Table 1's; "):
         load_sweep(content(grid=grid))
-    assert load_sweep(content(grid=grid, options={"unusual_values": True})).planned(0).setup.parameters.inner_mass == 30
+    assert load_sweep(content(grid=grid, options={"unusual_values": True})).walk(0).setup.parameters.inner_mass == 30
 
 
 def test_distributions_are_asked_about_too() -> None:

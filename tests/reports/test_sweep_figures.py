@@ -38,7 +38,7 @@ ISHIGAMI = np.array([[0.3139, 0.4424, 0.0], [0.5576, 0.4424, 0.2437]])
 
 def ishigami_distance(walk: PlannedWalk) -> float:
     """The function of what a walk has drawn."""
-    x, y, z = (math.pi * (2 * walk.drawn[name] - 1) for name in ARGUMENTS)
+    x, y, z = (math.pi * (2 * walk.draws[name] - 1) for name in ARGUMENTS)
     return math.sin(x) + 7 * math.sin(y) ** 2 + 0.1 * z**4 * math.sin(x)
 
 

@@ -29,7 +29,7 @@ def two_blocks(first: int, second: int, **changes: Any) -> dict[str, Any]:
 
 def drawn_distance(walk: PlannedWalk) -> float:
     """A distance that depends on what the walk is, and not on its number [m]."""
-    return walk.setup.scene.links + walk.setup.scene.frequency / 7 + sum(walk.drawn.values())
+    return walk.setup.scene.links + walk.setup.scene.frequency / 7 + sum(walk.draws.values())
 
 
 def columns(result: SweepResult) -> dict[tuple[str, str], bytes]:

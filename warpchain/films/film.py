@@ -16,7 +16,7 @@ GRAVITY: Final = _TABLE_1.gravity
 """As of Table 1 [m/s²]."""
 JOINT_RADIUS: Final = _TABLE_1.sprocket_radius + _TABLE_1.circle_radius
 """Distance of the joints from the centre of Table 1's sprocket [m]."""
-BEFORE: Final = 0.1
+LEAD: Final = 0.1
 """Time before the release that a film shows [s]."""
 CLOCK: Final = np.arange(0.02, 0.361, 0.02)
 """Times since the release [s] at which films are compared, each a mean over 20 ms."""
@@ -97,7 +97,7 @@ class Film:
     def seen(self, camera: Camera, errors: Array, random: np.random.Generator) -> Self:
         """A film without errors as a camera shows it, given the errors that other films of the chain share."""
         scale, floor, origin, roll, *edges_off, clock = errors
-        time = np.arange(-BEFORE + random.uniform() / camera.fps, (1 + clock) * self.time[-1], 1 / camera.fps)
+        time = np.arange(-LEAD + random.uniform() / camera.fps, (1 + clock) * self.time[-1], 1 / camera.fps)
         center = np.column_stack([np.interp(time / (1 + clock), self.time, x) for x in self.center.T])
         turned = roll * np.column_stack([center[:, 1] - center[0, 1], -center[:, 0]])
         shift, noise = np.array([origin, floor]), random.normal(size=center.shape) * camera.noise
@@ -129,8 +129,8 @@ class Film:
         checked_array(self.time, "film.time", "t")
         checked_array(self.center, "film.center", len(self.time), 2)
         first, last = self.time[0], self.time[-1]
-        if first > 0.02 - BEFORE or last < CLOCK[-1] + 0.01:
-            needed = f"−{BEFORE:g} to {CLOCK[-1] + 0.02:g} s; if the film has them, check unit, fps, or give release"
+        if first > 0.02 - LEAD or last < CLOCK[-1] + 0.01:
+            needed = f"−{LEAD:g} to {CLOCK[-1] + 0.02:g} s; if the film has them, check unit, fps, or give release"
             raise InputError(f"film: it shows {first:.3f} to {last:.3f} s after the release; give {needed}")
         if abs((rate := 1 / float(np.median(np.diff(self.time)))) / camera.fps - 1) > 0.01:
             wrong = f"{camera.fps:g}, but the film has {rate:.4g} frames a second"

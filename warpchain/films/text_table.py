@@ -10,7 +10,7 @@ from typing import Annotated, Final, Literal
 import numpy as np
 from pydantic import Field
 
-from warpchain.films.film import BEFORE, GRAVITY, Film, rounding_of
+from warpchain.films.film import GRAVITY, LEAD, Film, rounding_of
 from warpchain.inputs.arrays import Array, checked_array
 from warpchain.inputs.validation import InputError, Whole, checked, checked_path, shown
 
@@ -164,14 +164,14 @@ def _fitted_release(time: Array, y: Array) -> float:
     """When a height that was constant begins to fall freely, for at least 30 ms."""
 
     def misfit(start: float) -> float:
-        near = slice(*np.searchsorted(time, [start - BEFORE, start + 0.03]))
+        near = slice(*np.searchsorted(time, [start - LEAD, start + 0.03]))
         return float((y[near] + GRAVITY / 2 * np.maximum(time[near] - start, 0) ** 2).var())
 
-    starts = np.arange(time[0] + BEFORE / 2, time[-1] - 0.1, 2.5e-4)
+    starts = np.arange(time[0] + LEAD / 2, time[-1] - 0.1, 2.5e-4)
     if not len(starts):
         raise InputError("release: the film is too short to fit it; give it")
     release = float(min(starts, key=misfit))
-    still = y[(time > release - BEFORE) & (time < release)].var()
+    still = y[(time > release - LEAD) & (time < release)].var()
     if misfit(release) > 4 * max(still, rounding_of(y) ** 2, 1e-8):
         raise InputError("release: nothing begins to fall freely; check unit and fps, or give it")
     return release

@@ -100,7 +100,7 @@ def figure6(result: SweepResult) -> Picture:
     for block, given in zip(result.blocks.values(), result.sweep["blocks"], strict=True):
         found, own = block.statistics("dx"), dict[str, str]()  # start → label
         for place in np.ndindex(*block.shape[:-1]) if _is_series(block) else ():
-            of_point = {name: sets[0] for name, sets in block.planned.points.items()}  # there is one set at most
+            of_point = {name: sets[0] for name, sets in block.block.points.items()}  # there is one set at most
             values = {**given["scene"], **of_point, **cell_values(block.axes, place)}
             if values["start"] not in own:
                 label, further = STARTS[values["start"]].legend, _OTHERS[max(0, len(looks) - 1)]
@@ -182,15 +182,15 @@ def sensitivities(result: SweepResult) -> list[Sensitivity]:
     The intervals are Student's, from the jackknife over the randomisations, which are independent of one another.
     `NothingToShow`: no block is sampled so, or none has a cell with two complete samples yet.
     """
-    crossed = [block for block in result.blocks.values() if SAMPLERS[block.planned.sampler].crosses]
+    crossed = [block for block in result.blocks.values() if SAMPLERS[block.block.sampler].crosses]
     if not crossed:
         raise NothingToShow("no block is sampled for Sobol indices; give sampler: saltelli")
     found = []
     for block in crossed:
         for place in np.ndindex(*block.shape[:-1]):
-            whole = block.values("dx")[place].reshape(-1, SAMPLERS[block.planned.sampler].walks(len(block.drawn)))
+            whole = block.values("dx")[place].reshape(-1, SAMPLERS[block.block.sampler].walks(len(block.drawn)))
             is_complete = np.isfinite(whole).all(axis=1)
-            complete, groups = whole[is_complete], block.planned.groups[:: whole.shape[1]][is_complete]
+            complete, groups = whole[is_complete], block.block.groups[:: whole.shape[1]][is_complete]
             samples, indices = len(complete), np.array(sobol_indices(complete))
             if samples < 2 or not np.isfinite(indices).all():
                 continue

@@ -128,7 +128,7 @@ class SweepResult:
     def unit(self, name: str) -> str:
         """SI unit of a column or an axis of any block, "1" for pure numbers; a `KeyError` if there is none."""
         first, *others = self.blocks.values()
-        known = (block for block in others if name in (*block.columns, *block.dims, *block.planned.points))
+        known = (block for block in others if name in (*block.columns, *block.dims, *block.block.points))
         return next(known, first).unit(name)
 
     def cell_statistics(self, quantity: str = "dx") -> dict[str, CellStatistics]:

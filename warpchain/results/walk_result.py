@@ -23,7 +23,7 @@ from warpchain.hdf5_files import SWEEP_FILE, WALK_FILE, Format, hdf5_image, put,
 from warpchain.inputs.figure_kinds import FigureWord
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import InputError, checked_path, json_value, validated
-from warpchain.loop.stationary_loop import FIELDS
+from warpchain.loop.stationary_loop import LOOP_FIELDS
 from warpchain.status import Status
 from warpchain.walks.landmarks import MOST_ENERGY_ERROR
 from warpchain.walks.restart import state_at
@@ -47,7 +47,7 @@ _STATE: Final = {
     "axes": ("1", "x and y axes of the plane in the laboratory frame"),
     "plane_rates": ("m/s, rad/s, rad/s", "speed across the plane, and its turning rates about x and y"),
 }
-_FORMAT: Final = Format.of("warpchain walk", STORED, FIELDS, {name: unit for name, (unit, _) in _STATE.items()})
+_FORMAT: Final = Format.of("warpchain walk", STORED, LOOP_FIELDS, {name: unit for name, (unit, _) in _STATE.items()})
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)

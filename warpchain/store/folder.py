@@ -35,7 +35,7 @@ from warpchain.store.folder_lock import locked
 from warpchain.store.shards import Manifest, Part, Shard, read_manifest
 from warpchain.sweeps.designs import SAMPLERS
 from warpchain.sweeps.plan import Sweep
-from warpchain.walks.rows import KEYS, MISSING, Rows, missing_rows
+from warpchain.walks.rows import MISSING, ROW_KEYS, Rows, missing_rows
 
 _PART: Final = re.compile(r"\.(?:sweep|\d{6,})\.[0-9a-f]{8}\.part\.(?:yaml|h5)")
 
@@ -151,7 +151,7 @@ def read_rows(
             continue
         place = Path(directory).absolute(), name, manifest.digest, manifest.numerics_version
         opened = partial(shards.opened_shard, *place)
-        numbers, cells, samples = (rows[key] for key in KEYS.names or ())
+        numbers, cells, samples = (rows[key] for key in ROW_KEYS.names or ())
         try:
             for number, table in enumerate(tables):
                 own = numbers == number

@@ -33,7 +33,7 @@ from warpchain.sweeps.designs import SAMPLERS
 from warpchain.sweeps.plan import Sweep
 from warpchain.sweeps.sweep_file import fields_of
 from warpchain.version import NUMERICS_VERSION, package_versions
-from warpchain.walks.rows import KEYS, MISSING, STORED_COLUMNS, Rows, row_type
+from warpchain.walks.rows import MISSING, ROW_KEYS, STORED_COLUMNS, Rows, row_type
 from warpchain.walks.walk_numbers import MOTION, write_motion
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ OWN: Final = (SWEEP_FILE, "sweep.yaml", "shards", "log.txt")
 EARLIER: Final = "sweep.json"
 """What earlier versions have there instead of sweep.h5."""
 MANIFEST: Final = Format.of("warpchain sweep")
-SHARD: Final = Format.of("warpchain shard", STORED_COLUMNS, MOTION, dict(KEYS.fields or {}))
+SHARD: Final = Format.of("warpchain shard", STORED_COLUMNS, MOTION, dict(ROW_KEYS.fields or {}))
 _NAME: Final = re.compile(r"\d{6,}\.h5")
 FOREIGN: Final = "a shard of another sweep; move it out of this folder"
 REBUILT: Final = "run the sweep in this folder again; all shards are kept"
@@ -59,8 +59,8 @@ FIRST_SHARDS: Final = 32
 class Shard:
     """Some walks of a sweep that are computed together and kept in one file.
 
-    `kind` is the type of the rows; `keys` of type `KEYS` and `walks` are of each walk its place and its number; `part`
-    is that of the folder which the shard was computed for.
+    `kind` is the type of the rows; `keys` of type `ROW_KEYS` and `walks` are of each walk its place and its number;
+    `part` is that of the folder which the shard was computed for.
     """
 
     digest: str
@@ -106,7 +106,7 @@ class Manifest:
     @cached_property
     def keys(self) -> Rows:
         """Block, cell and sample of all walks, in this order."""
-        keys, first = np.empty(self.sweep.walk_count, KEYS), 0
+        keys, first = np.empty(self.sweep.walk_count, ROW_KEYS), 0
         for number, block in enumerate(self.sweep.blocks):
             own = keys[first : first + block.walk_count]
             own["block"], (own["cell"], own["sample"]) = number, np.divmod(np.arange(len(own)), block.samples)
@@ -204,7 +204,8 @@ def write_shard(
     """
     if stamp(directory) != expected:
         raise InputError(f"{directory}: belongs to another sweep now; these walks were not written")
-    if any((rows[name] != shard.keys[name]).any() for name in KEYS.names or ()) or (rows["status"] == MISSING).any():
+    others = any((rows[name] != shard.keys[name]).any() for name in ROW_KEYS.names or ())
+    if others or (rows["status"] == MISSING).any():
         raise ValueError(f"{shard.name}: the rows are not those of its walks, all ended and in order")
     rows = rows.copy()
     for column in rows.dtype.names or ():  # a NaN has many bit patterns, and the pattern may depend on the batch

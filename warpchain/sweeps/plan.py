@@ -57,7 +57,7 @@ class PlannedWalk:
     sample: int
     setup: Setup
     laws: Mapping[str, Distribution]
-    drawn: Point
+    draws: Point
 
 
 @dataclass(frozen=True)
@@ -88,12 +88,12 @@ class Sweep:
         """Numbers of all walks, block by block."""
         return np.concatenate([block.indices.ravel() for block in self.blocks])
 
-    def planned(self, index: int) -> PlannedWalk:
-        """The walk with a number, one of `indices`; an `IndexError` if there is none; errors as of `drawn`."""
+    def walk(self, index: int) -> PlannedWalk:
+        """The walk with a number, one of `indices`; an `IndexError` if there is none; errors as of `with_draws`."""
         (walk,) = self.undrawn([index])
-        return self.drawn(walk)
+        return self.with_draws(walk)
 
-    def drawn(self, walk: PlannedWalk) -> PlannedWalk:
+    def with_draws(self, walk: PlannedWalk) -> PlannedWalk:
         """A walk of `undrawn` with what is drawn for it.
 
         A sample may make no possible walk: with the drawn lengths, say, the chain does not reach round its sprocket.
@@ -107,7 +107,7 @@ class Sweep:
         row, member = divmod(walk.sample, sampler.walks(len(block.drawn)))
         is_designed = sampler.engine is not None
         points, setups = self._first_possible(block, walk.cell, fixed, walk.laws, row, is_designed)
-        return replace(walk, setup=setups[member], drawn=points[member])
+        return replace(walk, setup=setups[member], draws=points[member])
 
     def undrawn(self, indices: Iterable[int]) -> Iterator[PlannedWalk]:
         """Walks without their draws, which take most of the time; options and number of links never depend on them."""
