@@ -16,11 +16,12 @@ from pydantic.fields import FieldInfo
 from warpchain.chain.keep import FRAME_INTERVAL
 from warpchain.cli.main import app
 from warpchain.inputs.distributions import TABLE, Uniform
+from warpchain.inputs.fields import FIELDS
 from warpchain.inputs.methods import METHODS, METHODS_BY_NEED
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS, Parameters
 from warpchain.inputs.scene import COMPOUND, Scene
-from warpchain.inputs.validation import FIELDS, field_limits, field_unit, spelled
+from warpchain.inputs.validation import field_limits, field_unit, spelled
 from warpchain.status import Status
 from warpchain.sweeps.designs import SAMPLERS
 from warpchain.sweeps.recording import SERIES_INTERVAL, Frames

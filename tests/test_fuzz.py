@@ -20,10 +20,11 @@ from tests.support.setups import setup_walk
 from tests.support.sweep_content import blocks, content
 from warpchain.chain.resolution import resolve
 from warpchain.cli.main import main
+from warpchain.inputs.fields import FIELDS, NAME_OF_SYMBOL
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
 from warpchain.inputs.scene import Scene
-from warpchain.inputs.validation import FIELDS, LONGEST_LINE, NAME_OF_SYMBOL, InputError
+from warpchain.inputs.validation import LONGEST_LINE, InputError
 from warpchain.results import one_walk
 from warpchain.sweeps.plan import load_sweep
 

@@ -6,8 +6,9 @@ import pytest
 
 from tests.support.sweep_content import content
 from warpchain.chain.resolution import resolve
+from warpchain.inputs.fields import SECTION_OF
 from warpchain.inputs.unit_slips import USUAL
-from warpchain.inputs.validation import SECTION_OF, InputError
+from warpchain.inputs.validation import InputError
 from warpchain.sweeps.plan import load_sweep
 
 

@@ -11,7 +11,8 @@ from pydantic.fields import FieldInfo
 
 import warpchain
 from tests.support.sweep_content import content
-from warpchain.inputs.validation import FIELDS, InputError
+from warpchain.inputs.fields import FIELDS
+from warpchain.inputs.validation import InputError
 from warpchain.results.sweep_result import merge
 from warpchain.run.sweep_run import sweep_of_keywords
 from warpchain.sweeps.block import is_axis

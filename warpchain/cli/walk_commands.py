@@ -73,10 +73,11 @@ def walk(
     as_json: Annotated[bool, JSON] = False,
 ) -> None:
     """Spin up one chain, drop it, and follow it until it rests."""
-    from warpchain.chain.resolution import SECTIONS, continued, resolve
+    from warpchain.chain.resolution import continued, resolve
     from warpchain.chain.setup import DEFAULT_PRESET
     from warpchain.cli.output import print_walk, saved, try_walk_folder, write_walk
     from warpchain.inputs.distributions import Seed
+    from warpchain.inputs.fields import SECTIONS
     from warpchain.inputs.validation import InputError, checked, printable
     from warpchain.inputs.yaml_files import parse_yaml
     from warpchain.results.one_walk import run_walk
@@ -173,7 +174,8 @@ def animate(
 
 def _given_values(named: Mapping[str, str | None], assignments: Sequence[str]) -> dict[str, dict[str, object]]:
     """Values of the command line by section; named options and `NAME=VALUE` are on a par."""
-    from warpchain.inputs.validation import SECTION_OF, InputError, by_section, dotted_name, shown
+    from warpchain.inputs.fields import SECTION_OF, by_section, dotted_name
+    from warpchain.inputs.validation import InputError, shown
     from warpchain.inputs.yaml_files import parse_yaml
 
     pairs = [(name, text) for name, text in named.items() if text is not None]

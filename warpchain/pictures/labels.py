@@ -7,8 +7,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.inputs.fields import FIELDS, SECTION_OF
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.validation import DIMENSIONLESS, FIELDS, SECTION_OF, field_unit, short
+from warpchain.inputs.validation import DIMENSIONLESS, field_unit, short
 from warpchain.walks.cell_statistics import CellStatistics
 from warpchain.walks.walk_numbers import WalkNumbers as Walk
 

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from warpchain.chain.resolution import SECTIONS
 from warpchain.chain.setup import Setup, State
 from warpchain.files import write_whole
 from warpchain.hdf5_files import SWEEP_FILE, WALK_FILE, Format, hdf5_image, put, read_fields, reading_hdf5, write_fields
+from warpchain.inputs.fields import SECTIONS
 from warpchain.inputs.figure_kinds import FigureWord
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import InputError, checked_path, json_value, validated

@@ -6,8 +6,9 @@ from warpchain.chain.keep import FRAME_INTERVAL
 from warpchain.chain.resolution import continued, resolve, takes_fields
 from warpchain.chain.setup import DEFAULT_PRESET, Setup, State
 from warpchain.inputs.distributions import Seed
+from warpchain.inputs.fields import by_section
 from warpchain.inputs.starts import StartWord
-from warpchain.inputs.validation import InputError, by_name, by_section, checked, shown
+from warpchain.inputs.validation import InputError, by_name, checked, shown
 from warpchain.results.one_walk import OnProgress, run_walk
 from warpchain.results.walk_result import WalkResult
 from warpchain.run.progress_bar import changing_line, walk_progress_text

@@ -25,19 +25,9 @@ from warpchain.chain.setup import DEFAULT_PRESET, Setup
 from warpchain.engine.devices import gpu_turn, has_gpu_turn, start_device
 from warpchain.engine.processors import free_memory, processors
 from warpchain.files import AnyPath
+from warpchain.inputs.fields import SECTION_OF, by_section
 from warpchain.inputs.options import Options, on_gpu
-from warpchain.inputs.validation import (
-    SECTION_OF,
-    InputError,
-    Whole,
-    by_name,
-    by_section,
-    checked,
-    checked_path,
-    plain,
-    shown,
-    validated,
-)
+from warpchain.inputs.validation import InputError, Whole, by_name, checked, checked_path, plain, shown, validated
 from warpchain.results.sweep_result import SweepResult, load
 from warpchain.run import progress_bar
 from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text

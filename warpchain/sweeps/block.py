@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, Field, ValidationError, ValidationInfo, WrapValidator
 
-from warpchain.chain.resolution import SECTIONS
 from warpchain.chain.setup import Setup
 from warpchain.inputs import validation
 from warpchain.inputs.distributions import Distribution, Gaussian
+from warpchain.inputs.fields import FIELDS, SECTION_OF, SECTIONS
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset as parameter_preset
 from warpchain.inputs.scene import COMPOUND, Scene
-from warpchain.inputs.validation import FIELDS, SECTION_OF, InputError, checked, json_value, path_of, shown, validated
+from warpchain.inputs.validation import InputError, checked, json_value, path_of, shown, validated
 from warpchain.sweeps.designs import SAMPLERS, independent_groups
 from warpchain.walks.landmarks import least
 

@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.chain.keep import Keep
-from warpchain.chain.resolution import SECTIONS
 from warpchain.chain.setup import Setup
 from warpchain.files import AnyPath
 from warpchain.inputs.distributions import DRAW_LIMIT, Distribution, draw, random_generator
+from warpchain.inputs.fields import SECTIONS
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS
 from warpchain.inputs.scene import Scene

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from warpchain.engine.tallies import CONTACTS, LOST
 from warpchain.hdf5_files import stored_fields
 from warpchain.inputs.distributions import DRAWABLE
-from warpchain.inputs.validation import FIELDS, field_unit
+from warpchain.inputs.fields import FIELDS
+from warpchain.inputs.validation import field_unit
 from warpchain.walks.landmarks import MOST_ENERGY_ERROR, energy_error, faults
 from warpchain.walks.outcome import Outcome
 
