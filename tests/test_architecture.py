@@ -37,7 +37,7 @@ STOREYS = (
     ("kernels/contacts", "kernels/methods"),
     ("kernels/physics",),
     ("kernels/types",),
-    ("kernels/layout", "kernels/codes"),
+    ("kernels/layout", "kernels/codes", "kernels/hooks"),
 )
 """Wings, from top to bottom: imports go downwards only."""
 KERNELS_FOR_ALL = {"kernels/codes", "kernels/features", "kernels/layout", "kernels/methods"}
