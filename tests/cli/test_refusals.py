@@ -24,6 +24,8 @@ REFUSED = {
     "walk --set mu_fc=0.3 --set floor_friction=0.3": "parameters.floor_friction: given twice on the command line;",
     "walk -o new --device cuda:98": "options.device: there is no cuda:98 on this machine",
     "walk --config nowhere.yaml": "nowhere.yaml: No such file",
+    "walk --set walk_until=1": "--set 'walk_until': unknown name; use stop_time, its new name",
+    "walk --record-loads": "No such option: --record-loads (Possible options: --record-joint-forces)",
     "walk --frobnicate": "No such option: --frobnicate; see warpchain walk --help",
     "walk extra": "Got unexpected extra argument(s) (extra); see warpchain walk --help",
     "walk -o walk.h5": "walk.h5: cannot be written (Not a directory); give a folder that is there",

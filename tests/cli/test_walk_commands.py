@@ -107,7 +107,7 @@ def test_like_changes_single_values(command: Command, tiny_walk: WalkResult, sav
         ("--method reference", {"method": "reference"}),
         ("--method standard --tol 1e-4", {"method": "standard", "tolerance": 1e-4}),
         ("--tol 1e-4", {"method": "dp5", "tolerance": 1e-4}),
-        ("--method standard --record-loads -o new", {"method": "explicit"}),
+        ("--method standard --record-joint-forces -o new", {"method": "explicit"}),
     ],
 )
 def test_a_method_beside_like_brings_its_settings(

@@ -128,6 +128,11 @@ STILL = [0.1, 0, 0, 0]
         ({"coulomb_frictions": [-1.0] * 60}, "scene.coulomb_frictions[0]: Input should be greater than or equal to 0"),
         ({"mass_gradient": 1.0}, "scene.mass_gradient: Input should be less than 1; given 1.0"),
         ({"charm_mass": 0.02, "load_factor": 9.0}, "scene.load_factor: 9 is too much for links of so little rotary "),
+        # names of development versions
+        ({"walk_until": 1.0}, "'walk_until': unknown name; use stop_time, its new name"),
+        ({"further_hold": 1.0}, "'further_hold': unknown name; use extra_hold, its new name"),
+        ({"stiff_joint_factor": 2}, "'stiff_joint_factor': unknown name; use joint_friction_factor, its new name"),
+        ({"record_loads": True}, "'record_loads': unknown name; use record_joint_forces, its new name"),
         # motions of the sprocket
         ({"release": [STILL], "start": "ellipse"}, "scene.release: a motion of the sprocket, which start: ellipse"),
         ({"release": [STILL], "plane": "tilting"}, "scene.release: a motion of the sprocket, which plane: tilting"),

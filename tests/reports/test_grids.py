@@ -119,7 +119,7 @@ def test_further_axes_are_panels(tmp_path: Path) -> None:
     grid = {"links": [60, 90], "start": ["rest", "ellipse"], "gravity": GRAVITY, "floor_friction": FRICTION}
     drawn = panels(make_sweep(tmp_path / "four", sweep(grid)).plot())
     assert list(drawn) == [f"$n$ = {n}, start = {start}" for n in (60, 90) for start in ("rest", "ellipse")]
-    counts = {"gravity": 6, "settle_time": 5, "further_hold": 7, "walk_limit": 8}
+    counts = {"gravity": 6, "settle_time": 5, "extra_hold": 7, "walk_limit": 8}
     grid = {name: list(range(1, 1 + count)) for name, count in counts.items()}
     figure = make_sweep(tmp_path / "many", sweep(grid, samples=1), lambda walk: 1.0 + walk.index).plot()
     assert len(panels(figure)) == MOST_PANELS

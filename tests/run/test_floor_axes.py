@@ -34,7 +34,7 @@ def sweep(out: Path, **changes: Any) -> warpchain.SweepResult:
 
 def test_heaps_slide_down_slopes_with_the_acceleration_of_a_block(tmp_path: Path) -> None:
     """Over slope × friction of the floor, collapsed chains gain g (sin α − μ cos α) a second."""
-    scene = {"start": "ellipse", "links": 12, "frequency": 2, "walk_until": 1.2}
+    scene = {"start": "ellipse", "links": 12, "frequency": 2, "stop_time": 1.2}
     result = sweep(tmp_path, scene=scene, grid={"slope": [25, 35], "floor_friction": [0.1, 0.2]})
     for degrees, friction in np.ndindex(2, 2):
         angle, mu = np.radians(result.axes["slope"][degrees]), result.axes["floor_friction"][friction]

@@ -48,7 +48,7 @@ def test_good_input_is_computed() -> None:
         for duration in (0, 0.0, 1.5, np.float32(1), np.int64(1)):
             with pytest.raises(ComputedError):
                 simulate("soft", position, np.zeros((8, 3)), duration, times=(0.0,))
-    numbers = {"seed": np.int32(3), "frame_interval": np.float64(0.02), "record_loads": np.bool_(True)}
+    numbers = {"seed": np.int32(3), "frame_interval": np.float64(0.02), "record_joint_forces": np.bool_(True)}
     for settings in ({}, {"start": "spinning"}, {"start": "ellipse", **numbers}, {"setup": SETUP}):
         with pytest.raises(ComputedError):
             walk(**settings)
@@ -103,7 +103,7 @@ REFUSED: dict[Callable[..., object], list[tuple[dict[str, Any], str]]] = {
         ({"frame_interval": 1e300}, r"frame_interval: .*"),  # its number of samples must fit into 64 bits
         ({"frame_interval": 9e-7}, r"frame_interval: .*"),
         ({"record_interval": 1e-300}, r"(options\.record_interval|frame_interval): .*"),
-        ({"record_loads": 1}, r"record_loads: Input should be a valid boolean; given 1"),
+        ({"record_joint_forces": 1}, r"record_joint_forces: Input should be a valid boolean; given 1"),
     ],
     Chains: [
         ({"velocity": np.zeros((2, 8, 2))}, r"velocity: its shape is \(2, 8, 2\); give \(2, 8, 3\)"),

@@ -86,7 +86,7 @@ def test_notebooks_complete_the_names():
     """The signatures of walk, sweep and simulate name every field that they take."""
     for function, name, missing in (
         (warpchain.walk, "floor_friction", "soften"),
-        (warpchain.sweep, "walk_until", "soften"),
+        (warpchain.sweep, "stop_time", "soften"),
         (warpchain.simulate, "skin", "links"),
     ):
         names = inspect.signature(function).parameters

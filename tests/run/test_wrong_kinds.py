@@ -15,11 +15,11 @@ from tests.support.command_line import Command
 from tests.support.made_sweeps import make_sweep
 from tests.support.presets import SOFT
 from tests.support.sweep_content import content
-from warpchain import films
+from warpchain import video
 from warpchain.inputs.validation import InputError
 from warpchain.reports.sweep_figures import figures as sweep_figures
 
-SHORT: dict[str, Any] = {"start": "ellipse", "walk_until": 0.02, "links": 40, "preset": "soft"}
+SHORT: dict[str, Any] = {"start": "ellipse", "stop_time": 0.02, "links": 40, "preset": "soft"}
 
 
 def joined() -> tuple[Any, Any]:
@@ -33,7 +33,7 @@ def joined() -> tuple[Any, Any]:
     ("call", "problem"),
     [
         (lambda: warpchain.sweep(links=[40], out="never", executor=3), "executor: expected one with submit, such as "),
-        (lambda: films.film_of(3), "walk: expected a WalkResult, got 3"),  # type: ignore[arg-type]
+        (lambda: video.video_of(3), "walk: expected a WalkResult, got 3"),  # type: ignore[arg-type]
         (
             lambda: warpchain.sweep(points={"mu": [0.1]}, out="never"),
             "sweep.points.mu: unknown name; did you mean mu_fc, ",

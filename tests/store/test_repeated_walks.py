@@ -22,7 +22,7 @@ SWEEP: dict[str, Any] = {
     "preset": "soft",
     "method": "dp5",
     "clearance": 1e-3,
-    "walk_until": 0.05,
+    "stop_time": 0.05,
 }
 
 

@@ -112,7 +112,7 @@ def test_a_new_field_with_a_default_changes_no_digest() -> None:
     planned = load_sweep(content())
     older = planned.canonical()
     for block in older["blocks"]:
-        del block["scene"]["walk_until"], block["options"]["soften_area"], block["parameters"]["half_width"]
+        del block["scene"]["stop_time"], block["options"]["soften_area"], block["parameters"]["half_width"]
     assert load_sweep(older).digest() == planned.digest()
-    text = json.dumps(load_sweep(content(scene={"walk_until": 1.0})).canonical())
+    text = json.dumps(load_sweep(content(scene={"stop_time": 1.0})).canonical())
     assert load_sweep(json.loads(text)).digest() != planned.digest()

@@ -59,7 +59,7 @@ def test_the_sprocket_is_where_scipy_has_it() -> None:
 
 def test_a_sprocket_that_goes_on_as_it_was_keeps_the_loop() -> None:
     """The loop stays where and as fast as it was; when the sprocket vanishes, its centre falls on a parabola."""
-    walk = warpchain.walk(**SPUN, release=[[0.2, 0.0, 0.0, 20.0]], clearance=1.0, walk_until=0.4)
+    walk = warpchain.walk(**SPUN, release=[[0.2, 0.0, 0.0, 20.0]], clearance=1.0, stop_time=0.4)
     held = walk.time <= 0.2
     assert np.ptp(walk.center[held], axis=0).max() < 2e-3
     assert np.ptp(walk.kinetic_energy[held]) < 0.02 * walk.kinetic_energy[0]

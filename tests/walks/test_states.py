@@ -17,7 +17,7 @@ from warpchain.walks.walk_numbers import MOTION, NUMBERS
 
 SPUN = {"links": 36, "frequency": 15.0, "start": "spinning"}
 ELLIPSE = {"links": 36, "frequency": 20.0, "start": "ellipse", "preset": "soft", "method": "dp5"}
-BRIEF = {"links": 12, "frequency": 3.0, "start": "ellipse", "preset": "soft", "clearance": 1e-3, "walk_until": 0.03}
+BRIEF = {"links": 12, "frequency": 3.0, "start": "ellipse", "preset": "soft", "clearance": 1e-3, "stop_time": 0.03}
 WALKS: dict[str, tuple[dict[str, Any], float]] = {
     "explicit": (ELLIPSE, 0.6),
     "at the release": (ELLIPSE, 0.0),
@@ -105,7 +105,7 @@ def test_a_state_goes_on_with_other_values(fall: WalkResult) -> None:
     """Other parameters, options, limits and floors hold from the state on, and the ledger of the new walk closes."""
     state = fall.state(0.3)
     planned, slippery, finer, other = (
-        warpchain.walk(start=state, walk_until=0.4, **given)
+        warpchain.walk(start=state, stop_time=0.4, **given)
         for given in ({}, {"floor_friction": 0.01}, {"tolerance": 1e-8}, {"method": "os32"})
     )
     assert planned.status.label == "finished" and planned.walk_time == 0.4

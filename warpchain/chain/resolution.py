@@ -22,8 +22,8 @@ F = TypeVar("F", bound=Callable[..., object])
 SECTIONS: Final[Mapping[str, type[Section]]] = {"scene": Scene, "options": Options, "parameters": Parameters}
 """Sections of a user's values, and the models that hold their fields."""
 OF_THE_WALK: Final = (
-    *("walk_limit", "walk_until", "distance_limit", "floor", "slope"),
-    *("charm_mass", "charm_inertia", "charm_radius", "charm_link", "stiff_joint", "stiff_joint_factor"),
+    *("walk_limit", "stop_time", "distance_limit", "floor", "slope"),
+    *("charm_mass", "charm_inertia", "charm_radius", "charm_link", "stiff_joint", "joint_friction_factor"),
     *("mass_gradient", *OF_LINKS),
 )
 """Fields of the scene that matter after the release, and may change there."""

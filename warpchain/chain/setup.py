@@ -134,7 +134,7 @@ class Setup:
     @property
     def fingerprint(self) -> NDArray[np.uint8]:
         """What tells setups apart that would carry one state on in different ways, as bytes; its limits do not."""
-        limits = {"walk_limit", "walk_until", "distance_limit"}
+        limits = {"walk_limit", "stop_time", "distance_limit"}
         parts = [self.parameters.model_dump_json(), self.options.model_dump_json(exclude_defaults=True)]
         parts.append(self.scene.model_dump_json(exclude=limits, exclude_defaults=True))
         return np.frombuffer(hashlib.sha256("\n".join(parts).encode()).digest(), dtype=np.uint8)

@@ -66,7 +66,7 @@ def walk(
     index: Annotated[_Text, option("I", _INDEX)] = None,
     folder: Annotated[Path | None, output("DIR", _OUTPUT)] = None,
     frame_interval: Annotated[_Text, option("SECONDS", _FRAMES)] = None,
-    record_loads: Annotated[bool, typer.Option("--record-loads", help=_LOADS)] = False,
+    record_joint_forces: Annotated[bool, typer.Option("--record-joint-forces", help=_LOADS)] = False,
     as_json: Annotated[bool, JSON] = False,
 ) -> None:
     """Spin up one chain, drop it, and follow it until it rests."""
@@ -116,11 +116,11 @@ def walk(
         setup = continued(base.start, given)
     else:
         sections = {name: {**own.get(name, {}), **values} for name, values in given.items()}
-        setup = resolve(preset or DEFAULT_PRESET, **sections, seed=number, loads=record_loads)
-    if folder is None and (frame_interval is not None or record_loads):
-        name = "--record-loads" if frame_interval is None else "--frame-interval"
+        setup = resolve(preset or DEFAULT_PRESET, **sections, seed=number, loads=record_joint_forces)
+    if folder is None and (frame_interval is not None or record_joint_forces):
+        name = "--record-joint-forces" if frame_interval is None else "--frame-interval"
         raise InputError(f"{name}: there is no folder to write to; add -o DIR")
-    usual = None if folder is None else 1e-4 if record_loads else 2e-3
+    usual = None if folder is None else 1e-4 if record_joint_forces else 2e-3
     interval = usual if frame_interval is None else parse_yaml(frame_interval, "frame_interval")
     if folder is not None:
         try_walk_folder(folder)
@@ -129,7 +129,7 @@ def walk(
             setup,
             seed=number,
             frame_interval=interval,
-            record_loads=record_loads,
+            record_joint_forces=record_joint_forces,
             on_progress=lambda progress: show(walk_progress_text(progress)),
         )
     paths: list[Path] = []

@@ -67,7 +67,7 @@ class Scene(Section):
     period or, if the loads were never scaled, the time that slow waves need to cross the loop"""
     steady_tolerance: float = number_field(0.01, "1", gt=0, le=1)
     """largest relative change of the loop's height, width and horizontal position that counts as steady"""
-    further_hold: float = number_field(0.0, "s", ge=0, le=LONGEST)
+    extra_hold: float = number_field(0.0, "s", ge=0, le=LONGEST)
     """time for which a steady loop is held longer before its release"""
     hold_limit: float = number_field(30.0, "s", gt=0, le=LONGEST)
     """longest hold at full frequency; a loop that is not steady by then ends the walk as not_steady"""
@@ -83,7 +83,7 @@ class Scene(Section):
     """inclination of the infinite floor; positive slopes descend in the walking direction"""
     distance_limit: float | None = number_field(None, "m", gt=0, le=HIGHEST)
     """distance along the floor from x = 0 at which a walk ends as distance_limit; null: no limit"""
-    walk_until: float | None = number_field(None, "s", gt=0, le=LONGEST)
+    stop_time: float | None = number_field(None, "s", gt=0, le=LONGEST)
     """time after the release at which a walk that is not at rest ends, as planned, as finished and without Δx; null:
     no such time"""
     plane: Literal["fixed", "tilting"] = "fixed"
@@ -109,7 +109,7 @@ class Scene(Section):
     """radius of the contact circles of charm_link; null: unchanged"""
     stiff_joint: Whole = number_field(0, "1", ge=0, le=MOST_LINKS - 1)
     """index of the link at whose end the joint with changed friction is"""
-    stiff_joint_factor: float = number_field(1.0, "1", ge=0, le=1e6)
+    joint_friction_factor: float = number_field(1.0, "1", ge=0, le=1e6)
     """factor applied to the viscous and Coulomb friction of stiff_joint; its stiffness does not change"""
     mass_gradient: float = number_field(0.0, "1", gt=-1, lt=1)
     """relative change of mass and inertia along the chain, linear from 1 − this to 1 + this times their own values"""

@@ -111,6 +111,13 @@ SECTION_OF: Final[dict[str, str]] = {}
 SYMBOL_OF: Final[dict[str, str]] = {}
 """Name → the paper's symbol, in ASCII; no symbol is the name of a field."""
 NAME_OF_SYMBOL: Final[dict[str, str]] = {}
+NEW_NAMES: Final = {
+    "further_hold": "extra_hold",
+    "record_loads": "record_joint_forces",
+    "stiff_joint_factor": "joint_friction_factor",
+    "walk_until": "stop_time",
+}
+"""Names that values had in development versions → the names that replace them; the old ones are refused."""
 
 _SPELLINGS: Final = str.maketrans(
     {"ℓ": "ell", "β": "beta", "μ": "mu", "\N{MICRO SIGN}": "mu", "ν": "nu", "τ": "tau", "ω": "omega"}
@@ -315,6 +322,8 @@ def checked_path(value: object, path: str) -> Path:
 def suggestion(given: object, known: Mapping[str, str] | Iterable[str]) -> str:
     """The remedy for an unknown name: the closest of the known, or as many as find room, shown as a mapping says."""
     names = known if isinstance(known, Mapping) else {name: name for name in known if name != given}
+    if isinstance(given, str) and given in NEW_NAMES:
+        return f"use {NEW_NAMES[given]}, its new name"
     close = difflib.get_close_matches(str(given)[:_LONGEST_VALUE], names, n=1) if isinstance(given, str) else []
     if close:
         return f"did you mean {names[close[0]]}?"

@@ -139,7 +139,7 @@ def _tilt(walk: Walk, figure: Figure) -> None:
     Marked are the moments at which the chain was first tilted by 45°, beyond which it has fallen over, and at which
     its loop collapsed, if they came. A `ValueError` says that the plane of the walk is fixed.
     """
-    if walk.joints_in_room is None:
+    if walk.joints_lab is None:
         raise ValueError("walk: its plane is fixed, so it has no tilt; run it with plane: tilting")
     angles, drift = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     for limit in (-FALLEN, FALLEN):
@@ -250,7 +250,7 @@ def film_strip(walk: Walk, figure: Figure | None = None) -> Figure:
     the walk. A `ValueError` says that the walk has no frames or broken ones.
     """
     joints = checked_joints(walk)
-    tilts = walk.joints_in_room is not None
+    tilts = walk.joints_lab is not None
     low, high = walk_box(walk, joints)
     moments = [] if tilts else _moments(walk)
     size = high - low

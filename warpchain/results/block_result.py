@@ -175,7 +175,7 @@ class BlockResult:
         sample: int | None = None,
         frame_interval: float | None = 2e-3,
         record_before: float | None = None,
-        record_loads: bool = False,
+        record_joint_forces: bool = False,
         **at: Any,
     ) -> WalkResult:
         """Run one walk again, with series and frames: `walk(17)`, or `walk(links=60, frequency=15, sample=2)`.
@@ -188,7 +188,7 @@ class BlockResult:
             sample: number of the sample; None: 0.
             frame_interval: as of `warpchain.walk`, like the next two.
             record_before: see there.
-            record_loads: see there.
+            record_joint_forces: see there.
             at: value of each axis; of an axis with just one value it may be left out.
 
         Raises:
@@ -205,7 +205,11 @@ class BlockResult:
             _, place = located([self], index)
         from warpchain.results.one_walk import run_walk
 
-        recording = {"frame_interval": frame_interval, "record_before": record_before, "record_loads": record_loads}
+        recording = {
+            "frame_interval": frame_interval,
+            "record_before": record_before,
+            "record_joint_forces": record_joint_forces,
+        }
         walk = run_walk(self.setup_at(place), seed=self.origin.seed, **recording)  # type: ignore[arg-type]
         dx, number = self.columns["dx"][place], self.columns["index"][place]
         if self.is_there[place] and not self.has_same(walk, place):
