@@ -67,5 +67,5 @@ def test_a_sweep_keeps_them(tmp_path: Path) -> None:
     assert of_sweep.mean_loop().kink().dip < 0
     with pytest.raises(InputError, match=r"sweep\.record\.series\.before: unknown name"):
         warpchain.sweep(content | {"record": {"series": {"before": 0.1}}}, tmp_path / "three")
-    with pytest.raises(InputError, match=r"sweep\.record\.frames\.before: .*; given -1"):
+    with pytest.raises(InputError, match=r"sweep\.record\.frames\.before: .*, got -1"):
         warpchain.sweep(content | {"record": {"series": True, "frames": {"before": -1}}}, tmp_path / "three")

@@ -179,7 +179,7 @@ def test_an_unknown_unit_or_a_missing_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"video: expected .* check unit, fps, or set release"):
         video.friction_line(video.read(path, links=60, frequency=20.0))
     path.unlink()
-    with pytest.raises(InputError, match=r"^/dev/null: no regular file; give the path of a text table"):
+    with pytest.raises(InputError, match=r"^/dev/null: not a regular file; use the path of a text table"):
         video.read("/dev/null", links=60, frequency=20.0)
     with pytest.raises(OSError, match=r"video\.txt"):
         video.read(tmp_path / "video.txt", links=60, frequency=20.0)

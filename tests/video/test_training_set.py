@@ -128,7 +128,7 @@ def test_video_that_are_not_the_training_set_s_are_refused() -> None:
             training.posterior(wrong)
     unlisted: Any
     for unlisted in (clip, [clip, "video.csv"], None):
-        with pytest.raises(InputError, match=r"^videos(\[1\])?: Input should be a"):
+        with pytest.raises(InputError, match=r"^videos(\[1\])?: expected a"):
             training.posterior(unlisted)
     with pytest.raises(InputError, match=r"^videos: unlike the training set; check .* outline"):
         training.posterior([dataclasses.replace(clip, outline=np.full(4, np.nan))])

@@ -105,7 +105,7 @@ def test_standard_is_explicit_where_loads_are_recorded() -> None:
     rigid = warpchain.walk(**brief)
     assert rigid.setup.options.method == "hybrid" and rigid.frame_forces.shape == (0, 24, 2)
     assert rigid.frame_moments.shape == (0, 24)
-    refusal = r"options\.method: 'hybrid' has rigid joints, without forces; give explicit"
+    refusal = r"options\.method: 'hybrid' has rigid joints, without forces; use explicit"
     for settings in ({"method": "hybrid"}, {"setup": rigid.setup}):
         with pytest.raises(InputError, match=refusal):
             warpchain.walk(**settings, record_joint_forces=True)

@@ -160,7 +160,7 @@ def test_the_clock_of_a_state_is_that_of_its_walk() -> None:
     """Any other time is refused; a measured state has time 0."""
     state = State.of_joints(RING)
     for time in (-1.0, 1.0, math.nan, "a"):
-        with pytest.raises(InputError, match=r"^time: .* is not that of its walk; give 0$"):
+        with pytest.raises(InputError, match=r"^time: expected the time of its walk, 0 s, got .*"):
             replace(state, time=time)
 
 
@@ -194,7 +194,7 @@ def test_a_chain_on_an_outline_falls_to_rest() -> None:
     [
         (RING * 1000, "joints: the loop is not closed, or lengths are not in m"),
         (outline(11, LENGTH), "joints: 11 is odd"),
-        (RING[:, :1], r"joints: its shape is \(12, 1\)"),
+        (RING[:, :1], r"joints: expected shape .*, got \(12, 1\)"),
         (RING * np.nan, "joints: holds a number that is not finite"),
         ("ring", "joints: not an array"),
     ],
@@ -220,7 +220,7 @@ def test_what_comes_before_a_state_is_refused(fall: WalkResult, settings: dict[s
     with pytest.raises(InputError, match=problem):
         warpchain.walk(start=fall.state(0.2), **settings)
     for time in (-0.1, math.nan, "soon"):
-        with pytest.raises(InputError, match=r"^t: .*; give"):
+        with pytest.raises(InputError, match=r"^t: .*; use"):
             fall.state(time)
 
 

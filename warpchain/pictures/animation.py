@@ -55,7 +55,7 @@ def animate(walk: Walk, path: str | os.PathLike[str], *, fps: float = 30.0, slow
     """
     suffix = Path(path).suffix.lower()
     if suffix not in (".gif", ".mp4", ".html"):
-        raise ValueError(f"{path}: unknown kind of picture; give a name that ends in .gif, .mp4 or .html")
+        raise ValueError(f"{path}: unknown file format; use a name that ends in .gif, .mp4 or .html")
     checked(slow, "slow", _POSITIVE)
     checked(fps, "fps", _GIF_RATE if suffix == ".gif" else _POSITIVE)
     checked_joints(walk)

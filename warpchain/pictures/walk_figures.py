@@ -63,13 +63,13 @@ _CLOSE_UP_LINKS, _CLOSE_UP_ASPECT = 9, 1.5
 def draw(walk: Walk, kind: Kind, *, figure: Figure | None = None, ax: Axes | None = None) -> Figure:
     """Draw a walk; arguments and errors as of `WalkResult.plot`."""
     if kind not in get_args(Kind):
-        raise ValueError(f"kind: {kind!r} is unknown; give {', '.join(map(repr, get_args(Kind)))}")
+        raise ValueError(f"kind: unknown kind {kind!r}; use {', '.join(map(repr, get_args(Kind)))}")
     if kind not in ("film_strip", "loop") and len(walk.time) == 0:
         raise ValueError(f"walk: it has no time series. {walk.status.sentence}")
     if ax is not None and kind != "energy":
-        raise ValueError(f"ax: {kind} has several axes; give an empty figure=, or a SubFigure of yours")
+        raise ValueError(f"ax: {kind} has several axes; use figure= with an empty Figure or SubFigure")
     if ax is not None and figure is not None:
-        raise ValueError("ax: given together with figure; leave one out")
+        raise ValueError("ax: not possible with figure; remove one")
     if figure is not None:
         checked_figure(figure)
     if ax is not None and not isinstance(ax, Axes):

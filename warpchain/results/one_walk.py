@@ -37,10 +37,10 @@ def run_walk(
     before: float | None = checked(record_before, "record_before", _BEFORE | None, "s")
     if interval is None and (before or record_joint_forces):
         name = "record_before" if before else "record_joint_forces"
-        raise InputError(f"{name}: kept with frames, but frame_interval is None; give a frame_interval as well")
+        raise InputError(f"{name}: needs frames, but frame_interval is None; set frame_interval as well")
     method = setup.options.method
     if record_joint_forces and find_method(method).has_rigid_flight:
-        raise InputError(f"options.method: {method!r} has rigid joints, without forces; give explicit")
+        raise InputError(f"options.method: {method!r} has rigid joints, without forces; use explicit")
     if not setup.has_drive:
         before = 0.0
     earlier = RECORD_BEFORE if before is None else before

@@ -77,7 +77,7 @@ def walk(
     if isinstance(start, State) and setup is None:
         for name, value in {"preset": preset, "seed": seed}.items():
             if value is not None:
-                raise InputError(f"{name}: given together with a state, which has its chain; leave it out")
+                raise InputError(f"{name}: not possible with a state, which has its own chain; remove it")
         del given["start"]
         setup = continued(start, by_section(given))
     elif setup is None:
@@ -85,9 +85,11 @@ def walk(
         setup = resolve(preset, **by_section(given), seed=seed, loads=loads)
     else:
         if not isinstance(setup, Setup):
-            raise InputError(f"setup: {shown(setup)} is none; give that of a WalkResult, such as load_walk(…).setup")
+            raise InputError(
+                f"setup: expected the setup of a walk, got {shown(setup)}; pass walk.setup, e.g. load_walk(…).setup"
+            )
         if others := [*["preset"] * (preset is not None), *given]:
-            raise InputError(f"{', '.join(others)}: given together with setup, which is complete; leave one out")
+            raise InputError(f"{', '.join(others)}: not possible with setup, which is complete; remove one")
     with changing_line(in_terminals=False) as show:
         return run_walk(
             setup,

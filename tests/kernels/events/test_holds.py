@@ -142,7 +142,7 @@ def test_factors_that_links_cannot_bear_are_refused() -> None:
     most = alternating(SOFT.with_values(TENTH), 4).greatest_load(SOFT.link_length)
     setup_walk("soft", TENTH | {"load_factor": 0.999 * most})
     with pytest.raises(
-        InputError, match=r"^scene\.load_factor: 15 is too much for links .*; give at most 1\.\d+, or null$"
+        InputError, match=r"^scene\.load_factor: 15 is too much for links .*; use at most 1\.\d+, or null$"
     ):
         setup_walk("soft", TENTH | {"load_factor": 15.0})
     setup_walk("soft", TENTH | {"load_factor": 15.0, "start": "ellipse"})
