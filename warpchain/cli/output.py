@@ -154,7 +154,7 @@ def try_walk_folder(folder: Path) -> None:
         with tempfile.TemporaryDirectory(prefix=".warpchain-", dir=nearest):
             pass
     if (folder / "sweep.h5").exists():
-        raise InputError(f"{folder}: holds a sweep; give another folder")
+        raise InputError(f"{folder}: already holds a sweep; use another folder")
     if folder.is_dir():
         for name in (RECORD, *_PICTURES):
             checked_output(folder / name)

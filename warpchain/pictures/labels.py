@@ -155,7 +155,7 @@ def lost_note(cells: Sequence[Mapping[str, Any]]) -> str:
 def kinds_of(walk: Walk) -> tuple[Kind, ...]:
     """The figures that a walk has, if it was recorded."""
     kinds: tuple[Kind, ...] = get_args(Kind)
-    return tuple(kind for kind in kinds if kind != "tilt" or walk.joints_in_room is not None)
+    return tuple(kind for kind in kinds if kind != "tilt" or walk.joints_lab is not None)
 
 
 def setting(walk: Walk) -> str:

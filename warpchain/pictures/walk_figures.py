@@ -63,13 +63,13 @@ _CLOSE_UP_LINKS, _CLOSE_UP_ASPECT = 9, 1.5
 def draw(walk: Walk, kind: Kind, *, figure: Figure | None = None, ax: Axes | None = None) -> Figure:
     """Draw a walk; arguments and errors as of `WalkResult.plot`."""
     if kind not in get_args(Kind):
-        raise ValueError(f"kind: {kind!r} is unknown; give {', '.join(map(repr, get_args(Kind)))}")
+        raise ValueError(f"kind: unknown kind {kind!r}; use {', '.join(map(repr, get_args(Kind)))}")
     if kind not in ("film_strip", "loop") and len(walk.time) == 0:
         raise ValueError(f"walk: it has no time series. {walk.status.sentence}")
     if ax is not None and kind != "energy":
-        raise ValueError(f"ax: {kind} has several axes; give an empty figure=, or a SubFigure of yours")
+        raise ValueError(f"ax: {kind} has several axes; use figure= with an empty Figure or SubFigure")
     if ax is not None and figure is not None:
-        raise ValueError("ax: given together with figure; leave one out")
+        raise ValueError("ax: not possible with figure; remove one")
     if figure is not None:
         checked_figure(figure)
     if ax is not None and not isinstance(ax, Axes):
@@ -139,7 +139,7 @@ def _tilt(walk: Walk, figure: Figure) -> None:
     Marked are the moments at which the chain was first tilted by 45°, beyond which it has fallen over, and at which
     its loop collapsed, if they came. A `ValueError` says that the plane of the walk is fixed.
     """
-    if walk.joints_in_room is None:
+    if walk.joints_lab is None:
         raise ValueError("walk: its plane is fixed, so it has no tilt; run it with plane: tilting")
     angles, drift = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     for limit in (-FALLEN, FALLEN):
@@ -250,7 +250,7 @@ def film_strip(walk: Walk, figure: Figure | None = None) -> Figure:
     the walk. A `ValueError` says that the walk has no frames or broken ones.
     """
     joints = checked_joints(walk)
-    tilts = walk.joints_in_room is not None
+    tilts = walk.joints_lab is not None
     low, high = walk_box(walk, joints)
     moments = [] if tilts else _moments(walk)
     size = high - low
