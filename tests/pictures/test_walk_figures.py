@@ -132,7 +132,7 @@ def test_film_strips_of_odd_walks() -> None:
 def test_film_strip_shows_two_sides_of_a_plane_that_tilts() -> None:
     """Two views of the same instants, to one scale."""
     walk = make_tilting_walk()
-    joints = walk.joints_in_room
+    joints = walk.joints_lab
     assert joints is not None
     figure = film_strip(walk)
     side, above = figure.axes

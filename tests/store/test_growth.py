@@ -102,10 +102,10 @@ HYPERCUBE = content(samples=8, sampler="latin_hypercube")
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (HYPERCUBE, "but a latin_hypercube does not grow; give samples: 4"),
+        (HYPERCUBE, "but a latin_hypercube design cannot grow; use samples: 4"),
         (
             content(samples=3),
-            "holds 4 samples of each cell of block main, but 3 are asked for; give samples: 4 or more",
+            "holds 4 samples of each cell of block main, but 3 are requested; use samples: 4 or more",
         ),
         (content(samples=8, seed=8), "holds another sweep"),
         (content(samples=8, grid={"links": [60, 90], "frequency": [5, 12]}), "holds another sweep"),

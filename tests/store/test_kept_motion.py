@@ -119,12 +119,12 @@ def test_only_chosen_samples_are_kept(kept: Path) -> None:
     assert len(last.frame_time) == pytest.approx(20, abs=1) and first.sprocket_center is None
     assert last.setup.scene.links == 44
     for message, at in (
-        (r"walk 6 is not there; give one of the samples 0, 3", {"links": 44, "frequency": 5, "sample": 1}),
-        (r"frequency: 6 is not on the axis; give one of 5\.0, 15\.0", {"links": 44, "frequency": 6}),
-        (r"frequency: missing; give one of 5\.0, 15\.0", {"links": 44}),
-        (r"link: no axis of block main; did you mean links", {"link": 44}),
-        (r"sample: there is no sample 5; give 0 to 4", {"links": 44, "frequency": 5, "sample": 5}),
-        (r"sample: there is no sample True", {"links": 44, "frequency": 5, "sample": True}),
+        (r"walk 6 is not there; use one of the samples 0, 3", {"links": 44, "frequency": 5, "sample": 1}),
+        (r"frequency: 6 is not on the axis; use one of 5\.0, 15\.0", {"links": 44, "frequency": 6}),
+        (r"frequency: missing; use one of 5\.0, 15\.0", {"links": 44}),
+        (r"link: not an axis of block main; did you mean links", {"link": 44}),
+        (r"sample: expected 0 to 4, got 5", {"links": 44, "frequency": 5, "sample": 5}),
+        (r"sample: expected 0 to 4, got True", {"links": 44, "frequency": 5, "sample": True}),
     ):
         with pytest.raises(InputError, match=message):
             result.series(**at)

@@ -111,9 +111,9 @@ def test_what_is_independent_differs_along_such_axes(sampler: str) -> None:
 @pytest.mark.parametrize(
     ("names", "problem"),
     [
-        (["frequency"], "sweep.independent: 'frequency' is not drawn; give one of clearance"),
-        (["clearence"], "sweep.independent: 'clearence' is not drawn; did you mean clearance?"),
-        ("clearance", "sweep.independent: Input should be a valid list"),
+        (["frequency"], "sweep.independent: 'frequency' is not sampled; use one of clearance"),
+        (["clearence"], "sweep.independent: 'clearence' is not sampled; did you mean clearance?"),
+        ("clearance", "sweep.independent: expected a list"),
     ],
 )
 def test_only_drawn_quantities_are_independent(names: Any, problem: str) -> None:
@@ -241,12 +241,10 @@ def test_every_planned_walk_is_possible(sampler: str) -> None:
 def test_samples_that_are_never_possible_are_refused() -> None:
     """One line names what is drawn, whether one quantity alone or all of them together are never physical."""
     never = Uniform(2.0, 3.0, (0.0, 1.0))
-    with pytest.raises(InputError, match=r"^scene\.phase: 1000 draws of .*2\.0, 3\.0.* were all out of bounds"):
+    with pytest.raises(InputError, match=r"^scene\.phase: 1000 samples of .*2\.0, 3\.0.* were all out of bounds"):
         draw({"gravity": Uniform(0.0, 1.0, (0.0, 1.0)), "phase": never}, np.random.default_rng(0))
     too_large = {"all": "fixed", "sprocket_radius": {"uniform": [0.061, 0.07]}}
-    problem = (
-        r"^sweep\.distributions: 1000 samples made no possible walk; the last: scene\.links: 32 links do not reach"
-    )
+    problem = r"^sweep\.distributions: none of 1000 samples makes a possible walk; the last: scene\.links: 32 links "
     for sampler in ("random", "sobol"):
         with pytest.raises(InputError, match=problem):
             load_sweep(content(grid=None, scene={"links": 32}, samples=4, sampler=sampler, distributions=too_large))

@@ -89,5 +89,5 @@ def test_walks_without_bounces_have_none() -> None:
     """One that was never released has an empty table; a profile is refused, because its normal is not one."""
     assert all(len(column) == 0 for column in make_unreleased().bounce_table().values())
     setup = resolve("paper", scene={"links": 30, "floor": [[0, 0], [1, 0.1]]}, options={}, parameters={})
-    with pytest.raises(InputError, match=r"bounces: .* give a walk on a flat floor or a slope"):
+    with pytest.raises(InputError, match=r"bounces: expected .* a flat floor or a slope"):
         make_walk(setup=setup).bounce_table()

@@ -107,7 +107,7 @@ def test_rules_change_what_they_say() -> None:
     charm = values_of(charm_link=7, charm_mass=0.02, charm_inertia=1e-6)
     assert charm.mass[7] == usual.mass[7] + 0.02 and charm.inertia[7] == usual.inertia[7] + 1e-6
     assert np.array_equal(np.delete(charm.mass, 7), np.delete(usual.mass, 7))
-    stiff = values_of(stiff_joint=3, stiff_joint_factor=10.0)
+    stiff = values_of(stiff_joint=3, joint_friction_factor=10.0)
     assert np.flatnonzero(stiff.viscous_friction != usual.viscous_friction).tolist() == [3]
     assert stiff.coulomb_friction[3] == 10 * SOFT.coulomb_friction
     graded = values_of(mass_gradient=0.5)

@@ -83,6 +83,6 @@ def link_values(scene: Scene, parameters: Parameters) -> LinkValues:
     values.inertia[scene.charm_link] += scene.charm_inertia
     if scene.charm_radius is not None:
         values.radius[scene.charm_link] = scene.charm_radius
-    values.viscous_friction[scene.stiff_joint] *= scene.stiff_joint_factor
-    values.coulomb_friction[scene.stiff_joint] *= scene.stiff_joint_factor
+    values.viscous_friction[scene.stiff_joint] *= scene.joint_friction_factor
+    values.coulomb_friction[scene.stiff_joint] *= scene.joint_friction_factor
     return values

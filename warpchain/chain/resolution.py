@@ -20,8 +20,8 @@ from warpchain.inputs.validation import InputError, checked, validated
 Values = Mapping[str, object]
 F = TypeVar("F", bound=Callable[..., object])
 OF_THE_WALK: Final = (
-    *("walk_limit", "walk_until", "distance_limit", "floor", "slope"),
-    *("charm_mass", "charm_inertia", "charm_radius", "charm_link", "stiff_joint", "stiff_joint_factor"),
+    *("walk_limit", "stop_time", "distance_limit", "floor", "slope"),
+    *("charm_mass", "charm_inertia", "charm_radius", "charm_link", "stiff_joint", "joint_friction_factor"),
     *("mass_gradient", *OF_LINKS),
 )
 """Fields of the scene that matter after the release, and may change there."""
@@ -49,7 +49,7 @@ def resolve(
 def continued(state: State, sections: Mapping[str, Values]) -> Setup:
     """The setup of a walk from a state, with other values of what comes behind the release; else an `InputError`."""
     if early := [name for name in sections["scene"] if name not in OF_THE_WALK]:
-        raise InputError(f"{', '.join(early)}: given together with a state, whose chain is released; leave it out")
+        raise InputError(f"{', '.join(early)}: not possible with a state, whose chain is already released; remove it")
     before, given = state.setup, sections["options"]
     options = validated(Options, {**before.options.beside(given), **given}, "options")
     scene = validated(Scene, {**vars(before.scene), **sections["scene"]}, "scene")
@@ -57,7 +57,7 @@ def continued(state: State, sections: Mapping[str, Values]) -> Setup:
     setup = Setup(before.preset, parameters, scene, options, state).checked("start")
     for name in OF_THE_WALK[:2]:
         if (end := getattr(scene, name)) is not None and end < state.time:
-            raise InputError(f"{name}: {end:g} s is before the state at {state.time:g} s; give a later time")
+            raise InputError(f"{name}: {end:g} s is before the state at {state.time:g} s; use a later time")
     if not options.unusual_values:
         check_units({name: getattr(parameters, name) for name in sections["parameters"]}, "parameters")
         check_units(sections["scene"], "scene")

@@ -24,13 +24,13 @@ class Shape(NamedTuple):
 
 HUNG: Final = Shape(
     lambda setups: stadium([setup.joint_radius for setup in setups]),
-    "scene.links: {links} links do not reach round the sprocket; give more",
+    "scene.links: {links} links do not reach around the sprocket; use more",
 )
 """The shape of starts on a sprocket."""
 SHAPES: Final[Mapping[str, Shape]] = {
     "ellipse": Shape(
         lambda setups: ellipse([setup.scene.ellipse_aspect for setup in setups]),
-        "scene.ellipse_aspect: too far from 1 for {links} links; give one closer to it",
+        "scene.ellipse_aspect: too far from 1 for {links} links; use a value closer to 1",
     ),
 }
 """Start without a sprocket, as in `warpchain.inputs.starts.STARTS` → its shape."""

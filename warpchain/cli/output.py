@@ -153,7 +153,7 @@ def try_walk_folder(folder: Path) -> None:
         with tempfile.TemporaryDirectory(prefix=".warpchain-", dir=nearest):
             pass
     if (folder / SWEEP_FILE).exists():
-        raise InputError(f"{folder}: holds a sweep; give another folder")
+        raise InputError(f"{folder}: already holds a sweep; use another folder")
     if folder.is_dir():
         for name in (WALK_FILE, *_PICTURES):
             checked_output(folder / name)

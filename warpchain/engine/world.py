@@ -264,7 +264,7 @@ class World:
         An `InputError` says that a warpchain with other rows or fields kept it.
         """
         if not np.array_equal(snapshot[_LAYOUT], _layout_digest()):
-            raise InputError("start: a warpchain with other kernels kept this state; take it anew from its walk")
+            raise InputError("start: this state was made with other kernels; take it again from its walk")
         for name, values in snapshot.items():
             if name.startswith(KEPT):
                 self._host[name][self._at] = values

@@ -144,7 +144,9 @@ def draw(distributions: Mapping[str, Distribution], rng: np.random.Generator) ->
                 break
         else:
             path, law = f"{SECTION_OF[name]}.{name}", distribution.canonical()
-            raise InputError(f"{path}: {DRAW_LIMIT} draws of {law} were all out of bounds; give a mean inside them")
+            raise InputError(
+                f"{path}: {DRAW_LIMIT} samples of {law} were all out of bounds; use a mean within the bounds"
+            )
     return drawn
 
 

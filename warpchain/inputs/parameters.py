@@ -115,7 +115,9 @@ class Parameters(Section):
     @model_validator(mode="after")
     def _circles_apart(self) -> Self:
         if not self.circle_radius < (half := self.link_length / 2):
-            raise InputError(f"circle_radius: {self.circle_radius} is not below half a link, {half}; give less")
+            raise InputError(
+                f"circle_radius: expected less than half a link, {half}, got {self.circle_radius}; use less"
+            )
         return self
 
     @classmethod
@@ -156,5 +158,5 @@ def preset(name: str) -> Parameters:
         InputError: the name is unknown; the message lists the known ones.
     """
     if not isinstance(name, str) or name not in PRESETS:
-        raise InputError(f"preset: {shown(name)} is unknown; presets are {', '.join(PRESETS)}")
+        raise InputError(f"preset: unknown preset {shown(name)}; use one of {', '.join(PRESETS)}")
     return PRESETS[name]

@@ -109,6 +109,13 @@ _SECTION_OF: Final[dict[str, str]] = {}
 _SYMBOL_OF: Final[dict[str, str]] = {}
 _NAME_OF_SYMBOL: Final[dict[str, str]] = {}
 """What refusals know of the sections that are imported; `warpchain.inputs.fields` has all."""
+NEW_NAMES: Final = {
+    "further_hold": "extra_hold",
+    "record_loads": "record_joint_forces",
+    "stiff_joint_factor": "joint_friction_factor",
+    "walk_until": "stop_time",
+}
+"""Names that values had in development versions → the names that replace them; the old ones are refused."""
 
 _SPELLINGS: Final = str.maketrans(
     {"ℓ": "ell", "β": "beta", "μ": "mu", "\N{MICRO SIGN}": "mu", "ν": "nu", "τ": "tau", "ω": "omega"}
@@ -150,7 +157,7 @@ def by_name(values: Mapping[Any, T], path: str = "") -> dict[Any, T]:
     for written, value in values.items():
         name = full_name(written)
         if name in named:
-            raise InputError(f"{path_of(path, name)}: given twice, also as {shown(_SYMBOL_OF[name])}; leave one out")
+            raise InputError(f"{path_of(path, name)}: given twice, also as {shown(_SYMBOL_OF[name])}; remove one")
         named[name] = value
     return named
 
@@ -158,7 +165,7 @@ def by_name(values: Mapping[Any, T], path: str = "") -> dict[Any, T]:
 def suggested_name(written: object, keys: Iterable[str] = ()) -> str:
     """The remedy for an unknown name of a field, or for one of these keys, or for a field in a wrong place."""
     if written in _SECTION_OF:
-        return f"give it in {_SECTION_OF[str(written)]}"
+        return f"move it to {_SECTION_OF[str(written)]}"
     stem = f"{spelled(written)}_" if isinstance(written, str) else ""
     if family := [symbol for symbol in _NAME_OF_SYMBOL if stem and symbol.startswith(stem)]:  # mu: of which pair?
         return f"did you mean {' or '.join(filter(None, (', '.join(family[:-1]), family[-1])))}?"
@@ -205,17 +212,49 @@ def refusals(error: ValidationError, path: str, keys: Iterable[str] = (), unit: 
             unknown = "not possible here" if problem["loc"][-1] in _SECTION_OF else "unknown name"
             lines.append(f"{where}: {unknown}; {suggested_name(problem['loc'][-1], keys)}")
         elif problem["type"] == "model_type":
-            lines.append(f"{where}: {shown(problem['input'])} is no mapping; give names with values")
+            lines.append(f"{where}: expected names with values, got {shown(problem['input'])}; use a mapping")
         elif cause is not None or problem["type"] == "missing":
-            lines.append(f"{where}: {cause or 'missing; give a value'}")
+            lines.append(f"{where}: {cause or 'missing; set a value'}")
         else:
             its_unit = next((field_unit(_FIELDS[name]) for name in problem["loc"] if name in _FIELDS), unit)
-            in_unit = "" if its_unit == DIMENSIONLESS else f", in {its_unit}"
-            said = problem["msg"].replace("tuple", "list").replace("Tuple", "List").replace(" after validation", "")
-            lines.append(f"{where}: {said}{in_unit}; given {shown(problem['input'])}")
+            got = problem.get("ctx", {}).get("actual_length") or shown(problem["input"])
+            lines.append(f"{where}: expected {_expected(problem, its_unit)}, got {got}")
     if error.error_count() > len(lines):
         lines.append(f"{error.error_count() - len(lines)} more problems; correct these first")
     return lines
+
+
+_BOUNDS: Final = {
+    "greater_than_equal": ("at least", "ge"),
+    "greater_than": ("more than", "gt"),
+    "less_than_equal": ("at most", "le"),
+    "less_than": ("less than", "lt"),
+}
+_LENGTHS: Final = {"too_long": "at most {max_length} values", "too_short": "at least {min_length} values"}
+_KINDS: Final = {
+    "bool_type": "true or false",
+    "dict_type": "a mapping",
+    "finite_number": "a finite number",
+    "float_type": "a number",
+    "int_from_float": "an integer",
+    "int_type": "an integer",
+    "list_type": "a list",
+    "string_type": "text",
+    "tuple_type": "a list",
+}
+"""Types of pydantic's errors → what was expected."""
+
+
+def _expected(problem: Mapping[str, Any], unit: str) -> str:
+    """What one of pydantic's errors expected in place of the value, in the unit of the field."""
+    kind, context = problem["type"], problem.get("ctx", {})
+    if kind in _BOUNDS:
+        words, limit = _BOUNDS[kind]
+        return f"{words} {short(context[limit])}" + (f" {unit}" if unit != DIMENSIONLESS else "")
+    if kind in _LENGTHS:
+        return _LENGTHS[kind].format(**context)
+    text = _KINDS.get(kind) or str(problem["msg"]).removeprefix("Input should be ").replace("an instance of", "a")
+    return text + (f" in {unit}" if unit != DIMENSIONLESS else "")
 
 
 def plain(value: object, path: str = "value") -> Any:
@@ -232,7 +271,7 @@ def plain(value: object, path: str = "value") -> Any:
         nonlocal left
         left -= 1
         if left < 0:
-            raise InputError(f"{path}: more than {MOST_VALUES} values; give fewer")
+            raise InputError(f"{path}: expected at most {MOST_VALUES} values, got more; use fewer")
         if type(value) in _OWN:
             return value
         if hasattr(value, "to_dict") and hasattr(value, "columns"):
@@ -252,7 +291,7 @@ def plain(value: object, path: str = "value") -> Any:
         if not isinstance(value, Mapping | np.ndarray | list | tuple | range):
             return value
         if depth == DEEPEST:
-            raise InputError(f"{path}: more than {DEEPEST} lists or mappings inside of one another; give fewer")
+            raise InputError(f"{path}: expected at most {DEEPEST} nested lists or mappings, got more; use fewer")
         if isinstance(value, Mapping):
             return {key: converted(item, depth + 1, (*keys, key)) for key, item in value.items()}
         return [converted(item, depth + 1, keys) for item in value]
@@ -290,18 +329,20 @@ def checked_path(value: object, path: str) -> Path:
     try:
         return given_path(value)  # type: ignore[arg-type]
     except (OSError, TypeError):
-        raise InputError(f"{path}: {shown(value)} is no path; give one as text") from None
+        raise InputError(f"{path}: expected a path, got {shown(value)}; pass it as text") from None
 
 
 def suggestion(given: object, known: Mapping[str, str] | Iterable[str]) -> str:
     """The remedy for an unknown name: the closest of the known, or as many as find room, shown as a mapping says."""
     names = known if isinstance(known, Mapping) else {name: name for name in known if name != given}
+    if isinstance(given, str) and given in NEW_NAMES:
+        return f"use {NEW_NAMES[given]}, its new name"
     close = difflib.get_close_matches(str(given)[:_LONGEST_VALUE], names, n=1) if isinstance(given, str) else []
     if close:
         return f"did you mean {names[close[0]]}?"
     if not names:
-        return "there are none; leave it out"
-    return f"give one of {textwrap.shorten(', '.join(names.values()), 125, placeholder=' ...')}"
+        return "none is possible; remove it"
+    return f"use one of {textwrap.shorten(', '.join(names.values()), 125, placeholder=' ...')}"
 
 
 def path_of(path: str, key: object) -> str:

@@ -52,7 +52,7 @@ class Film:
             center=center,
             frame_time=times,
             frame_joints=joints,
-            joints_in_room=None,
+            joints_lab=None,
             sprocket_center=None if is_bare else np.array([0.0, height]),
             sprocket_radius=math.nan if is_bare else setup.contact_radius,
         )

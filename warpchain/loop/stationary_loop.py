@@ -181,7 +181,7 @@ def average_frames(
     moved = -np.unwrap(turned) * links / (2 * np.pi)  # o(t), until each frame [links]
     rate = float(np.polyfit(before.frame_time, moved, 1)[0])  # links a second
     if moved[-1] - moved[0] < LEAST_WAY:
-        raise ValueError("before_release: the loop does not run clockwise, or hardly moves; give one that runs")
+        raise ValueError("before_release: expected a loop that circulates clockwise; use one that does")
     curve = _Harmonics(joints, moved)
     force = _Harmonics(before.frame_forces, moved).at(0)
     moment = -_Harmonics(before.frame_moments[..., None], moved).at(0)[:, 0]
@@ -267,5 +267,5 @@ def _free_part(s: Array, distance: Array, least: float) -> tuple[float, float]:
     middle, touching = len(s) // 2, np.flatnonzero(distance <= least)
     before, after = touching[touching < middle], touching[touching > middle]
     if distance[middle] <= least or not len(before) or not len(after):
-        raise ValueError("before_release: the loop has no free part below a sprocket; give one that hangs on one")
+        raise ValueError("before_release: expected a loop that hangs on a sprocket; use one that does")
     return float(s[before[-1] + 1]), float(s[after[0] - 1])

@@ -65,13 +65,13 @@ _CLOSE_UP_LINKS, _CLOSE_UP_ASPECT = 9, 1.5
 def draw(walk: Walk, kind: FigureWord, *, figure: Figure | None = None, ax: Axes | None = None) -> Figure:
     """Draw a walk; arguments and errors as of `WalkResult.plot`."""
     if kind not in KINDS:
-        raise ValueError(f"kind: {kind!r} is unknown; give {', '.join(map(repr, KINDS))}")
+        raise ValueError(f"kind: unknown kind {kind!r}; use {', '.join(map(repr, KINDS))}")
     if KINDS[kind].needs_series and len(walk.time) == 0:
         raise ValueError(f"walk: it has no time series. {walk.status.sentence}")
     if ax is not None and kind not in _ON_AXES:
-        raise ValueError(f"ax: {kind} has several axes; give an empty figure=, or a SubFigure of yours")
+        raise ValueError(f"ax: {kind} has several axes; use figure= with an empty Figure or SubFigure")
     if ax is not None and figure is not None:
-        raise ValueError("ax: given together with figure; leave one out")
+        raise ValueError("ax: not possible with figure; remove one")
     if figure is not None:
         checked_figure(figure)
     if ax is not None and not isinstance(ax, Axes):
@@ -84,7 +84,7 @@ def draw(walk: Walk, kind: FigureWord, *, figure: Figure | None = None, ax: Axes
 
 def kinds_of(walk: Walk) -> tuple[FigureWord, ...]:
     """The figures that a walk has, if it was recorded."""
-    return tuple(word for word, kind in KINDS.items() if not kind.needs_tilt or walk.joints_in_room is not None)
+    return tuple(word for word, kind in KINDS.items() if not kind.needs_tilt or walk.joints_lab is not None)
 
 
 def _paper(figure: Figure | None, width: float, height: float) -> Figure:
@@ -151,7 +151,7 @@ def _tilt(walk: Walk, figure: Figure | None) -> Figure:
     Marked are the moments at which the chain was first tilted by 45°, beyond which it has fallen over, and at which
     its loop collapsed, if they came. A `ValueError` says that the plane of the walk is fixed.
     """
-    if walk.joints_in_room is None:
+    if walk.joints_lab is None:
         raise ValueError("walk: its plane is fixed, so it has no tilt; run it with plane: tilting")
     figure = _paper(figure, 6.4, 5.0)
     angles, drift = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
@@ -266,7 +266,7 @@ def film_strip(walk: Walk, figure: Figure | None = None) -> Figure:
     the walk. A `ValueError` says that the walk has no frames or broken ones.
     """
     joints = checked_joints(walk)
-    tilts = walk.joints_in_room is not None
+    tilts = walk.joints_lab is not None
     low, high = walk_box(walk, joints)
     moments = [] if tilts else _moments(walk)
     size = high - low

@@ -115,7 +115,9 @@ def figure6(result: SweepResult) -> Picture:
     rows = np.array([row for series in cells.values() for each in series.values() for row in each]).reshape(-1, 5)
     frequencies = np.unique(rows[:, 0])
     if not np.isfinite(rows[:, 1]).any() or len(cells) == len(frequencies) == 1:
-        raise NothingToShow("Figure 6 has walks at rest over links and frequency; give such a block, or let it go on")
+        raise NothingToShow(
+            "Figure 6 needs walks at rest over links and frequency; use such a block, or finish the sweep"
+        )
     gap = float(np.diff(frequencies).min()) if len(frequencies) > 1 else 1.0
     columns = {1: 1, 2: 2, 4: 2}.get(len(cells), 3)
     size = max(4.2, 3.1 * columns), 1.0 + 2.6 * -(-len(cells) // columns)
@@ -184,7 +186,7 @@ def sensitivities(result: SweepResult) -> list[Sensitivity]:
     """
     crossed = [block for block in result.blocks.values() if SAMPLERS[block.block.sampler].crosses]
     if not crossed:
-        raise NothingToShow("no block is sampled for Sobol indices; give sampler: saltelli")
+        raise NothingToShow("no block is sampled for Sobol indices; use sampler: saltelli")
     found = []
     for block in crossed:
         for place in np.ndindex(*block.shape[:-1]):
@@ -201,7 +203,7 @@ def sensitivities(result: SweepResult) -> list[Sensitivity]:
             lost = len(whole) - samples
             found.append(Sensitivity(text, block.drawn, indices, intervals, samples, lost))
     if not found:
-        raise NothingToShow("no cell has two complete samples for Sobol indices yet; let the sweep go on")
+        raise NothingToShow("no cell has two complete samples for Sobol indices yet; resume the sweep")
     return found
 
 

@@ -89,7 +89,7 @@ class BlockResult:
         """A column."""
         columns: dict[str, AnyArray] = self.__dict__.get("columns", {})
         if name not in columns:
-            raise AttributeError(f"{name}: no such column; columns are {', '.join(columns)}", name=name, obj=self)
+            raise AttributeError(f"{name}: unknown column; use one of {', '.join(columns)}", name=name, obj=self)
         return columns[name]
 
     def __dir__(self) -> list[str]:
@@ -153,17 +153,19 @@ class BlockResult:
         """Place along the axes and samples of a walk, see `series`."""
         at = by_name(at)
         if unknown := [name for name in at if name not in self.axes]:
-            raise InputError(f"{unknown[0]}: no axis of block {self.name}; {suggestion(unknown[0], tuple(self.axes))}")
+            raise InputError(
+                f"{unknown[0]}: not an axis of block {self.name}; {suggestion(unknown[0], tuple(self.axes))}"
+            )
         place = []
         for name, values in self.axes.items():
             wanted = plain(at[name], name) if name in at else values[0]
             found = [k for k, value in enumerate(values.tolist()) if value == wanted]
             if not len(found) or (name not in at and len(values) > 1):
                 problem = f"{shown(at[name])} is not on the axis" if name in at else "missing"
-                raise InputError(f"{name}: {problem}; give one of {', '.join(map(str, values))}")
+                raise InputError(f"{name}: {problem}; use one of {', '.join(map(str, values))}")
             place.append(found[0])
         if type(plain(sample)) is not int or not 0 <= sample < self.shape[-1]:
-            raise InputError(f"sample: there is no sample {shown(sample)}; give 0 to {self.shape[-1] - 1}")
+            raise InputError(f"sample: expected 0 to {self.shape[-1] - 1}, got {shown(sample)}; use one of them")
         return (*place, sample)
 
     def setup_at(self, place: tuple[int, ...]) -> Setup:
@@ -177,7 +179,7 @@ class BlockResult:
         sample: int | None = None,
         frame_interval: float | None = FRAME_INTERVAL,
         record_before: float | None = None,
-        record_loads: bool = False,
+        record_joint_forces: bool = False,
         **at: Any,
     ) -> WalkResult:
         """Run one walk again, with series and frames: `walk(17)`, or `walk(links=60, frequency=15, sample=2)`.
@@ -190,7 +192,7 @@ class BlockResult:
             sample: number of the sample; None: 0.
             frame_interval: as of `warpchain.walk`, like the next two.
             record_before: see there.
-            record_loads: see there.
+            record_joint_forces: see there.
             at: value of each axis; of an axis with just one value it may be left out.
 
         Raises:
@@ -202,12 +204,16 @@ class BlockResult:
         if index is None:
             place = self.place(0 if sample is None else sample, at)
         elif words := [*at, *["sample"] * (sample is not None)]:
-            raise InputError(f"{', '.join(words)}: given together with index; leave one out")
+            raise InputError(f"{', '.join(words)}: not possible with index; remove one")
         else:
             _, place = located([self], index)
         from warpchain.results.one_walk import run_walk
 
-        recording = {"frame_interval": frame_interval, "record_before": record_before, "record_loads": record_loads}
+        recording = {
+            "frame_interval": frame_interval,
+            "record_before": record_before,
+            "record_joint_forces": record_joint_forces,
+        }
         walk = run_walk(self.setup_at(place), seed=self.origin.seed, **recording)  # type: ignore[arg-type]
         dx, number = self.columns["dx"][place], self.columns["index"][place]
         if self.is_there[place] and not self.has_same(walk, place):
@@ -226,7 +232,7 @@ class BlockResult:
         if not self.kept[place]:
             kept = np.flatnonzero(self.kept.any(axis=tuple(range(len(self.axes)))))
             samples = ", ".join(map(str, kept[:12]))
-            remedy = f"give one of the samples {samples}" if samples else "a sweep with record: {series: true} keeps it"
+            remedy = f"use one of the samples {samples}" if samples else "a sweep with record: {series: true} keeps it"
             raise InputError(f"the motion of walk {self.columns['index'][place]} is not there; {remedy}")
         numbers: dict[str, Any] = {}
         for name, column in rows.STORED_COLUMNS.items():
@@ -363,5 +369,7 @@ def located(blocks: Sequence[BlockResult], index: object) -> tuple[BlockResult, 
     found = [(block, tuple(map(int, at))) for block in blocks for at in np.argwhere(block.columns["index"] == number)]
     if not found:
         largest = max(int(block.columns["index"].max()) for block in blocks)
-        raise InputError(f"index: the sweep has no walk {number}; give one of its column index, at most {largest}")
+        raise InputError(
+            f"index: expected a number in the column index, at most {largest}, got {number}; use one of these"
+        )
     return found[0]

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-WANTED: Final = "give a saved walk; `walk --like SWEEP --index I` saves one"
+WANTED: Final = "use a saved walk; `walk --like SWEEP --index I` saves one"
 SHOWN: Final = 12_000
 """Joints that a notebook keeps of the frames of a walk: 200 frames of 60 links take 0.12 MB."""
 
@@ -197,7 +197,7 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
     if os.path.isdir(path):
         record = os.path.join(path, WALK_FILE)
         if not os.path.exists(record) and os.path.exists(os.path.join(path, SWEEP_FILE)):
-            raise InputError(f"{path}: the folder of a sweep, not of a saved walk; {WANTED}")
+            raise InputError(f"{path}: expected a saved walk, got the folder of a sweep; {WANTED}")
         path = record
     remedy = "run the walk again, or fetch another copy of the file"
     with reading_hdf5(path, _FORMAT, remedy, WANTED) as file:

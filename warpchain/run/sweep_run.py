@@ -122,7 +122,7 @@ def sweep(
     """
     if executor is not None and not hasattr(executor, "submit"):
         wanted = "one with submit, such as concurrent.futures.ProcessPoolExecutor(), or a Dask client"
-        raise InputError(f"executor: expected {wanted}; got {shown(executor)}")
+        raise InputError(f"executor: expected {wanted}, got {shown(executor)}")
     planned, folder, own, count = _checked_call(source, out, settings, device, workers, part)
     if hasattr(executor, "get_executor"):
         count = count or sum(executor.nthreads().values())
@@ -148,7 +148,7 @@ def _checked_call(
     replaced = {name: plain(settings[name], name) for name in ("seed", "samples") if name in settings}
     if source is not None and (others := [name for name in settings if name not in replaced]):
         names = ", ".join(others)
-        problems.append(f"{names}: given together with a source; leave one out, or write it into the source")
+        problems.append(f"{names}: not possible with a source; remove one, or write it into the source")
     at_least_one = Annotated[Whole, Field(ge=1)] | None
     checks = plan, partial(checked_path, out, "out"), partial(checked_part, part)
     for check in (*checks, partial(checked, workers, "workers", at_least_one)):
@@ -179,7 +179,7 @@ def sweep_of_keywords(given: Values, out: AnyPath | None) -> Sweep:
         others = content.setdefault(key, {})
         if isinstance(others, dict):  # the check of the content refuses anything else
             if name in by_name(others):
-                raise InputError(f"{name}: given twice, also in {key}; leave one out")
+                raise InputError(f"{name}: given twice, also in {key}; remove one")
             content[key] = {**others, name: value}
     grid = content.get("grid")
     if not (isinstance(grid, Mapping) and "preset" in grid):
@@ -193,7 +193,7 @@ def checked_part(given: object) -> Part:
         return 1, 1
     found = re.fullmatch(r"([1-9]\d{0,5})/([1-9]\d{0,5})", given) if isinstance(given, str) else None
     if found is None or int(found[1]) > int(found[2]):
-        raise InputError(f"part: {shown(given)} is no part; give k/N with 1 ≤ k ≤ N < 10⁶, such as 3/8")
+        raise InputError(f"part: expected k/N with 1 ≤ k ≤ N < 10⁶, got {shown(given)}; use e.g. 3/8")
     return int(found[1]), int(found[2])
 
 
@@ -206,7 +206,7 @@ def _run_in_folder(
     if executor is None:
         devices = {setup.options.device for setup in kinds}
         if has_gpu_turn() and any(map(on_gpu, devices)):
-            raise InputError("device: this thread is in the middle of a walk on a GPU; begin a sweep when it is over")
+            raise InputError("device: this thread is running a walk on a GPU; start the sweep after it has ended")
         for device in devices:
             start_device(device)  # refuses one that is not there before anything is written
         if all(map(on_gpu, devices)):
@@ -214,7 +214,7 @@ def _run_in_folder(
     needed = BYTES_OF_WALK * planned.walk_count
     if needed > (free := free_memory()):
         problem = f"{planned.walk_count:,} walks take {needed / 1e9:.2g} GB of memory, and {free / 1e9:.2g} GB are free"
-        raise InputError(f"samples: {problem}; give fewer samples or cells, or a machine with more memory")
+        raise InputError(f"samples: {problem}; use fewer samples or cells, or a machine with more memory")
     size = max(1, min(SHARD_WALKS, planned.walk_count // SHARDS))  # by the sweep only: equal sweeps leave equal files
     with SweepFolder.open(folder, planned, fresh=fresh, shard_size=size, part=part) as store, ExitStack() as held:
         missing = store.missing()
@@ -260,7 +260,7 @@ def on_device(planned: Sweep, device: str) -> Sweep:
     the same method on any device. An `InputError` says that the sweep's grid goes over devices.
     """
     if any("device" in block.varied for block in planned.blocks):
-        raise InputError(f"device: {device} is given, but the sweep's grid goes over devices; leave one of them out")
+        raise InputError(f"device: {device} is not possible with device as an axis of the grid; remove one")
     validated(Options, {"device": device}, "options")
     blocks = []
     for block in planned.blocks:

@@ -77,7 +77,7 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         for own in (path / name for name in (*shards.OWN, "lock")):
             if own.is_symlink() or (own.exists() and not (own.is_file() or own.is_dir())):
                 kind = "a symbolic link" if own.is_symlink() else "a pipe or a device"
-                raise InputError(f"{own}: {kind}, where a sweep writes and deletes; remove it, or give another folder")
+                raise InputError(f"{own}: {kind}, where a sweep writes and deletes; remove it, or use another folder")
         is_new = not (path / "lock").exists()
         unlock = locked(path)
         try:
@@ -173,7 +173,7 @@ def _prepared(folder: Path, sweep: Sweep, manifest: Manifest, fresh: bool) -> Ma
     if not (named.exists() or has_shards):
         for name in (*shards.OWN, shards.EARLIER, WALK_FILE):
             if (folder / name).exists():
-                raise InputError(f"{folder / name}: in the way of a sweep; move it away, or give another folder")
+                raise InputError(f"{folder / name}: in the way of a sweep; move it away, or use another folder")
         write_whole(named, manifest.image())
     elif fresh:
         if not has_shards:
@@ -224,12 +224,14 @@ def _rebuild(folder: Path, manifest: Manifest) -> None:
         with shards.opened_shard(folder, name, manifest.digest, manifest.numerics_version) as shard:
             parts.add(tuple(shard.attrs["part"].tolist()))
     if len(parts) == 1 and manifest.part not in parts:
-        raise InputError(f"{problem} of one part of the sweep; give --part {{}}/{{}}".format(*parts.pop()))
+        raise InputError(f"{problem} of one part of the sweep; use --part {{}}/{{}}".format(*parts.pop()))
     write_whole(path, manifest.image())
     given = folder / "sweep.yaml"
     if given.exists() and given.read_text("utf-8").startswith(_YAML_HEAD):
         given.unlink()  # it may be of fewer samples
-    warnings.warn(f"{path}: was lost or damaged; written anew, all shards are kept", InputWarning, stacklevel=4)
+    warnings.warn(
+        f"{path}: was missing or damaged; it was written again, and all shards are kept", InputWarning, stacklevel=4
+    )
 
 
 def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
@@ -238,21 +240,21 @@ def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
     shards.check_numerics_of(folder, found.numerics_version)
     if found.part != manifest.part:
         own, wanted = ("{}/{}".format(*part) if part[1] > 1 else "1/1 (all)" for part in (found.part, manifest.part))
-        remedy = f"give --part {own}" if found.part[1] > 1 else "leave --part out"
+        remedy = f"use --part {own}" if found.part[1] > 1 else "remove --part"
         raise InputError(f"{folder}: holds part {own} of its sweep, not {wanted}; {remedy}, or another folder")
     there, asked = ([block.samples_given for block in one.blocks] for one in (found.sweep, sweep))
     ones = [1] * len(there)  # digests by this version, which may know of more fields than that which began the folder
     if len(there) != len(asked) or sweep.digest(ones) != found.sweep.digest(ones):
         raise InputError(
             f"{folder}: holds another sweep ({found.sweep.name}), or this one before it was changed; "
-            "give another folder, or start anew with fresh, which deletes what is there"
+            "use another folder, or fresh, which deletes what is there"
         )
     for count, more, block in zip(there, asked, sweep.blocks, strict=True):
         holds = f"{folder}: holds {count} samples of each cell of block {block.name}, but"
         if more < count:
-            raise InputError(f"{holds} {more} are asked for; give samples: {count} or more, or another folder")
+            raise InputError(f"{holds} {more} are requested; use samples: {count} or more, or another folder")
         if more > count and not SAMPLERS[block.sampler].grows:
-            raise InputError(f"{holds} a {block.sampler} does not grow; give samples: {count}, or another folder")
+            raise InputError(f"{holds} a {block.sampler} design cannot grow; use samples: {count}, or another folder")
     return found if there == asked else replace(manifest, versions=found.versions)
 
 

@@ -161,13 +161,13 @@ def read_manifest(directory: AnyPath) -> Manifest:
     path = Path(directory) / SWEEP_FILE
     if not os.path.lexists(path):
         if not os.path.exists(directory):
-            raise InputError(f"{directory}: is not there; give the folder of a sweep, or a merged file")
+            raise InputError(f"{directory}: does not exist; use the folder of a sweep, or a merged file")
         if (Path(directory) / EARLIER).exists():
             raise InputError(f"{directory}: holds a sweep of an earlier warpchain; read it with that version")
         if any(own_shards(directory)):
-            raise DamagedFileError(f"{path}: is lost; {REBUILT}")
+            raise DamagedFileError(f"{path}: is missing; {REBUILT}")
         there = "a saved walk, no sweep" if (Path(directory) / WALK_FILE).exists() else "no sweep"
-        raise InputError(f"{directory}: {there} in this folder; give the folder of one, or a merged file")
+        raise InputError(f"{directory}: {there} in this folder; use the folder of a sweep, or a merged file")
     with reading_hdf5(path, MANIFEST, REBUILT) as file:
         return Manifest(
             stored_sweep(path, json.loads(file.attrs["sweep"])),
@@ -184,7 +184,7 @@ def stamp(directory: AnyPath) -> str:
         with open_regular(Path(directory) / SWEEP_FILE) as file:
             return hashlib.sha256(file.read()).hexdigest()
     except (FileNotFoundError, NotADirectoryError):
-        problem = "no sweep in this folder; give the folder of one, which every worker can reach by this path"
+        problem = "no sweep in this folder; use the folder of a sweep that every worker can reach by this path"
         raise InputError(f"{directory}: {problem}") from None
 
 
@@ -281,5 +281,5 @@ def check_numerics_of(directory: AnyPath, version: int) -> None:
     if version != NUMERICS_VERSION:
         raise InputError(
             f"{directory}: its walks are of numerics {version}, but this warpchain has {NUMERICS_VERSION}; "
-            "use one version for all workers, give another folder, or start anew"
+            "use one version for all workers, another folder, or fresh"
         )

@@ -87,22 +87,26 @@ def check_design(sampler: str, samples: int, dimensions: int, randomisations: in
     own = SAMPLERS[sampler]
     if dimensions == 0:
         if own.crosses:
-            raise InputError(f"{path}.sampler: {sampler} has nothing to draw; give distributions")
+            raise InputError(f"{path}.sampler: {sampler} needs sampled quantities; set distributions")
         if samples > 1:
-            raise InputError(f"{path}.samples: nothing is drawn, so all would be the same; give 1, or distributions")
+            raise InputError(
+                f"{path}.samples: nothing is sampled, so all samples would be equal; use 1, or set distributions"
+            )
         return
     if own.engine is None:
         return
     columns = own.columns(dimensions)
     if samples * columns > DESIGN_LIMIT:
         most = 1 << (DESIGN_LIMIT // columns).bit_length() - 1
-        raise InputError(f"{path}.samples: {samples} are too many; give at most {most}, or sampler: random")
+        raise InputError(f"{path}.samples: expected at most {most}, got {samples}; use fewer, or sampler: random")
     if own.is_balanced and randomisations & (randomisations - 1):
-        problem = f"{randomisations} is not a power of 2, as {sampler} needs"
+        problem = f"expected a power of 2 for {sampler}, got {randomisations}"
         raise InputError(f"{path}.randomisations: {problem}; use {1 << randomisations.bit_length() - 1}")
     if own.is_balanced and samples & (samples - 1):
         lower = 1 << (samples.bit_length() - 1)
-        raise InputError(f"{path}.samples: {samples} is no power of 2, as {sampler} needs; give {lower} or {2 * lower}")
+        raise InputError(
+            f"{path}.samples: expected a power of 2 for {sampler}, got {samples}; use {lower} or {2 * lower}"
+        )
 
 
 @functools.lru_cache(maxsize=4)

@@ -136,7 +136,9 @@ class Sweep:
         most = max(block.samples for block in self.blocks)
         for name, choice in self.recording.choices.items():
             if choice.samples != "all" and (last := choice.samples[-1]) >= most:
-                raise InputError(f"sweep.record.{name}.samples: no block has sample {last}; give 0 to {most - 1}")
+                raise InputError(
+                    f"sweep.record.{name}.samples: expected 0 to {most - 1}, got {last}; use samples of a block"
+                )
         for block in self.blocks:
             first = before = None
             checked: dict[str, Distribution] = {}
@@ -150,7 +152,7 @@ class Sweep:
                 for name, distribution in distributions.items():
                     if distribution != checked.get(name) and distribution.share() < LEAST_SHARE:
                         path, law = f"{block.path}.distributions.{name}", distribution.canonical()
-                        raise InputError(f"{path}: less than {LEAST_SHARE:.0%} of {law} is physical; give uniform")
+                        raise InputError(f"{path}: less than {LEAST_SHARE:.0%} of {law} is physical; use uniform")
                     if distribution != checked.get(name) and not fixed.options.unusual_values:
                         check_units({name: distribution.quantile(0.5)}, f"{block.path}.distributions")
                 checked = distributions
@@ -163,7 +165,7 @@ class Sweep:
             follows = name == "precision" and not {"tolerance", "soft_tolerance"}.isdisjoint(block.varied)
             if here != there and name not in block.varied and not follows:
                 both = f"{here!r} in one cell, {there!r} in another"
-                raise InputError(f"{block.path}.grid: {name} is {both}; give each a block of its own")
+                raise InputError(f"{block.path}.grid: {name} is {both}; use a separate block for each")
         for name, choice in self.recording.choices.items():
             choice.steps(options, f"sweep.record.{name}")
 
@@ -198,7 +200,9 @@ class Sweep:
                 return points, [fixed.with_drawn(point) for point in points]
             except InputError as error:
                 problem = str(error)
-        raise InputError(f"{block.path}.distributions: {DRAW_LIMIT} samples made no possible walk; the last: {problem}")
+        raise InputError(
+            f"{block.path}.distributions: none of {DRAW_LIMIT} samples makes a possible walk; the last: {problem}"
+        )
 
     def canonical(self) -> dict[str, Any]:
         """The sweep as JSON-able content of a file, with every default and range written out."""

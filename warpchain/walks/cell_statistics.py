@@ -100,7 +100,7 @@ class CellStatistics:
         if not ((self.count > 1) & (self.independent < 2)).any():
             return ""
         problem = "walks of one randomisation depend on one another, so their spread gives no standard error"
-        return f"{problem}; randomisations: 8 and more samples give one"
+        return f"{problem}; use randomisations: 8 and more samples"
 
 
 def known_values(column: AnyArray, status: AnyArray) -> Floats:

@@ -35,12 +35,12 @@ def state_at(setup: Setup, t: object, end: float) -> State:
     if setup.start is not None:
         first = setup.start.time
     if np.isnan(end):
-        raise InputError("t: the walk ended before its release, and has no such time; see its status")
+        raise InputError("t: the walk ended before its release; see its status")
     if setup.start is None and 0 <= time < first:
-        remedy = "give more" if end >= first else f"but the walk ends at {end:g} s: it has no state"
-        raise InputError(f"t: {time:g} s: the sprocket is there until {first:g} s, and a state has none; {remedy}")
+        remedy = "use a later time" if end >= first else f"but the walk ends at {end:g} s: it has no state"
+        raise InputError(f"t: expected a time after {first:g} s, when the sprocket vanishes, got {time:g} s; {remedy}")
     if not first <= time <= end:
-        raise InputError(f"t: {time:g} s is not in the walk; give a time from {first:g} to {end:.6g}")
+        raise InputError(f"t: expected {first:g} to {end:.6g} s, got {time:g} s; use a time of the walk")
     with gpu_turn([setup.options.device]):
         batch = Batch(1, setup.scene.links, setup.options, faces=len(setup.floor.laws))
         world = batch.worlds[0]
@@ -62,4 +62,4 @@ def state_at(setup: Setup, t: object, end: float) -> State:
                     memory=memory_of(run),
                     **(state_of_plane(world.plane) if setup.scene.plane == "tilting" else {}),
                 )
-        raise InputError(f"t: run again, the walk ends as {run.status.label} at {world.time:.6g} s; give less")
+        raise InputError(f"t: the repeated walk ended as {run.status.label} at {world.time:.6g} s; use an earlier time")

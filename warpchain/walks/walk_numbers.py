@@ -86,7 +86,7 @@ class WalkNumbers(Outcome):
         return np.nan if had_none or not self.setup.scene.is_on_sprocket else self.setup.contact_radius
 
     @property
-    def joints_in_room(self) -> Array | None:
+    def joints_lab(self) -> Array | None:
         """Joints x, y, z [m] in the room, (f, n, 3), if the plane tilts; else None: `frame_joints` are in the room."""
         if self.setup.scene.plane == "fixed":
             return None

@@ -93,7 +93,7 @@ class WalkRun:
         self.is_free = self.is_released = False
         self._hold_softness = 0.0
         self._tilts = scene.plane == "tilting"
-        self._walk_end = min(scene.walk_limit, scene.walk_until or math.inf)  # since the release, if it is not at rest
+        self._walk_end = min(scene.walk_limit, scene.stop_time or math.inf)  # since the release, if it is not at rest
         self._farthest = (scene.distance_limit or 0.0) * along_floor(setup)  # along x
 
     def phases(self) -> Iterator[Features]:
@@ -103,7 +103,7 @@ class WalkRun:
         """
         yield from self._phases()
         status, scene = self.world.status, self.setup.scene
-        is_planned = scene.walk_until is not None and scene.walk_until <= scene.walk_limit
+        is_planned = scene.stop_time is not None and scene.stop_time <= scene.walk_limit
         self.status = Status.FINISHED if status == Status.TIME_LIMIT and is_planned else status
 
     def _phases(self) -> Iterator[Features]:
