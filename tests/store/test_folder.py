@@ -247,15 +247,6 @@ def test_a_sweep_that_is_refused_now_is_named(tmp_path: Path, monkeypatch: pytes
         load(tmp_path)
 
 
-def test_a_folder_of_an_earlier_version_is_refused(tmp_path: Path) -> None:
-    """Its sweep.json is named as what it is; nothing begins there, with shards or without."""
-    (tmp_path / "sweep.json").write_text("{}")
-    with refused(InputError, tmp_path, "a sweep of an earlier warpchain; read it with that version"):
-        load(tmp_path)
-    with refused(InputError, tmp_path, "use another folder"):
-        open_folder(tmp_path)
-
-
 def test_workers_need_the_folder(tmp_path: Path) -> None:
     """A worker that does not see the folder, or finds another sweep in it, writes nothing."""
     rows, first = synthetic_rows(SWEEP, SHARDS[0]), SHARDS[0]

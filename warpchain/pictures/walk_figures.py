@@ -79,7 +79,12 @@ def draw(walk: Walk, kind: FigureWord, *, figure: Figure | None = None, ax: Axes
     if ax is not None:
         _ON_AXES[kind](walk, ax)
         return ax.figure.figure if isinstance(ax.figure, SubFigure) else ax.figure
-    return _DRAWN_BY[kind](walk, figure)
+    if kind == "film_strip":
+        return film_strip(walk, figure)
+    draw_into, size = _DRAWN_BY[kind]
+    figure = InlineFigure(figsize=size, layout="constrained") if figure is None else figure
+    draw_into(walk, figure)
+    return figure
 
 
 def kinds_of(walk: Walk) -> tuple[FigureWord, ...]:
@@ -87,18 +92,12 @@ def kinds_of(walk: Walk) -> tuple[FigureWord, ...]:
     return tuple(word for word, kind in KINDS.items() if not kind.needs_tilt or walk.joints_lab is not None)
 
 
-def _paper(figure: Figure | None, width: float, height: float) -> Figure:
-    """The figure that is given to draw into, or else a new one of this size [inches]."""
-    return InlineFigure(figsize=(width, height), layout="constrained") if figure is None else figure
-
-
-def _height_and_speed(walk: Walk, figure: Figure | None) -> Figure:
+def _height_and_speed(walk: Walk, figure: Figure) -> None:
     """Height and horizontal speed of the centre of mass against time since the release, as in Figure 5.
 
     A thin line is the height of a floor that is not flat, below the centre of mass; it is thick and has a label where
     the floor has coefficients of its own.
     """
-    figure = _paper(figure, 6.4, 5.0)
     height, speed = figure.subplots(2, 1, sharex=True)
     height.plot(walk.time, walk.center[:, 1], color=BLUE, linewidth=1.4)
     speed.plot(walk.time, walk.center_velocity[:, 0], color=BLUE, linewidth=1.4)
@@ -114,17 +113,9 @@ def _height_and_speed(walk: Walk, figure: Figure | None) -> Figure:
             height.plot(walk.time, np.where(is_above, floor, np.nan), color=color, linewidth=3.5, label=label)
             height.legend(frameon=False)
     _finish(walk, height, speed)
-    return figure
 
 
-def _energy(walk: Walk, figure: Figure | None) -> Figure:
-    """A figure with `_energy_on` its only axes."""
-    figure = _paper(figure, 6.4, 4.0)
-    _energy_on(walk, figure.subplots())
-    return figure
-
-
-def _energy_on(walk: Walk, ax: Axes) -> None:
+def _energy(walk: Walk, ax: Axes) -> None:
     """Energies of a walk against time, and what was lost by then.
 
     Lost is the energy at the release less that of the moment. The dot at the end is the sum of the ledger's losses,
@@ -145,7 +136,7 @@ def _energy_on(walk: Walk, ax: Axes) -> None:
     _finish(walk, ax)
 
 
-def _tilt(walk: Walk, figure: Figure | None) -> Figure:
+def _tilt(walk: Walk, figure: Figure) -> None:
     """Tilt and yaw of the plane, and lateral drift of the centre of mass, against time.
 
     Marked are the moments at which the chain was first tilted by 45°, beyond which it has fallen over, and at which
@@ -153,7 +144,6 @@ def _tilt(walk: Walk, figure: Figure | None) -> Figure:
     """
     if walk.joints_lab is None:
         raise ValueError("walk: its plane is fixed, so it has no tilt; run it with plane: tilting")
-    figure = _paper(figure, 6.4, 5.0)
     angles, drift = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     for limit in (-FALLEN, FALLEN):
         angles.axhline(limit, color=FAINT, linewidth=0.8, linestyle=DOTS)
@@ -172,7 +162,6 @@ def _tilt(walk: Walk, figure: Figure | None) -> Figure:
     angles.legend(frameon=False, fontsize="small")
     figure.align_ylabels()
     _finish(walk, angles, drift)
-    return figure
 
 
 def _finish(walk: Walk, *panels: Axes) -> None:
@@ -183,7 +172,7 @@ def _finish(walk: Walk, *panels: Axes) -> None:
     panels[-1].set(xlabel="time since release $t$ / s", xlim=(0.0, float(walk.time[-1]) or None))
 
 
-def _loop(walk: Walk, figure: Figure | None) -> Figure:
+def _loop(walk: Walk, figure: Figure) -> None:
     """The mean loop of a walk before its release, to scale, and its curvature and tension along the arc.
 
     A `ValueError` says that the time before the release was not kept, or is not enough for a mean loop.
@@ -192,7 +181,6 @@ def _loop(walk: Walk, figure: Figure | None) -> Figure:
     kink = loop.kink()
     width, height = np.ptp(loop.position, axis=0)
     share = float(np.clip(0.56 * (width + 0.08) / (height + 0.08), 0.23, 0.42))
-    figure = _paper(figure, 10.0, 6.4)
     left, right = np.asarray(figure.subfigures(1, 2, width_ratios=[share, 1 - share]))
     shape = left.subplots()
     bend, pull = right.subplots(2, 1)
@@ -218,7 +206,6 @@ def _loop(walk: Walk, figure: Figure | None) -> Figure:
     pull.set(xlim=(loop.free[0] - 0.03, loop.free[1] + 0.03), ylabel="tension $T - \\rho v^2$ / N")
     pull.set_xlabel("arc length $s$ from the lowest point, along the motion / m")
     pull.set_ylim(bottom=min(0.0, 1.1 * float(loop.effective_tension[inside].min())))
-    return figure
 
 
 def _draw_shape(axes: Axes, loop: StationaryLoop, sprocket_radius: float) -> None:
@@ -415,13 +402,12 @@ def _sharpest_bend(joints: Array) -> Array:
     return np.asarray(joints[np.argmax(np.abs(turn))])
 
 
-_DRAWN_BY: Final[Mapping[FigureWord, Callable[[Walk, Figure | None], Figure]]] = {
-    "film_strip": film_strip,
-    "height_and_speed": _height_and_speed,
-    "loop": _loop,
-    "energy": _energy,
-    "tilt": _tilt,
+_DRAWN_BY: Final[Mapping[str, tuple[Callable[[Walk, Figure], None], tuple[float, float]]]] = {
+    "height_and_speed": (_height_and_speed, (6.4, 5.0)),
+    "loop": (_loop, (10.0, 6.4)),
+    "energy": (lambda walk, figure: _energy(walk, figure.subplots()), (6.4, 4.0)),
+    "tilt": (_tilt, (6.4, 5.0)),
 }
-"""Each figure of `KINDS` draws into an empty figure, or a new one of its own size, and returns it."""
-_ON_AXES: Final[Mapping[FigureWord, Callable[[Walk, Axes], None]]] = {"energy": _energy_on}
+"""Each figure of `KINDS` but the film strip, which has a size of its own: what draws it, and its size [inches]."""
+_ON_AXES: Final = {"energy": _energy}
 """Those with one pair of axes draw into given ones, too."""

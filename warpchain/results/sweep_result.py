@@ -28,7 +28,7 @@ from warpchain.inputs.validation import InputError, InputWarning, checked_path, 
 from warpchain.results.block_result import BlockResult, counted, located, status_counts
 from warpchain.results.walk_result import WalkResult
 from warpchain.store.folder import read_rows
-from warpchain.store.shards import Manifest, read_manifest, stamp, stored_sweep
+from warpchain.store.shards import read_manifest, stamp, stored_sweep
 from warpchain.sweeps.plan import Sweep
 from warpchain.walks.cell_statistics import CellStatistics
 from warpchain.walks.rows import COLUMNS, STORED_COLUMNS, derived_columns, drawn_column, quantity_of
@@ -253,7 +253,8 @@ def _together(sources: Sequence[AnyPath]) -> SweepResult:
 
 def _load_folder(directory: AnyPath) -> SweepResult:
     for left in reversed(range(TRIES)):
-        begun, manifest = _seen(directory)
+        begun = stamp(directory) if os.path.lexists(Path(directory) / SWEEP_FILE) else ""  # then the next line refuses
+        manifest = read_manifest(directory)
         try:
             rows, motions = read_rows(directory, manifest)
             break
@@ -265,13 +266,6 @@ def _load_folder(directory: AnyPath) -> SweepResult:
             time.sleep(PAUSE * is_deleting)
     provenance = {"digest": manifest.sweep.digest(), "numerics_version": manifest.numerics_version}
     return _result(manifest.sweep, provenance | {"versions": manifest.versions}, rows, motions)
-
-
-def _seen(directory: AnyPath) -> tuple[str, Manifest]:
-    """Stamp and manifest of a folder."""
-    if os.path.lexists(Path(directory) / SWEEP_FILE):
-        return stamp(directory), read_manifest(directory)
-    return "", read_manifest(directory)  # says what is wrong
 
 
 def _load_merged(path: AnyPath) -> SweepResult:

@@ -171,7 +171,7 @@ def _prepared(folder: Path, sweep: Sweep, manifest: Manifest, fresh: bool) -> Ma
     _clear_leftovers(folder)
     named, has_shards = folder / SWEEP_FILE, any(shards.own_shards(folder))
     if not (named.exists() or has_shards):
-        for name in (*shards.OWN, shards.EARLIER, WALK_FILE):
+        for name in (*shards.OWN, WALK_FILE):
             if (folder / name).exists():
                 raise InputError(f"{folder / name}: in the way of a sweep; move it away, or use another folder")
         write_whole(named, manifest.image())
