@@ -10,7 +10,9 @@ import warpchain
 from tests.support.made_walks import make_unreleased, make_walk
 from warpchain import InputError, WalkResult
 from warpchain.chain.resolution import resolve
-from warpchain.walks.landmarks import bounces
+from warpchain.kernels.events import tallies, tilting
+from warpchain.pictures.walk_figures import FALLEN
+from warpchain.walks.landmarks import PAUSE, bounces
 
 
 @pytest.fixture(scope="module")
@@ -91,3 +93,9 @@ def test_walks_without_bounces_have_none() -> None:
     setup = resolve("paper", scene={"links": 30, "floor": [[0, 0], [1, 0.1]]}, options={}, parameters={})
     with pytest.raises(InputError, match=r"bounces: expected .* a flat floor or a slope"):
         make_walk(setup=setup).bounce_table()
+
+
+def test_constants_that_kernels_have_too_are_the_same() -> None:
+    """The pause between two bounces, and the tilt at which a chain has fallen over."""
+    assert float(tallies.BOUNCE_PAUSE) == PAUSE
+    assert float(tilting.FALLEN) == pytest.approx(np.sin(np.radians(FALLEN)), abs=1e-15)

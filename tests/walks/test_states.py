@@ -13,6 +13,7 @@ from scipy.optimize import minimize
 import warpchain
 from tests.oracle_model.motion_equations import gravitational_energy, kinetic_energy
 from warpchain import InputError, State, WalkResult
+from warpchain.kernels.cpu import stage_rows
 from warpchain.walks.walk_numbers import MOTION, NUMBERS
 
 SPUN = {"links": 36, "frequency": 15.0, "start": "spinning"}
@@ -236,3 +237,11 @@ def test_a_state_keeps_its_floor_in_simulate() -> None:
     assert (y + x * math.tan(math.radians(10))).min() > 0 > y.min()
     with pytest.raises(InputError, match=r"position: link \d+ starts .* inside the floor"):
         warpchain.simulate(replace(state, position=state.position - [0, 0.3, 0]), duration=0.1, floor=True)
+
+
+def test_a_state_of_other_rows_is_refused(fall: WalkResult, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What kernels with other rows of memory kept is not read as if it were ours; all rows of the memory count."""
+    state = fall.state(0.3)
+    monkeypatch.setattr(stage_rows, "STAGES", stage_rows.STAGES + 1)
+    with pytest.raises(InputError, match="made with other kernels"):
+        warpchain.walk(start=state)

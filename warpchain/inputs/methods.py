@@ -30,3 +30,8 @@ The means of `standard` and `explicit` lie within some tenths of a per cent of t
 is the cheapest on a CPU. It means `explicit` where there is no `hybrid`, on a GPU and if the plane of the chain tilts,
 and if joint forces are recorded, which `hybrid` does not have.
 """
+
+
+def meant_by(method: object, *, can_be_rigid: bool) -> object:
+    """The method that a word means where rigid flights are possible, or where they are not: `standard` differs."""
+    return "explicit" if method == "standard" and not can_be_rigid else method
