@@ -29,7 +29,7 @@ class NotReplaceable(OSError):  # noqa: N818 - the path is refused, nothing went
     """Something is at a path that a new file must not replace; one line that names it."""
 
 
-class Kind(NamedTuple):
+class FileKind(NamedTuple):
     """A kind of file by its content: what it is called, and whether the regular file at a path is of it."""
 
     name: str
@@ -46,7 +46,7 @@ def given_path(path: AnyPath) -> Path:
     return Path(path)
 
 
-def checked_output(path: AnyPath, only: Kind | None = None) -> Path:
+def checked_output(path: AnyPath, only: FileKind | None = None) -> Path:
     """The path, if a file may be written there; everything that writes files for a user asks here.
 
     Replaced may be any regular file, or `only` one of a kind; a `NotReplaceable` says that something else is there. An
@@ -68,7 +68,7 @@ def checked_output(path: AnyPath, only: Kind | None = None) -> Path:
 
 
 @contextmanager
-def replacing(path: AnyPath, only: Kind | None = None) -> Iterator[Path]:
+def replacing(path: AnyPath, only: FileKind | None = None) -> Iterator[Path]:
     """Yield the path of an empty part beside `path`, which becomes `path` if the block ends without an error.
 
     The data reach the disk before the part is renamed. So `path` is at any moment, even after a power cut, either the
@@ -125,7 +125,7 @@ def clear_parts(path: AnyPath) -> None:
                     part.unlink()
 
 
-def write_whole(path: AnyPath, content: bytes | str, only: Kind | None = None) -> None:
+def write_whole(path: AnyPath, content: bytes | str, only: FileKind | None = None) -> None:
     """Write a file, see `replacing`; text in UTF-8."""
     data = content.encode() if isinstance(content, str) else content
     with replacing(path, only) as part:

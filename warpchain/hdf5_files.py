@@ -40,6 +40,10 @@ _HEAD: Final = 2**16
 _FIXED: Final[dict[str, Any]] = {"libver": ("v108", "v108"), "track_order": True}
 """Version bounds without which equal content would not give equal bytes; they also leave out times."""
 
+WALK_FILE: Final = "walk.h5"
+SWEEP_FILE: Final = "sweep.h5"
+"""Names of the file of a saved walk, and of the manifest of a sweep, in their folders."""
+
 
 @dataclass(frozen=True)
 class Stored:

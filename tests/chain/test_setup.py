@@ -6,8 +6,9 @@ import pytest
 
 import warpchain
 from tests.support.setups import setup_walk
+from warpchain.inputs.fields import NAME_OF_SYMBOL, SECTION_OF, SYMBOL_OF
 from warpchain.inputs.parameters import Parameters, preset
-from warpchain.inputs.validation import NAME_OF_SYMBOL, SECTION_OF, SYMBOL_OF, InputError
+from warpchain.inputs.validation import InputError
 from warpchain.sweeps.sweep_file import read_walk_file
 
 SYMBOLS = {

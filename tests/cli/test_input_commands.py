@@ -8,7 +8,7 @@ import pytest
 
 import warpchain
 from tests.support.command_line import Command
-from warpchain.inputs.validation import SECTION_OF
+from warpchain.inputs.fields import SECTION_OF
 from warpchain.store.folder import SweepFolder
 from warpchain.sweeps.plan import Sweep, load_sweep
 from warpchain.sweeps.sweep_file import sweep_schema

@@ -14,8 +14,9 @@ import pytest
 
 import warpchain
 from tests.support.setups import setup_walk
-from warpchain.chain.resolution import SECTIONS, resolve
-from warpchain.inputs.validation import LONGEST_LINE, SECTION_OF, InputError, field_limits
+from warpchain.chain.resolution import resolve
+from warpchain.inputs.fields import SECTION_OF, SECTIONS
+from warpchain.inputs.validation import LONGEST_LINE, InputError, field_limits
 from warpchain.inputs.yaml_files import LARGEST_FILE, read_yaml
 from warpchain.kernels.methods.method import find_method, method_names
 from warpchain.sweeps.plan import load_sweep

@@ -7,7 +7,7 @@ import pytest
 
 import warpchain
 from warpchain.inputs.validation import InputError
-from warpchain.loop.stationary_loop import FIELDS, BeforeRelease
+from warpchain.loop.stationary_loop import LOOP_FIELDS, BeforeRelease
 from warpchain.results.one_walk import run_walk
 
 BRIEF = {
@@ -60,7 +60,7 @@ def test_a_sweep_keeps_them(tmp_path: Path) -> None:
     kept, expected = of_sweep.before_release, run_walk(of_sweep.setup, record_before=0.2).before_release
     assert result.series(frequency=12, sample=1).before_release is None
     assert isinstance(kept, BeforeRelease) and expected is not None
-    for name in FIELDS:
+    for name in LOOP_FIELDS:
         ours, theirs = getattr(kept, name), getattr(expected, name)
         single = name.startswith("frame_") and name != "frame_time"
         np.testing.assert_array_equal(ours, theirs.astype(np.float32) if single else theirs)

@@ -15,8 +15,7 @@ from tests.support.made_walks import made_setup, make_unreleased, make_walk
 from warpchain.chain.sprocket_motion import sprocket_places
 from warpchain.pictures.animation import Film
 from warpchain.pictures.chain import link_outlines
-from warpchain.pictures.labels import kinds_of
-from warpchain.pictures.walk_figures import film_strip
+from warpchain.pictures.walk_figures import film_strip, kinds_of
 from warpchain.status import Status
 
 RADIUS = 4.2e-3

@@ -156,7 +156,7 @@ def test_walk_is_run_again(folder: Path, tmp_path: Path, monkeypatch: pytest.Mon
     asked = with_walk(monkeypatch, make_walk, dx=dx)
     write_report(folder, tmp_path / "report.html", animation_of=5)
     document = Document((tmp_path / "report.html").read_text(encoding="utf-8"))
-    assert asked == [load_sweep(result.sweep).planned(5).setup]
+    assert asked == [load_sweep(result.sweep).walk(5).setup]
     text = document.texts["one-walk"]
     assert f"Walk 5 (block ellipse, n = 120, ν = 20 Hz, sample 0), run again for this page: Δx = {dx:.4f} m" in text
     assert "The sweep has the same, to the bit." in text

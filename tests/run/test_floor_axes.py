@@ -11,7 +11,8 @@ from pydantic.fields import FieldInfo
 
 import warpchain
 from tests.support.sweep_content import content
-from warpchain.inputs.validation import FIELDS, InputError
+from warpchain.inputs.fields import FIELDS
+from warpchain.inputs.validation import InputError
 from warpchain.results.sweep_result import merge
 from warpchain.run.sweep_run import sweep_of_keywords
 from warpchain.sweeps.block import is_axis
@@ -70,11 +71,11 @@ def test_named_floors_are_an_axis_of_the_walks_that_each_floor_gives_alone(tmp_p
 def test_a_sweep_by_keywords_takes_one_floor_or_names_with_floors() -> None:
     """Points are one floor, names with points an axis; releases and values of links likewise, null among them."""
     one = sweep_of_keywords({"links": [40, 60], "floor": STEP, "samples": 1}, "x")
-    assert list(one.blocks[0].axes) == ["links"] and [*map(list, one.planned(0).setup.scene.floor)] == STEP
+    assert list(one.blocks[0].axes) == ["links"] and [*map(list, one.walk(0).setup.scene.floor)] == STEP
     masses = {"own": None, "heavy": [0.02] * 40}
     lifts = {"none": None, "lift": [[0.1, 0.0, 0.02, 15.0]]}
     both = sweep_of_keywords({"links": 40, "link_masses": masses, "release": lifts, "samples": 1}, "x")
-    scenes = [both.planned(index).setup.scene for index in range(4)]
+    scenes = [both.walk(index).setup.scene for index in range(4)]
     assert [scene.link_masses for scene in scenes] == [None, None, (0.02,) * 40, (0.02,) * 40]
     assert [scene.release for scene in scenes] == [None, ((0.1, 0.0, 0.02, 15.0),)] * 2
     assert load_sweep(both.canonical()).digest() == both.digest() != one.digest()

@@ -3,8 +3,8 @@
 import numpy as np
 
 from tests.support.setups import setup_walk
+from warpchain.inputs.fields import SECTION_OF
 from warpchain.inputs.scene import OF_LINKS
-from warpchain.inputs.validation import SECTION_OF
 
 
 def of_numpy(value):

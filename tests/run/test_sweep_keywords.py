@@ -110,7 +110,7 @@ def test_parameter_sets(tmp_path):
     data = result.to_xarray()
     assert data.floor_friction.dims == ("point",) and (data.floor_friction == table["mu_fc"]).all()
     for place, index in np.ndenumerate(result.index):
-        setup = result.origin.planned(int(index)).setup
+        setup = result.origin.walk(int(index)).setup
         assert setup.parameters.floor_friction == table["mu_fc"][place[0]]
     lines = refused(points={"mu_fc": [0.1, 0.2], "R": [0.05]}, mu_fc=0.2, samples=1, out=tmp_path)
     assert lines == ["sweep.points.floor_friction: given twice, also in parameters; remove one"]

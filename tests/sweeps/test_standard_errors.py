@@ -26,7 +26,7 @@ def planned(sampler: str, seed: int, samples: int = 64, **keys: Any) -> Sweep:
 
 def fractions(sweep: Sweep) -> np.ndarray:
     """What each walk drew, as fractions of the ranges, (walks, 4)."""
-    draws = [sweep.planned(index).drawn for index in sweep.indices.tolist()]
+    draws = [sweep.walk(index).draws for index in sweep.indices.tolist()]
     return np.array([[(draw[name] - low) / (high - low) for name, (low, high) in DRAWN.items()] for draw in draws])
 
 

@@ -48,12 +48,12 @@ def test_digest_ignores_what_does_not_matter(kind: str) -> None:
 def test_a_method_by_need_is_that_of_the_device(options: dict[str, Any], expected: tuple[str, str]) -> None:
     """The same file on another device has the method that its word means there, with the settings given."""
     planned = load_sweep(content(options=options))
-    here, there = (sweep.planned(0).setup.options for sweep in (planned, on_device(planned, "cuda:1")))
+    here, there = (sweep.walk(0).setup.options for sweep in (planned, on_device(planned, "cuda:1")))
     assert (here.method, there.method) == expected
     assert there.device == "cuda:1"
     assert there.tolerance == options.get("tolerance", here.tolerance)
     again = load_sweep(on_device(planned, "cuda:1").canonical())
-    assert again.planned(0).setup.options == there
+    assert again.walk(0).setup.options == there
 
 
 def test_a_device_is_refused_beside_devices_on_an_axis() -> None:

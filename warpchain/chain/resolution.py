@@ -10,17 +10,15 @@ from typing import Any, Final, TypeVar
 
 from warpchain.chain.setup import Setup, State
 from warpchain.inputs.distributions import TABLE, Seed, draw, random_generator
+from warpchain.inputs.fields import SECTIONS
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.parameters import preset as parameter_preset
 from warpchain.inputs.scene import OF_LINKS, Scene
 from warpchain.inputs.unit_slips import check_units
-from warpchain.inputs.validation import InputError, Section, checked, validated
+from warpchain.inputs.validation import InputError, checked, validated
 
 Values = Mapping[str, object]
 F = TypeVar("F", bound=Callable[..., object])
-SECTIONS: Final[Mapping[str, type[Section]]] = {"scene": Scene, "options": Options, "parameters": Parameters}
-"""Sections of a user's values, and the models that hold their fields."""
 OF_THE_WALK: Final = (
     *("walk_limit", "stop_time", "distance_limit", "floor", "slope"),
     *("charm_mass", "charm_inertia", "charm_radius", "charm_link", "stiff_joint", "joint_friction_factor"),

@@ -18,11 +18,12 @@ from warpchain.chain.start_shapes import links_between
 from warpchain.inputs.arrays import Array, checked_array
 from warpchain.inputs.compound_fields import FARTHEST
 from warpchain.inputs.distributions import Distribution, Gaussian
+from warpchain.inputs.fields import SECTION_OF
 from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL, Options
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import Scene, check_links_on_gpu
 from warpchain.inputs.unit_slips import check_units
-from warpchain.inputs.validation import SECTION_OF, InputError, InputWarning, shown, validated
+from warpchain.inputs.validation import InputError, InputWarning, shown, validated
 from warpchain.kernels.methods.method import find_method
 
 DEFAULT_PRESET: Final = "paper"

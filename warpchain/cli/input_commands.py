@@ -39,12 +39,12 @@ def parameters(
     ] = "paper",
 ) -> None:
     """List all parameters, scene fields and options, with symbols, units, values, bounds and meanings."""
-    from warpchain.chain.resolution import SECTIONS
     from warpchain.cli.output import print_table
+    from warpchain.inputs.fields import FIELDS, SECTION_OF, SECTIONS, SYMBOL_OF, dotted_name
     from warpchain.inputs.options import Options
     from warpchain.inputs.parameters import preset as parameter_preset
     from warpchain.inputs.scene import Scene
-    from warpchain.inputs.validation import FIELDS, SECTION_OF, SYMBOL_OF, dotted_name, field_limits, field_unit, shown
+    from warpchain.inputs.validation import field_limits, field_unit, shown
     from warpchain.pictures.labels import value_text
 
     wanted = {name if name in SECTIONS else dotted_name(name, shown(name)) for name in names or SECTIONS}

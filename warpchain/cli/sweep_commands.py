@@ -3,18 +3,23 @@
 import contextlib
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
 from warpchain.cli.walk_commands import FAILED
 from warpchain.cli.words import JSON, argument, option, output, output_path
+from warpchain.inputs.figure_kinds import KINDS, FigureWord
 
 if TYPE_CHECKING:
     from warpchain.results.sweep_result import SweepResult
 
 _FILE: Final = "Sweep file, or the bare name of a sweep that comes with warpchain, e.g. figure6."
 _FILES: Final = "Sweep files, or bare names of sweeps that come with warpchain. Default: all of the latter."
+_KIND: Final = (
+    f"The only figure of a walk to draw. {'; '.join(f'{word}: {kind.described}' for word, kind in KINDS.items())}. "
+    "Default: all that the walk has data for."
+)
 _DEVICE: Final = "cpu, cuda (the first GPU) or cuda:N, instead of the device in the sweep file."
 
 AsJson = Annotated[bool, JSON]
@@ -146,21 +151,17 @@ def plot(
     quantity: Annotated[
         str | None, option("NAME", "Column of a sweep to draw: dx, walk_time, bounces, hold_time ... Default: dx.")
     ] = None,
-    kind: Annotated[
-        Literal["film_strip", "height_and_speed", "loop", "energy", "tilt"] | None,
-        typer.Option(help="Only figure of a walk to draw. Default: all that it has something for."),
-    ] = None,
+    kind: Annotated[FigureWord | None, typer.Option(help=_KIND)] = None,
 ) -> None:
     """Draw all figures of a sweep or of a saved walk.
 
     For a sweep these are the distance as in the paper's Figure 6, maps, lines over any axes, and sensitivity. For a
-    walk they are film_strip.png, height_and_speed.png, loop.png, energy.png and, if the plane tilts, tilt.png. A line
-    names each figure that cannot be drawn, and why.
+    walk there is a file for each --kind that it has. A line names each figure that cannot be drawn, and why.
     """
     from warpchain.cli.output import draw_figures, saved
     from warpchain.files import make_folder
     from warpchain.inputs.validation import InputError, printable
-    from warpchain.pictures.labels import kinds_of
+    from warpchain.pictures.walk_figures import kinds_of
     from warpchain.reports.sweep_figures import figures
     from warpchain.results.walk_result import WalkResult
 

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Final
 
 import typer
 
+from warpchain.chain.keep import FRAME_INTERVAL
 from warpchain.cli.words import JSON, argument, option, output
 from warpchain.inputs.methods import METHODS
 from warpchain.inputs.starts import STARTS
@@ -44,10 +45,13 @@ _OUTPUT: Final = (
     "draws the other figures, `warpchain animate` an animation."
 )
 _FILM: Final = "File to write; its name ends in .gif, .mp4 or .html. Default: walk.gif beside the walk."
-_FRAMES: Final = "Simulated time between two frames, in s; needs a folder. Default: 0.002."
+_LOADED_FRAMES: Final = 1e-4
+"""Time [s] between two frames with joint forces, unless another is given."""
+_FRAMES: Final = f"Simulated time between two frames, in s; needs a folder. Default: {FRAME_INTERVAL:g}."
 _LOADS: Final = (
-    "Record the forces and moments of the joints with each frame, by default every 0.0001 s; needs a folder. standard "
-    "then means explicit, because rigid joints have no forces. 60 links take 24 MB per simulated second."
+    f"Record the forces and moments of the joints with each frame, by default every {_LOADED_FRAMES:g} s; needs a "
+    "folder. standard then means explicit, because rigid joints have no forces. 60 links take 24 MB per simulated "
+    "second."
 )
 
 _Text = str | None
@@ -72,10 +76,11 @@ def walk(
     as_json: Annotated[bool, JSON] = False,
 ) -> None:
     """Spin up one chain, drop it, and follow it until it rests."""
-    from warpchain.chain.resolution import SECTIONS, continued, resolve
+    from warpchain.chain.resolution import continued, resolve
     from warpchain.chain.setup import DEFAULT_PRESET
     from warpchain.cli.output import print_walk, saved, try_walk_folder, write_walk
     from warpchain.inputs.distributions import Seed
+    from warpchain.inputs.fields import SECTIONS
     from warpchain.inputs.validation import InputError, checked, printable
     from warpchain.inputs.yaml_files import parse_yaml
     from warpchain.results.one_walk import run_walk
@@ -122,7 +127,7 @@ def walk(
     if folder is None and (frame_interval is not None or record_joint_forces):
         name = "--record-joint-forces" if frame_interval is None else "--frame-interval"
         raise InputError(f"{name}: has no folder to write to; add -o DIR")
-    usual = None if folder is None else 1e-4 if record_joint_forces else 2e-3
+    usual = None if folder is None else _LOADED_FRAMES if record_joint_forces else FRAME_INTERVAL
     interval = usual if frame_interval is None else parse_yaml(frame_interval, "frame_interval")
     if folder is not None:
         try_walk_folder(folder)
@@ -157,11 +162,11 @@ def animate(
     slow: Annotated[float, option("NUMBER", "Playing time per simulated time. Default: 4.")] = 4.0,
 ) -> None:
     """Write an animation of a saved walk: GIF, MP4 or HTML with a player."""
-    from warpchain.cli.output import RECORD
+    from warpchain.hdf5_files import WALK_FILE
     from warpchain.inputs.validation import InputError, printable
     from warpchain.results.walk_result import load_walk
 
-    record = walk / RECORD if walk.is_dir() else walk
+    record = walk / WALK_FILE if walk.is_dir() else walk
     result, path = load_walk(walk), path or record.with_suffix(".gif")
     try:
         result.animate(path, fps=fps, slow=slow)
@@ -172,7 +177,8 @@ def animate(
 
 def _given_values(named: Mapping[str, str | None], assignments: Sequence[str]) -> dict[str, dict[str, object]]:
     """Values of the command line by section; named options and `NAME=VALUE` are on a par."""
-    from warpchain.inputs.validation import SECTION_OF, InputError, by_section, dotted_name, shown
+    from warpchain.inputs.fields import SECTION_OF, by_section, dotted_name
+    from warpchain.inputs.validation import InputError, shown
     from warpchain.inputs.yaml_files import parse_yaml
 
     pairs = [(name, text) for name, text in named.items() if text is not None]

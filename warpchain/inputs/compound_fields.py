@@ -12,7 +12,7 @@ from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Stri
 from warpchain.inputs.parameters import FRACTION, FRICTION
 from warpchain.inputs.validation import shown
 
-Motion = tuple[tuple[float, float, float, float], ...]
+SprocketMotion = tuple[tuple[float, float, float, float], ...]
 
 MOST_POINTS: Final = 256
 """Most points of a profile; each takes time where a chain is near it."""
@@ -69,7 +69,7 @@ FloorField = Annotated[
 """What the field `floor` of a scene may be."""
 
 
-def _in_order(rows: Motion) -> Motion:
+def _in_order(rows: SprocketMotion) -> SprocketMotion:
     if not rows:
         raise ValueError("expected at least one row, e.g. [[0.1, 0, -0.02, 0]], got none; add one, or use null")
     for number, (before, after) in enumerate(itertools.pairwise([(0.0,), *rows])):

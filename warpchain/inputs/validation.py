@@ -104,13 +104,11 @@ def field_bounds(field: FieldInfo) -> tuple[float, float]:
     return least, limits["le"] if "le" in limits else math.nextafter(limits.get("lt", math.inf), -math.inf)
 
 
-FIELDS: Final[dict[str, FieldInfo]] = {}
-"""Name of each field of parameters, scene and options → the field; no name is in two sections."""
-SECTION_OF: Final[dict[str, str]] = {}
-"""Name of each field → its section."""
-SYMBOL_OF: Final[dict[str, str]] = {}
-"""Name → the paper's symbol, in ASCII; no symbol is the name of a field."""
-NAME_OF_SYMBOL: Final[dict[str, str]] = {}
+_FIELDS: Final[dict[str, FieldInfo]] = {}
+_SECTION_OF: Final[dict[str, str]] = {}
+_SYMBOL_OF: Final[dict[str, str]] = {}
+_NAME_OF_SYMBOL: Final[dict[str, str]] = {}
+"""What refusals know of the sections that are imported; `warpchain.inputs.fields` has all."""
 NEW_NAMES: Final = {
     "further_hold": "extra_hold",
     "record_loads": "record_joint_forces",
@@ -138,16 +136,16 @@ class Section(BaseModel):
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
         """Tell the names of the fields; those without a description have the text that stands below them."""
         for name, field in cls.model_fields.items():
-            FIELDS[name], SECTION_OF[name] = field, cls.__name__.lower()
+            _FIELDS[name], _SECTION_OF[name] = field, cls.__name__.lower()
             field.description = " ".join((field.description or "").split())
             if isinstance(field.json_schema_extra, dict) and "symbol" in field.json_schema_extra:
-                SYMBOL_OF[name] = spelled(str(field.json_schema_extra["symbol"]))
-                NAME_OF_SYMBOL[SYMBOL_OF[name]] = name
+                _SYMBOL_OF[name] = spelled(str(field.json_schema_extra["symbol"]))
+                _NAME_OF_SYMBOL[_SYMBOL_OF[name]] = name
 
 
 def full_name(written: Any) -> Any:
     """Name of the field that is written as its name or symbol, `mu_fc` or μ_fc; anything else stays as it is."""
-    return NAME_OF_SYMBOL.get(spelled(written), written) if isinstance(written, str) else written
+    return _NAME_OF_SYMBOL.get(spelled(written), written) if isinstance(written, str) else written
 
 
 T = TypeVar("T")
@@ -159,38 +157,21 @@ def by_name(values: Mapping[Any, T], path: str = "") -> dict[Any, T]:
     for written, value in values.items():
         name = full_name(written)
         if name in named:
-            raise InputError(f"{path_of(path, name)}: given twice, also as {shown(SYMBOL_OF[name])}; remove one")
+            raise InputError(f"{path_of(path, name)}: given twice, also as {shown(_SYMBOL_OF[name])}; remove one")
         named[name] = value
     return named
 
 
 def suggested_name(written: object, keys: Iterable[str] = ()) -> str:
     """The remedy for an unknown name of a field, or for one of these keys, or for a field in a wrong place."""
-    if written in SECTION_OF:
-        return f"move it to {SECTION_OF[str(written)]}"
+    if written in _SECTION_OF:
+        return f"move it to {_SECTION_OF[str(written)]}"
     stem = f"{spelled(written)}_" if isinstance(written, str) else ""
-    if family := [symbol for symbol in NAME_OF_SYMBOL if stem and symbol.startswith(stem)]:  # mu: of which pair?
+    if family := [symbol for symbol in _NAME_OF_SYMBOL if stem and symbol.startswith(stem)]:  # mu: of which pair?
         return f"did you mean {' or '.join(filter(None, (', '.join(family[:-1]), family[-1])))}?"
-    fields = {name: f"{section}.{name}" for name, section in SECTION_OF.items()}
-    symbols = {symbol: f"{SECTION_OF[name]}.{symbol}" for symbol, name in NAME_OF_SYMBOL.items()}
+    fields = {name: f"{section}.{name}" for name, section in _SECTION_OF.items()}
+    symbols = {symbol: f"{_SECTION_OF[name]}.{symbol}" for symbol, name in _NAME_OF_SYMBOL.items()}
     return suggestion(written, {key: key for key in keys} | fields | symbols)
-
-
-def by_section(settings: Mapping[str, object]) -> dict[str, dict[str, object]]:
-    """Values by name or symbol, sorted into sections, unchecked; an `InputError` if there is no such field."""
-    sections: dict[str, dict[str, object]] = {"scene": {}, "options": {}, "parameters": {}}
-    for name, value in by_name(settings).items():
-        sections[SECTION_OF[dotted_name(name, shown(name))]][name] = value
-    return sections
-
-
-def dotted_name(written: str, path: str) -> str:
-    """Name of the field written as name or symbol, with or without its section; `path` is for the `InputError`."""
-    section, _, last = written.rpartition(".")
-    name: str = full_name(last)
-    if name not in SECTION_OF or section not in ("", SECTION_OF[name]):
-        raise InputError(f"{path}: unknown name; {suggested_name(last)}")
-    return name
 
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
@@ -228,14 +209,14 @@ def refusals(error: ValidationError, path: str, keys: Iterable[str] = (), unit: 
         if isinstance(cause, InputError):
             lines.append(f"{where}.{cause}".removeprefix("."))
         elif problem["type"] == "extra_forbidden":
-            unknown = "not possible here" if problem["loc"][-1] in SECTION_OF else "unknown name"
+            unknown = "not possible here" if problem["loc"][-1] in _SECTION_OF else "unknown name"
             lines.append(f"{where}: {unknown}; {suggested_name(problem['loc'][-1], keys)}")
         elif problem["type"] == "model_type":
             lines.append(f"{where}: expected names with values, got {shown(problem['input'])}; use a mapping")
         elif cause is not None or problem["type"] == "missing":
             lines.append(f"{where}: {cause or 'missing; set a value'}")
         else:
-            its_unit = next((field_unit(FIELDS[name]) for name in problem["loc"] if name in FIELDS), unit)
+            its_unit = next((field_unit(_FIELDS[name]) for name in problem["loc"] if name in _FIELDS), unit)
             got = problem.get("ctx", {}).get("actual_length") or shown(problem["input"])
             lines.append(f"{where}: expected {_expected(problem, its_unit)}, got {got}")
     if error.error_count() > len(lines):

@@ -17,11 +17,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import numpy as np
 from pydantic import Field, Strict
 
-from warpchain.chain.resolution import SECTIONS, resolve
+from warpchain.chain.resolution import resolve
 from warpchain.chain.setup import DEFAULT_PRESET, Setup
 from warpchain.engine.processors import processors
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.validation import InputError, by_section, checked, json_value, shown
+from warpchain.inputs.fields import SECTIONS, by_section
+from warpchain.inputs.validation import InputError, checked, json_value, shown
 from warpchain.live_page.messages import Film, recipes, summary
 from warpchain.pictures.player import player_data
 from warpchain.results.walk_result import WalkResult

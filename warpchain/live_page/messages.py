@@ -11,10 +11,10 @@ from typing import Any, Final, cast
 import numpy as np
 import yaml
 
-from warpchain.chain.resolution import SECTIONS
 from warpchain.chain.setup import DEFAULT_PRESET, Setup
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.validation import by_section, json_value
+from warpchain.inputs.fields import SECTIONS, by_section
+from warpchain.inputs.validation import json_value
 from warpchain.pictures.player import player_data
 from warpchain.results.walk_result import WalkResult
 from warpchain.walks.walk_numbers import WalkNumbers as Walk

@@ -24,7 +24,7 @@ from warpchain.hdf5_files import Stored, stored_fields
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.parameters import Parameters
 
-BEFORE: Final = "before_release"
+BEFORE_RELEASE: Final = "before_release"
 """Name of the motion before the release, among the arrays of a walk and in its file."""
 FEWEST_FRAMES: Final = 8
 """Number of frames that an average needs."""
@@ -70,7 +70,7 @@ class BeforeRelease:
         return f"<BeforeRelease: {span:.3g} s, {len(self.time)} instants, {len(self.frame_time)} frames>"
 
 
-FIELDS: Final[dict[str, Stored]] = stored_fields(BeforeRelease)
+LOOP_FIELDS: Final[dict[str, Stored]] = stored_fields(BeforeRelease)
 """Arrays of a `BeforeRelease`: name → unit, meaning and shape."""
 
 

@@ -6,7 +6,8 @@ Sizes of a film strip on paper are in inches: constrained layout clips labels of
 plain: formulas would take a third of the time that this figure takes, and every walk has one.
 """
 
-from typing import Any, Final, get_args
+from collections.abc import Callable, Mapping
+from typing import Any, Final
 
 import numpy as np
 from matplotlib import colormaps
@@ -18,10 +19,11 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from warpchain.inputs.arrays import Array
+from warpchain.inputs.figure_kinds import KINDS, FigureWord
 from warpchain.inputs.validation import InputError, shown
 from warpchain.loop.stationary_loop import StationaryLoop
 from warpchain.pictures import chain
-from warpchain.pictures.labels import Kind, setting
+from warpchain.pictures.labels import setting
 from warpchain.pictures.places import center_in_room, checked_joints, circle_radii, stretches, walk_box
 from warpchain.pictures.style import (
     BLUE,
@@ -60,13 +62,13 @@ _CLOSE_UP_LINKS, _CLOSE_UP_ASPECT = 9, 1.5
 """Width of a close-up [links], and its width over its height."""
 
 
-def draw(walk: Walk, kind: Kind, *, figure: Figure | None = None, ax: Axes | None = None) -> Figure:
+def draw(walk: Walk, kind: FigureWord, *, figure: Figure | None = None, ax: Axes | None = None) -> Figure:
     """Draw a walk; arguments and errors as of `WalkResult.plot`."""
-    if kind not in get_args(Kind):
-        raise ValueError(f"kind: unknown kind {kind!r}; use {', '.join(map(repr, get_args(Kind)))}")
-    if kind not in ("film_strip", "loop") and len(walk.time) == 0:
+    if kind not in KINDS:
+        raise ValueError(f"kind: unknown kind {kind!r}; use {', '.join(map(repr, KINDS))}")
+    if KINDS[kind].needs_series and len(walk.time) == 0:
         raise ValueError(f"walk: it has no time series. {walk.status.sentence}")
-    if ax is not None and kind != "energy":
+    if ax is not None and kind not in _ON_AXES:
         raise ValueError(f"ax: {kind} has several axes; use figure= with an empty Figure or SubFigure")
     if ax is not None and figure is not None:
         raise ValueError("ax: not possible with figure; remove one")
@@ -74,26 +76,29 @@ def draw(walk: Walk, kind: Kind, *, figure: Figure | None = None, ax: Axes | Non
         checked_figure(figure)
     if ax is not None and not isinstance(ax, Axes):
         raise InputError(f"ax: expected matplotlib Axes, got {shown(ax)}")
-    if kind == "film_strip":
-        return film_strip(walk, figure)
     if ax is not None:
-        _energy(walk, ax)
+        _ON_AXES[kind](walk, ax)
         return ax.figure.figure if isinstance(ax.figure, SubFigure) else ax.figure
-    size = {"loop": (10.0, 6.4), "energy": (6.4, 4.0)}.get(kind, (6.4, 5.0))
-    figure = InlineFigure(figsize=size, layout="constrained") if figure is None else figure
-    if kind == "energy":
-        _energy(walk, figure.subplots())
-    else:
-        {"height_and_speed": _height_and_speed, "loop": _loop, "tilt": _tilt}[kind](walk, figure)
-    return figure
+    return _DRAWN_BY[kind](walk, figure)
 
 
-def _height_and_speed(walk: Walk, figure: Figure) -> None:
+def kinds_of(walk: Walk) -> tuple[FigureWord, ...]:
+    """The figures that a walk has, if it was recorded."""
+    return tuple(word for word, kind in KINDS.items() if not kind.needs_tilt or walk.joints_lab is not None)
+
+
+def _paper(figure: Figure | None, width: float, height: float) -> Figure:
+    """The figure that is given to draw into, or else a new one of this size [inches]."""
+    return InlineFigure(figsize=(width, height), layout="constrained") if figure is None else figure
+
+
+def _height_and_speed(walk: Walk, figure: Figure | None) -> Figure:
     """Height and horizontal speed of the centre of mass against time since the release, as in Figure 5.
 
     A thin line is the height of a floor that is not flat, below the centre of mass; it is thick and has a label where
     the floor has coefficients of its own.
     """
+    figure = _paper(figure, 6.4, 5.0)
     height, speed = figure.subplots(2, 1, sharex=True)
     height.plot(walk.time, walk.center[:, 1], color=BLUE, linewidth=1.4)
     speed.plot(walk.time, walk.center_velocity[:, 0], color=BLUE, linewidth=1.4)
@@ -109,16 +114,23 @@ def _height_and_speed(walk: Walk, figure: Figure) -> None:
             height.plot(walk.time, np.where(is_above, floor, np.nan), color=color, linewidth=3.5, label=label)
             height.legend(frameon=False)
     _finish(walk, height, speed)
+    return figure
 
 
-def _energy(walk: Walk, ax: Axes) -> None:
+def _energy(walk: Walk, figure: Figure | None) -> Figure:
+    """A figure with `_energy_on` its only axes."""
+    figure = _paper(figure, 6.4, 4.0)
+    _energy_on(walk, figure.subplots())
+    return figure
+
+
+def _energy_on(walk: Walk, ax: Axes) -> None:
     """Energies of a walk against time, and what was lost by then.
 
     Lost is the energy at the release less that of the moment. The dot at the end is the sum of the ledger's losses,
     which counts each cause by itself: it lies on the line if the integration conserved energy.
     """
-    ledger, whole = walk.energy, walk.kinetic_energy + walk.gravitational_energy + walk.spring_energy
-    released = ledger["kinetic_at_release"] + ledger["potential_at_release"]
+    released, whole = walk.energy_at_release, walk.kinetic_energy + walk.gravitational_energy + walk.spring_energy
     for name, values, color in (
         ("kinetic", walk.kinetic_energy, BLUE),
         ("gravitational", walk.gravitational_energy, GREEN),
@@ -126,14 +138,14 @@ def _energy(walk: Walk, ax: Axes) -> None:
         ("lost since the release", released - whole, INK),
     ):
         ax.plot(walk.time, values, label=name, color=color, linewidth=1.4, linestyle=DASHES if color == INK else "-")
-    lost = released - ledger["kinetic_at_end"] - ledger["potential_at_end"] - ledger["residual"]
+    lost = released - walk.energy_at_end - walk.energy["residual"]
     ax.plot(walk.time[-1:], [lost], "o", color=INK, clip_on=False, label="sum of all losses", zorder=4)
     ax.set_ylabel("energy / J")
     ax.legend(frameon=False)
     _finish(walk, ax)
 
 
-def _tilt(walk: Walk, figure: Figure) -> None:
+def _tilt(walk: Walk, figure: Figure | None) -> Figure:
     """Tilt and yaw of the plane, and lateral drift of the centre of mass, against time.
 
     Marked are the moments at which the chain was first tilted by 45°, beyond which it has fallen over, and at which
@@ -141,6 +153,7 @@ def _tilt(walk: Walk, figure: Figure) -> None:
     """
     if walk.joints_lab is None:
         raise ValueError("walk: its plane is fixed, so it has no tilt; run it with plane: tilting")
+    figure = _paper(figure, 6.4, 5.0)
     angles, drift = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     for limit in (-FALLEN, FALLEN):
         angles.axhline(limit, color=FAINT, linewidth=0.8, linestyle=DOTS)
@@ -159,6 +172,7 @@ def _tilt(walk: Walk, figure: Figure) -> None:
     angles.legend(frameon=False, fontsize="small")
     figure.align_ylabels()
     _finish(walk, angles, drift)
+    return figure
 
 
 def _finish(walk: Walk, *panels: Axes) -> None:
@@ -169,7 +183,7 @@ def _finish(walk: Walk, *panels: Axes) -> None:
     panels[-1].set(xlabel="time since release $t$ / s", xlim=(0.0, float(walk.time[-1]) or None))
 
 
-def _loop(walk: Walk, figure: Figure) -> None:
+def _loop(walk: Walk, figure: Figure | None) -> Figure:
     """The mean loop of a walk before its release, to scale, and its curvature and tension along the arc.
 
     A `ValueError` says that the time before the release was not kept, or is not enough for a mean loop.
@@ -178,6 +192,7 @@ def _loop(walk: Walk, figure: Figure) -> None:
     kink = loop.kink()
     width, height = np.ptp(loop.position, axis=0)
     share = float(np.clip(0.56 * (width + 0.08) / (height + 0.08), 0.23, 0.42))
+    figure = _paper(figure, 10.0, 6.4)
     left, right = np.asarray(figure.subfigures(1, 2, width_ratios=[share, 1 - share]))
     shape = left.subplots()
     bend, pull = right.subplots(2, 1)
@@ -203,6 +218,7 @@ def _loop(walk: Walk, figure: Figure) -> None:
     pull.set(xlim=(loop.free[0] - 0.03, loop.free[1] + 0.03), ylabel="tension $T - \\rho v^2$ / N")
     pull.set_xlabel("arc length $s$ from the lowest point, along the motion / m")
     pull.set_ylim(bottom=min(0.0, 1.1 * float(loop.effective_tension[inside].min())))
+    return figure
 
 
 def _draw_shape(axes: Axes, loop: StationaryLoop, sprocket_radius: float) -> None:
@@ -397,3 +413,15 @@ def _sharpest_bend(joints: Array) -> Array:
     direction = np.arctan2(step[:, 1], step[:, 0])
     turn = np.angle(np.exp(1j * (np.roll(direction, -2) - np.roll(direction, 1))))
     return np.asarray(joints[np.argmax(np.abs(turn))])
+
+
+_DRAWN_BY: Final[Mapping[FigureWord, Callable[[Walk, Figure | None], Figure]]] = {
+    "film_strip": film_strip,
+    "height_and_speed": _height_and_speed,
+    "loop": _loop,
+    "energy": _energy,
+    "tilt": _tilt,
+}
+"""Each figure of `KINDS` draws into an empty figure, or a new one of its own size, and returns it."""
+_ON_AXES: Final[Mapping[FigureWord, Callable[[Walk, Axes], None]]] = {"energy": _energy_on}
+"""Those with one pair of axes draw into given ones, too."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.chain.keep import FRAME_INTERVAL
 from warpchain.chain.setup import Setup
 from warpchain.inputs.arrays import AnyArray
 from warpchain.inputs.parameters import Parameters
@@ -17,9 +18,10 @@ from warpchain.inputs.validation import InputError, InputWarning, by_name, check
 from warpchain.results.walk_result import WalkResult
 from warpchain.status import Status
 from warpchain.sweeps.block import POINT, Block
+from warpchain.sweeps.designs import SAMPLERS
 from warpchain.sweeps.plan import Sweep
 from warpchain.walks import rows
-from warpchain.walks.cell_statistics import CellStatistics
+from warpchain.walks.cell_statistics import CellStatistics, known_values
 from warpchain.walks.landmarks import LENGTHS
 from warpchain.walks.rows import COLUMNS, MISSING, Column, quantity_of
 from warpchain.walks.walk_numbers import read_motion
@@ -69,7 +71,7 @@ class BlockResult:
     motions: AnyArray
 
     @property
-    def planned(self) -> Block:
+    def block(self) -> Block:
         """The block of the sweep that it is of."""
         return self.origin.blocks[self.number]
 
@@ -110,7 +112,7 @@ class BlockResult:
     def _column(self, name: str) -> Column:
         if name in _NUMBERED:
             return Column("<i8", "1", _NUMBERED[name])
-        if not any(name in known for known in (self.columns, self.axes, self.planned.points)):
+        if not any(name in known for known in (self.columns, self.axes, self.block.points)):
             raise KeyError(f"{shown(name)}: {suggestion(name, (*self.columns, *self.axes))}")
         return COLUMNS[name] if name in COLUMNS else rows.field_column(name)
 
@@ -168,14 +170,14 @@ class BlockResult:
 
     def setup_at(self, place: tuple[int, ...]) -> Setup:
         """Everything that says what the walk at a place is, its draws included."""
-        return self.origin.planned(int(self.columns["index"][place])).setup
+        return self.origin.walk(int(self.columns["index"][place])).setup
 
     def walk(
         self,
         index: int | None = None,
         *,
         sample: int | None = None,
-        frame_interval: float | None = 2e-3,
+        frame_interval: float | None = FRAME_INTERVAL,
         record_before: float | None = None,
         record_joint_forces: bool = False,
         **at: Any,
@@ -256,12 +258,16 @@ class BlockResult:
     @cached_property
     def faults(self) -> dict[str, NDArray[np.bool_]]:
         """What makes walks inaccurate, a key of `warpchain.walks.landmarks.FAULTS` → whether each walk has it."""
-        return rows.faults_of_columns(self.columns, {name: self.planned.parameter(name) for name in LENGTHS})
+        return rows.faults_of_columns(self.columns, {name: self.block.parameter(name) for name in LENGTHS})
 
     @property
     def inaccurate(self) -> NDArray[np.bool_]:
         """Whether a walk has one of the `faults`, shape `shape`."""
         return np.asarray(np.any([*self.faults.values()], axis=0))
+
+    def values(self, name: str = "dx") -> NDArray[np.float64]:
+        """A column as numbers, shape `shape`, those of which `statistics` are; NaN of walks that are in no mean."""
+        return known_values(self.columns[name], self.columns["status"])
 
     def statistics(self, name: str = "dx") -> CellStatistics:
         """Statistics of a column in each cell, over the walks at rest that have a number there.
@@ -275,7 +281,7 @@ class BlockResult:
         unit, column, status = self.unit(name), self.columns[name], self.columns["status"]
         is_bounded = name == "dx" and (status == Status.DISTANCE_LIMIT).any()
         farthest = self._farthest() if is_bounded else np.array(np.nan)
-        return CellStatistics.of(self.axes, unit, column, status, self.planned.groups, farthest)
+        return CellStatistics.of(self.axes, unit, column, status, self.block.groups, farthest)
 
     def _farthest(self) -> NDArray[np.float64]:
         """Distance [m] that walks which ended by it had come, in each cell; NaN where the floor may rise ahead.
@@ -291,15 +297,15 @@ class BlockResult:
             falls = scene.slope >= 0 and bool((np.diff(heights) <= 0).all())
             return scene.distance_limit if scene.distance_limit is not None and falls else math.nan
 
-        return self.planned.over_cells(("slope", "distance_limit", "floor"), limit)[..., 0]
+        return self.block.over_cells(("slope", "distance_limit", "floor"), limit)[..., 0]
 
     def design(self) -> "xarray.DataArray":
         """What differs between the walks beside the axes, as one array with the names along its last axis, `quantity`.
 
         Values of parameter sets (`points`) and those that samples drew; NaN of a walk that is not there.
         """
-        points = [*self.planned.points]
-        if words := [name for name, values in self.planned.points.items() if isinstance(values[0], str)]:
+        points = [*self.block.points]
+        if words := [name for name, values in self.block.points.items() if isinstance(values[0], str)]:
             raise InputError(f"{words[0]}: its values are words, and a design has numbers; take to_xarray()")
         if not points and not self.drawn:
             raise InputError(f"block {self.name}: nothing differs between its walks beside axes; take to_xarray()")
@@ -324,9 +330,9 @@ class BlockResult:
         """Coordinates and variables; null among numbers is NaN."""
         along = {name: (name, values) for name, values in self.axes.items()}
         along |= {"sample": ("sample", np.arange(self.shape[-1]))}
-        along |= {name: (POINT, np.array(values)) for name, values in self.planned.points.items()}
-        if self.planned.sampler != "random":
-            along[RANDOMISATION] = "sample", self.planned.groups
+        along |= {name: (POINT, np.array(values)) for name, values in self.block.points.items()}
+        if SAMPLERS[self.block.sampler].engine is not None:
+            along[RANDOMISATION] = "sample", self.block.groups
         coordinates: _Variables = {
             name: ((dim,), values.astype(float) if values.dtype.kind == "O" else values, self.notes(name))
             for name, (dim, values) in along.items()

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from warpchain.chain.keep import LONGEST_INTERVAL, Keep
+from warpchain.chain.keep import FRAME_INTERVAL, LONGEST_INTERVAL, Keep
 from warpchain.chain.setup import Setup
 from warpchain.engine.devices import gpu_turn
 from warpchain.inputs.validation import InputError, checked
@@ -27,7 +27,7 @@ def run_walk(
     setup: Setup,
     *,
     seed: int | None = None,
-    frame_interval: float | None = 2e-3,
+    frame_interval: float | None = FRAME_INTERVAL,
     record_before: float | None = None,
     record_joint_forces: bool = False,
     on_progress: OnProgress | None = None,

@@ -21,8 +21,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from warpchain.files import AnyPath, Kind, checked_output, clear_parts, given_path, write_whole
-from warpchain.hdf5_files import Format, hdf5_image, kind_of_hdf5, reading_hdf5
+from warpchain.files import AnyPath, FileKind, checked_output, clear_parts, given_path, write_whole
+from warpchain.hdf5_files import SWEEP_FILE, Format, hdf5_image, kind_of_hdf5, reading_hdf5
 from warpchain.inputs.arrays import AnyArray
 from warpchain.inputs.validation import InputError, InputWarning, checked_path, full_name, shown, suggestion
 from warpchain.results.block_result import BlockResult, counted, located, status_counts
@@ -128,7 +128,7 @@ class SweepResult:
     def unit(self, name: str) -> str:
         """SI unit of a column or an axis of any block, "1" for pure numbers; a `KeyError` if there is none."""
         first, *others = self.blocks.values()
-        known = (block for block in others if name in (*block.columns, *block.dims, *block.planned.points))
+        known = (block for block in others if name in (*block.columns, *block.dims, *block.block.points))
         return next(known, first).unit(name)
 
     def cell_statistics(self, quantity: str = "dx") -> dict[str, CellStatistics]:
@@ -269,7 +269,7 @@ def _load_folder(directory: AnyPath) -> SweepResult:
 
 def _seen(directory: AnyPath) -> tuple[str, Manifest]:
     """Stamp and manifest of a folder."""
-    if os.path.lexists(Path(directory) / "sweep.h5"):
+    if os.path.lexists(Path(directory) / SWEEP_FILE):
         return stamp(directory), read_manifest(directory)
     return "", read_manifest(directory)  # says what is wrong
 
@@ -341,7 +341,7 @@ def _is_merged(path: Path) -> bool:
         return False
 
 
-_MERGED: Final = Kind("merged sweep", _is_merged)
+_MERGED: Final = FileKind("merged sweep", _is_merged)
 """All that a merged file replaces."""
 
 

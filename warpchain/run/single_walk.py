@@ -2,11 +2,13 @@
 
 from typing import Any
 
+from warpchain.chain.keep import FRAME_INTERVAL
 from warpchain.chain.resolution import continued, resolve, takes_fields
 from warpchain.chain.setup import DEFAULT_PRESET, Setup, State
 from warpchain.inputs.distributions import Seed
+from warpchain.inputs.fields import by_section
 from warpchain.inputs.starts import StartWord
-from warpchain.inputs.validation import InputError, by_name, by_section, checked, shown
+from warpchain.inputs.validation import InputError, by_name, checked, shown
 from warpchain.results.one_walk import OnProgress, run_walk
 from warpchain.results.walk_result import WalkResult
 from warpchain.run.progress_bar import changing_line, walk_progress_text
@@ -24,7 +26,7 @@ def walk(
     start: StartWord | State | None = None,
     setup: Setup | None = None,
     seed: int | None = None,
-    frame_interval: float | None = 2e-3,
+    frame_interval: float | None = FRAME_INTERVAL,
     record_before: float | None = None,
     record_joint_forces: bool = False,
     on_progress: OnProgress | None = None,

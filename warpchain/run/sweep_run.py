@@ -25,19 +25,9 @@ from warpchain.chain.setup import DEFAULT_PRESET, Setup
 from warpchain.engine.devices import gpu_turn, has_gpu_turn, start_device
 from warpchain.engine.processors import free_memory, processors
 from warpchain.files import AnyPath
+from warpchain.inputs.fields import SECTION_OF, by_section
 from warpchain.inputs.options import Options, on_gpu
-from warpchain.inputs.validation import (
-    SECTION_OF,
-    InputError,
-    Whole,
-    by_name,
-    by_section,
-    checked,
-    checked_path,
-    plain,
-    shown,
-    validated,
-)
+from warpchain.inputs.validation import InputError, Whole, by_name, checked, checked_path, plain, shown, validated
 from warpchain.results.sweep_result import SweepResult, load
 from warpchain.run import progress_bar
 from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text
@@ -54,7 +44,7 @@ from warpchain.walks.scheduler import compile_kernels, run_setups
 
 Tasks = Iterator[tuple[Future[None], list[Shard]]]
 
-KEYS: Final = (*BlockKeys.model_fields, "same_samples_along", "record", "name", "seed")
+FILE_KEYS: Final = (*BlockKeys.model_fields, "same_samples_along", "record", "name", "seed")
 """Keys of a sweep file that are keywords."""
 OF_WALKS: Final = ("links", "frequency", "start", "method", "tolerance")
 """Fields of which None is the default, as of `warpchain.walk`."""
@@ -70,7 +60,7 @@ SHARDS = 32
 """Least number of shards of a sweep, about, if it has as many walks: the grain of a restart."""
 
 
-@takes_fields("scene", "parameters", "options", beside=KEYS)
+@takes_fields("scene", "parameters", "options", beside=FILE_KEYS)
 def sweep(
     source: str | os.PathLike[str] | Mapping[str, Any] | Sweep | None = None,
     out: str | os.PathLike[str] | None = None,
@@ -153,7 +143,8 @@ def _checked_call(
         return planned if device is None else on_device(planned, device)
 
     problems, found = list[str](), list[Any]()
-    settings = {name: value for name, value in given.items() if value is not None or name not in (*KEYS, *OF_WALKS)}
+    unsaid = {name for name in (*FILE_KEYS, *OF_WALKS) if given.get(name) is None}
+    settings = {name: value for name, value in given.items() if name not in unsaid}
     replaced = {name: plain(settings[name], name) for name in ("seed", "samples") if name in settings}
     if source is not None and (others := [name for name in settings if name not in replaced]):
         names = ", ".join(others)
@@ -173,13 +164,13 @@ def _checked_call(
 def sweep_of_keywords(given: Values, out: AnyPath | None) -> Sweep:
     """The sweep that keyword arguments describe; an `InputError` with a line for each value that is refused.
 
-    They are `KEYS`, and fields of a walk by name or symbol; a list or a range is an axis of the grid, behind those
+    They are `FILE_KEYS`, and fields of a walk by name or symbol; a list or a range is an axis of the grid, behind those
     given. Left out, the name is that of the folder, the seed 0, and the preset that of a walk, unless it is an axis.
     """
     name = Path(out).absolute().name if isinstance(out, str | os.PathLike) else ""
     usual = {"name": name or "sweep", "seed": 0, "version": VERSION}
     values = plain(given, "sweep")
-    content: dict[str, Any] = usual | {key: values.pop(key) for key in KEYS if key in values}
+    content: dict[str, Any] = usual | {key: values.pop(key) for key in FILE_KEYS if key in values}
     by_section(values)  # refuses unknown names
     if isinstance(content.get("preset"), list):
         values = {"preset": content.pop("preset"), **values}
@@ -296,7 +287,7 @@ def run_shards(planned: Sweep, directory: str, seal: str, shards: Sequence[Shard
     under_way: dict[int, PlannedWalk] = {}
 
     def draw(number: int) -> Setup:
-        under_way[number] = planned.drawn(walks[number])
+        under_way[number] = planned.with_draws(walks[number])
         return under_way[number].setup
 
     with gpu_turn((setup.options.device for setup in setups), stop):
@@ -305,7 +296,7 @@ def run_shards(planned: Sweep, directory: str, seal: str, shards: Sequence[Shard
             shard, row = places[number]
             if pulse is not None:
                 pulse.beat()
-            fill_row(rows[shard][row], run.outcome(), under_way.pop(number).drawn)
+            fill_row(rows[shard][row], run.outcome(), under_way.pop(number).draws)
             if keeps[number].series_every is not None:
                 motions[shard][row] = run.motion()
             if (rows[shard]["status"] != MISSING).all():

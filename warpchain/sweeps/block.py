@@ -15,15 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, Field, ValidationError, ValidationInfo, WrapValidator
 
-from warpchain.chain.resolution import SECTIONS
 from warpchain.chain.setup import Setup
 from warpchain.inputs import validation
 from warpchain.inputs.distributions import Distribution, Gaussian
+from warpchain.inputs.fields import FIELDS, SECTION_OF, SECTIONS
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset as parameter_preset
 from warpchain.inputs.scene import COMPOUND, Scene
-from warpchain.inputs.validation import FIELDS, SECTION_OF, InputError, checked, json_value, path_of, shown, validated
-from warpchain.sweeps.designs import independent_groups, walks_per_sample
+from warpchain.inputs.validation import InputError, checked, json_value, path_of, shown, validated
+from warpchain.sweeps.designs import SAMPLERS, independent_groups
 from warpchain.walks.landmarks import least
 
 Value = float | int | str | tuple[Any, ...] | None
@@ -56,7 +56,7 @@ class Block:
         points: name of each quantity that parameter sets have → its value in each, along the axis `point`.
         distributions: name → distribution, in the order of drawing.
         independent: names of those that each cell draws by itself, also along axes with the same samples.
-        sampler: one of `warpchain.sweeps.designs.SAMPLERS`.
+        sampler: a key of `warpchain.sweeps.designs.SAMPLERS`.
         randomisations: number of independent randomisations of designed samples; random ones need none.
         samples_given: samples per cell, as the file says.
         first_cell: number of the block's first cell among all cells of the sweep.
@@ -88,7 +88,7 @@ class Block:
     @property
     def samples(self) -> int:
         """Walks in each cell; for `saltelli` all walks of all samples."""
-        return self.samples_given * walks_per_sample(self.sampler, len(self.distributions))
+        return self.samples_given * SAMPLERS[self.sampler].walks(len(self.distributions))
 
     @property
     def groups(self) -> NDArray[np.int64]:
@@ -196,7 +196,7 @@ class Block:
             **({} if self.preset is None else {"preset": self.preset}),
             "samples": self.samples_given,
             "sampler": self.sampler,
-            **({} if self.sampler == "random" else {"randomisations": self.randomisations}),
+            **({} if SAMPLERS[self.sampler].engine is None else {"randomisations": self.randomisations}),
             **{section: getattr(first, section).model_dump(exclude=replaced) for section in SECTIONS},
             "distributions": {"all": "fixed"} | {name: each.canonical() for name, each in self.distributions.items()},
             **({"independent": list(self.independent)} if self.independent else {}),

@@ -20,17 +20,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.chain.keep import Keep
-from warpchain.chain.resolution import SECTIONS
 from warpchain.chain.setup import Setup
 from warpchain.files import AnyPath
 from warpchain.inputs.distributions import DRAW_LIMIT, Distribution, draw, random_generator
+from warpchain.inputs.fields import SECTIONS
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS
 from warpchain.inputs.scene import Scene
 from warpchain.inputs.unit_slips import check_units
 from warpchain.inputs.validation import InputError
 from warpchain.sweeps.block import Block
-from warpchain.sweeps.designs import design_points, walks_per_sample
+from warpchain.sweeps.designs import SAMPLERS, design_points
 from warpchain.sweeps.recording import Recording
 from warpchain.sweeps.sweep_file import VERSION, read_sweep
 
@@ -57,7 +57,7 @@ class PlannedWalk:
     sample: int
     setup: Setup
     laws: Mapping[str, Distribution]
-    drawn: Point
+    draws: Point
 
 
 @dataclass(frozen=True)
@@ -88,12 +88,12 @@ class Sweep:
         """Numbers of all walks, block by block."""
         return np.concatenate([block.indices.ravel() for block in self.blocks])
 
-    def planned(self, index: int) -> PlannedWalk:
-        """The walk with a number, one of `indices`; an `IndexError` if there is none; errors as of `drawn`."""
+    def walk(self, index: int) -> PlannedWalk:
+        """The walk with a number, one of `indices`; an `IndexError` if there is none; errors as of `with_draws`."""
         (walk,) = self.undrawn([index])
-        return self.drawn(walk)
+        return self.with_draws(walk)
 
-    def drawn(self, walk: PlannedWalk) -> PlannedWalk:
+    def with_draws(self, walk: PlannedWalk) -> PlannedWalk:
         """A walk of `undrawn` with what is drawn for it.
 
         A sample may make no possible walk: with the drawn lengths, say, the chain does not reach round its sprocket.
@@ -103,11 +103,11 @@ class Sweep:
         block, fixed = self.blocks[walk.block], walk.setup
         if not block.drawn:
             return walk
-        row, member = divmod(walk.sample, walks_per_sample(block.sampler, len(block.drawn)))
-        points, setups = self._first_possible(
-            block, walk.cell, fixed, walk.laws, row, designed=block.sampler != "random"
-        )
-        return replace(walk, setup=setups[member], drawn=points[member])
+        sampler = SAMPLERS[block.sampler]
+        row, member = divmod(walk.sample, sampler.walks(len(block.drawn)))
+        is_designed = sampler.engine is not None
+        points, setups = self._first_possible(block, walk.cell, fixed, walk.laws, row, is_designed)
+        return replace(walk, setup=setups[member], draws=points[member])
 
     def undrawn(self, indices: Iterable[int]) -> Iterator[PlannedWalk]:
         """Walks without their draws, which take most of the time; options and number of links never depend on them."""
@@ -156,7 +156,7 @@ class Sweep:
                     if distribution != checked.get(name) and not fixed.options.unusual_values:
                         check_units({name: distribution.quantile(0.5)}, f"{block.path}.distributions")
                 checked = distributions
-                self._first_possible(block, cell, fixed, distributions, 0, designed=False)
+                self._first_possible(block, cell, fixed, distributions, 0, is_designed=False)
 
     def _check_options(self, block: Block, first: Options, options: Options) -> None:
         """Check the options of a cell beside those of the block's first cell; else an `InputError`."""
@@ -170,7 +170,7 @@ class Sweep:
             choice.steps(options, f"sweep.record.{name}")
 
     def _first_possible(
-        self, block: Block, cell: Cell, fixed: Setup, laws: Mapping[str, Distribution], row: int, designed: bool
+        self, block: Block, cell: Cell, fixed: Setup, laws: Mapping[str, Distribution], row: int, is_designed: bool
     ) -> tuple[list[Point], list[Setup]]:
         """Points for the walks of sample `row` of a cell, the first that make possible walks only, and their setups.
 
@@ -186,14 +186,14 @@ class Sweep:
         own = {name: laws[name] for name in block.independent}
         of_cell = random_generator(self.seed, stream, row, 1, *cell) if own else rng
         makers: list[Callable[[], Point]] = [lambda: draw(laws, rng)] * DRAW_LIMIT
-        if designed:
+        if is_designed:
             given = block.samples_given, len(laws), block.randomisations
             matrix = design_points(block.sampler, self.seed, stream, *given)
             fractions = iter(matrix[row].tolist())
             makers = [lambda: {name: each.quantile(next(fractions)) for name, each in laws.items()}, *makers]
         for point in makers:
             points = [point() | draw(own, of_cell)]
-            if block.sampler == "saltelli":  # rows of A and B, and A with one value of B, of each quantity in turn
+            if SAMPLERS[block.sampler].crosses:  # rows of A and B, and A with one value of B, of each quantity in turn
                 first, second = points[0], point() | draw(own, of_cell)
                 points = [first, second, *({**first, name: second[name]} for name in first)]
             try:

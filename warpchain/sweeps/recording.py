@@ -4,14 +4,12 @@ from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Discriminator, Field, Strict, Tag, model_validator
 
-from warpchain.chain.keep import LONGEST_INTERVAL, Keep
+from warpchain.chain.keep import FRAME_INTERVAL, LONGEST_INTERVAL, Keep
 from warpchain.inputs.options import Options
 from warpchain.inputs.validation import STRICT, InputError, number_field
 
 SERIES_INTERVAL: Final = 1e-3
 """Default time [s] between two samples of a series."""
-FRAME_INTERVAL: Final = 2e-3
-"""Default time [s] between two frames."""
 
 _Numbers = Annotated[
     tuple[Annotated[int, Field(ge=0, le=2**30)], ...],

@@ -16,13 +16,13 @@ from typing import Annotated, Any, Final, Literal, Self
 import pydantic
 from pydantic import AfterValidator, BaseModel, Field, ValidationError, ValidationInfo, model_validator
 
-from warpchain.chain.resolution import SECTIONS
 from warpchain.files import AnyPath, write_whole
 from warpchain.inputs import validation
 from warpchain.inputs.distributions import DRAWABLE, TABLE, Distribution, Gaussian, Seed, Uniform
+from warpchain.inputs.fields import FIELDS, SECTION_OF, SECTIONS, SYMBOL_OF
 from warpchain.inputs.parameters import PRESETS
 from warpchain.inputs.scene import COMPOUND
-from warpchain.inputs.validation import FIELDS, SECTION_OF, STRICT, SYMBOL_OF, InputError, ModelT, shown
+from warpchain.inputs.validation import STRICT, InputError, ModelT, shown
 from warpchain.inputs.yaml_files import read_yaml
 from warpchain.sweeps.block import CELL_LIMIT, POINT, Block, Name, Sections, Value, axis, list_of, named_axis
 from warpchain.sweeps.designs import RANDOMISATIONS, SAMPLERS, check_design
@@ -333,8 +333,8 @@ def _block(name: str, path: str, outer: BlockKeys | None, inner: BlockKeys) -> B
         raise InputError(f"{path}.samples: missing; set the number of samples per cell")
     drawn = _drawn(merged("distributions"), sections, varied, f"{path}.distributions")
     sampler, randomisations = sampler or "random", either("randomisations") or RANDOMISATIONS
-    if inner.randomisations is not None and sampler == "random":
-        raise InputError(f"{path}.randomisations: random samples are independent anyway; remove it")
+    if inner.randomisations is not None and SAMPLERS[sampler].engine is None:
+        raise InputError(f"{path}.randomisations: {sampler} samples are independent anyway; remove it")
     check_design(sampler, samples, len(drawn), randomisations, path)
     own = {*map(validation.full_name, either("independent") or ())}
     for quantity in own - drawn.keys():

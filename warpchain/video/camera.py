@@ -11,12 +11,16 @@ import numpy as np
 from pydantic import Field
 
 from warpchain.inputs.arrays import Array, checked_array
+from warpchain.inputs.parameters import preset
 from warpchain.inputs.validation import InputError, checked, shown
 from warpchain.results.walk_result import WalkResult
 
-GRAVITY: Final = 9.809
+_TABLE_1: Final = preset("paper")
+GRAVITY: Final = _TABLE_1.gravity
 """Gravity of Table 1 [m/s²]."""
-BEFORE: Final = 0.1
+JOINT_RADIUS: Final = _TABLE_1.sprocket_radius + _TABLE_1.circle_radius
+"""Distance of the joints from the centre of Table 1's sprocket [m]."""
+LEAD: Final = 0.1
 """Time before the release that a video must show [s]."""
 CLOCK: Final = np.arange(0.02, 0.361, 0.02)
 """Times since the release [s] at which videos are compared; each value is a mean over 20 ms."""
@@ -104,7 +108,7 @@ class Video:
     def seen(self, camera: Camera, errors: Array, random: np.random.Generator) -> Self:
         """This error-free video with a camera's errors, of which `errors` are shared by all videos of the chain."""
         scale, floor, origin, roll, *edges_off, clock = errors
-        time = np.arange(-BEFORE + random.uniform() / camera.fps, (1 + clock) * self.time[-1], 1 / camera.fps)
+        time = np.arange(-LEAD + random.uniform() / camera.fps, (1 + clock) * self.time[-1], 1 / camera.fps)
         center = np.column_stack([np.interp(time / (1 + clock), self.time, x) for x in self.center.T])
         turned = roll * np.column_stack([center[:, 1] - center[0, 1], -center[:, 0]])
         shift, noise = np.array([origin, floor]), random.normal(size=center.shape) * camera.noise
@@ -140,8 +144,8 @@ class Video:
         checked_array(self.time, "video.time", "t")
         checked_array(self.center, "video.center", len(self.time), 2)
         first, last = self.time[0], self.time[-1]
-        if first > 0.02 - BEFORE or last < CLOCK[-1] + 0.01:
-            needed = f"−{BEFORE:g} to {CLOCK[-1] + 0.02:g} s after the release"
+        if first > 0.02 - LEAD or last < CLOCK[-1] + 0.01:
+            needed = f"−{LEAD:g} to {CLOCK[-1] + 0.02:g} s after the release"
             raise InputError(
                 f"video: expected {needed}, got {first:.3f} to {last:.3f} s; check unit, fps, or set release"
             )

@@ -7,7 +7,7 @@ import numpy as np
 
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.validation import InputError
-from warpchain.video.camera import CAREFUL, CLOCK, GRAVITY, Camera, Video
+from warpchain.video.camera import CAREFUL, CLOCK, GRAVITY, JOINT_RADIUS, Camera, Video
 
 RELEASE_SPEED: Final = 2e-3
 """Standard deviation of either velocity of the centre of mass at the release [m/s], as links leave one by one."""
@@ -69,7 +69,7 @@ def friction_line(video: Video, camera: Camera = CAREFUL) -> FrictionLine:
     x, y = (video.center - video.center[video.time < -2 * camera.release].mean(axis=0)).T
     time, noise = np.maximum(video.time, 0), video.error(camera)
     lift, one, none = y + GRAVITY * time**2 / 2, np.ones_like(y), np.zeros_like(y)
-    speed = video.speed or 2 * np.pi * video.frequency * 0.06  # by default that on Table 1's sprocket
+    speed = video.speed or 2 * np.pi * video.frequency * JOINT_RADIUS
     # columns: friction, place, height, delay of the release, speeds at the release, roll, clock
     prior = np.array([1e3, 1, 1, camera.release, RELEASE_SPEED, RELEASE_SPEED, camera.roll, camera.clock])
     vertical = np.column_stack([none, none, one, GRAVITY * time, none, time, none, GRAVITY * time**2])

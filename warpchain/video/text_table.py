@@ -12,7 +12,7 @@ from pydantic import Field
 
 from warpchain.inputs.arrays import Array, checked_array
 from warpchain.inputs.validation import InputError, Whole, checked, checked_path, shown
-from warpchain.video.camera import BEFORE, GRAVITY, Video, rounding_of
+from warpchain.video.camera import GRAVITY, LEAD, Video, rounding_of
 
 UNITS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 _OF_HEADS: Final = {"x": UNITS, "y": UNITS, "t": {"s": 1.0, "ms": 1e-3}}
@@ -172,14 +172,14 @@ def _fitted_release(time: Array, y: Array) -> float:
     """Time at which a height that was constant begins to fall freely, for at least 30 ms."""
 
     def misfit(start: float) -> float:
-        near = slice(*np.searchsorted(time, [start - BEFORE, start + 0.03]))
+        near = slice(*np.searchsorted(time, [start - LEAD, start + 0.03]))
         return float((y[near] + GRAVITY / 2 * np.maximum(time[near] - start, 0) ** 2).var())
 
-    starts = np.arange(time[0] + BEFORE / 2, time[-1] - 0.1, 2.5e-4)
+    starts = np.arange(time[0] + LEAD / 2, time[-1] - 0.1, 2.5e-4)
     if not len(starts):
         raise InputError("release: the video is too short to fit the release; set release")
     release = float(min(starts, key=misfit))
-    still = y[(time > release - BEFORE) & (time < release)].var()
+    still = y[(time > release - LEAD) & (time < release)].var()
     if misfit(release) > 4 * max(still, rounding_of(y) ** 2, 1e-8):
         raise InputError("release: found no beginning of a free fall; check unit and fps, or set release")
     return release

@@ -66,7 +66,7 @@ def drive_of(setup: Setup) -> dict[str, float]:
         "steady_window": window,
         "steady_time": BY_ITSELF if scene.steady_time is None else scene.steady_time,
         "steady_tolerance": scene.steady_tolerance,
-        "further_hold": scene.extra_hold,
+        "extra_hold": scene.extra_hold,
         "release_phase": scene.phase,
         "hold_softness": softness,
         "loaded_softness": loaded_softness,

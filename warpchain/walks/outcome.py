@@ -123,6 +123,16 @@ class Outcome:
     release: Annotated[dict[str, float], Stored("m", "geometry of the loop at the release", keys=RELEASE)]
     release_speed: Annotated[float, Stored("m/s", "mean speed of the link centres along the loop at the release")]
 
+    @property
+    def energy_at_release(self) -> float:
+        """Kinetic and potential energy at the release [J]; NaN without one."""
+        return self.energy["kinetic_at_release"] + self.energy["potential_at_release"]
+
+    @property
+    def energy_at_end(self) -> float:
+        """Kinetic and potential energy at the end [J]; NaN without a release."""
+        return self.energy["kinetic_at_end"] + self.energy["potential_at_end"]
+
 
 @dataclass(kw_only=True)
 class Driven:

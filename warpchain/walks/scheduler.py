@@ -155,7 +155,7 @@ class BatchRun:
         self._features: dict[int, Features] = {}
 
     @property
-    def load(self) -> float:
+    def filled_share(self) -> float:
         """Share of the device that its walks fill."""
         return len(self._running) / self._capacity
 
@@ -196,7 +196,7 @@ def _run_groups(groups: Iterator[list[BatchRun]], stop: threading.Event | None) 
     under_way: list[BatchRun] = []
     try:
         while not (stop is not None and stop.is_set()):
-            while not any(run.waiting for run in under_way) and sum(run.load for run in under_way) < 1:
+            while not any(run.waiting for run in under_way) and sum(run.filled_share for run in under_way) < 1:
                 group = next(groups, None)
                 if group is None:
                     break
