@@ -10,6 +10,7 @@ and the index only: no table of walks exists, and a walk is the same whoever ask
 
 import bisect
 import hashlib
+import itertools
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -185,12 +186,13 @@ class Sweep:
         rng, problem = random_generator(self.seed, stream, row), ""
         own = {name: laws[name] for name in block.independent}
         of_cell = random_generator(self.seed, stream, row, 1, *cell) if own else rng
-        makers: list[Callable[[], Point]] = [lambda: draw(laws, rng)] * DRAW_LIMIT
+        makers: Iterable[Callable[[], Point]] = itertools.repeat(lambda: draw(laws, rng), DRAW_LIMIT)
         if designed:
             given = block.samples_given, len(laws), block.randomisations
             matrix = design_points(block.sampler, self.seed, stream, *given)
             fractions = iter(matrix[row].tolist())
-            makers = [lambda: {name: each.quantile(next(fractions)) for name, each in laws.items()}, *makers]
+            designed_point = lambda: {name: each.quantile(next(fractions)) for name, each in laws.items()}  # noqa: E731
+            makers = itertools.chain([designed_point], makers)
         for point in makers:
             points = [point() | draw(own, of_cell)]
             if block.sampler == "saltelli":  # rows of A and B, and A with one value of B, of each quantity in turn
