@@ -147,7 +147,7 @@ class Setup:
             sections[SECTION_OF[name]][name] = value
         parameters = with_numbers(self.parameters, sections["parameters"], "parameters")
         scene = with_numbers(self.scene, sections["scene"], "scene")
-        return replace(self, parameters=parameters, scene=scene).checked(asks_units=False)
+        return Setup(self.preset, parameters, scene, self.options, self.start).checked(asks_units=False)
 
     def placed(self, distributions: Mapping[str, Distribution]) -> dict[str, Distribution]:
         """The distributions with means and bounds for this chain.

@@ -13,7 +13,7 @@ import hashlib
 import itertools
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any, Final
 
@@ -108,25 +108,27 @@ class Sweep:
         points, setups = self._first_possible(
             block, walk.cell, fixed, walk.laws, row, designed=block.sampler != "random"
         )
-        return replace(walk, setup=setups[member], drawn=points[member])
+        return PlannedWalk(walk.index, walk.block, walk.cell, walk.sample, setups[member], walk.laws, points[member])
 
     def undrawn(self, indices: Iterable[int]) -> Iterator[PlannedWalk]:
         """Walks without their draws, which take most of the time; options and number of links never depend on them."""
 
         @lru_cache(2**12)
-        def of_cell(number: int, cell: Cell) -> tuple[Setup, Mapping[str, Distribution]]:
-            """What all samples of a cell have in common."""
-            setup = self.blocks[number].fixed(cell)
-            return setup, setup.placed(self.blocks[number].distributions)
-
-        for index in map(int, indices):
-            sample, place = divmod(index, self.blocks[0].stride)
+        def of_cell(place: int) -> tuple[int, Cell, Setup, Mapping[str, Distribution]]:
+            """What all samples of a cell have in common, and their block."""
             number = bisect.bisect_right(self.blocks, place, key=lambda block: block.first_cell) - 1
             block = self.blocks[number]
-            if not 0 <= sample < block.samples:
-                raise IndexError(f"walk {index} of a sweep of {self.walk_count} walks")
             cell = tuple(map(int, np.unravel_index(place - block.first_cell, block.shape[:-1])))
-            yield PlannedWalk(index, number, cell, sample, *of_cell(number, cell), {})
+            setup = block.fixed(cell)
+            return number, cell, setup, setup.placed(block.distributions)
+
+        stride = self.blocks[0].stride
+        for index in map(int, indices):
+            sample, place = divmod(index, stride)
+            number, cell, setup, laws = of_cell(place)
+            if not 0 <= sample < self.blocks[number].samples:
+                raise IndexError(f"walk {index} of a sweep of {self.walk_count} walks")
+            yield PlannedWalk(index, number, cell, sample, setup, laws, {})
 
     def keep(self, walk: PlannedWalk) -> Keep:
         """What is kept of the motion of a walk."""

@@ -32,6 +32,13 @@ SHARED_WALKS = 2000
 Kernels for blocks of different sizes compete for the instruction cache of a multiprocessor: the 504 walks of Figure 6
 took a fifth longer in blocks of five sizes than in blocks of 192 threads, some of them idle; 2016 walks took as long.
 """
+BEGUN_TOGETHER = 32
+"""Free worlds of a batch of some hundred that are worth a beginning, if chains are under way there.
+
+To begin w walks takes about F + c w, with F as much as 20 walks (F = 1.2 ms, c = 0.06 ms on a quiet core of 3 GHz): so
+much of it goes to Python and not to numbers. From 32 walks on F is less than half of that. Meanwhile an eighth of the
+worlds at most is idle, and there are `WORLDS_OF_BLOCK` times as many as fill the device.
+"""
 BATCHES_PER_GPU = 4
 """While the host handles one of them, the others go on and fill the device."""
 NAP = 5e-4
@@ -159,9 +166,10 @@ class BatchRun:
         return len(self._running) / self._capacity
 
     def start(self) -> bool:
-        """Give waiting walks all free worlds and begin a launch; False if there is nothing to carry on."""
+        """Give waiting walks free worlds, if there are enough, and begin a launch; False if nothing is to carry on."""
         free = np.flatnonzero(self._kernel < 0)[: len(self.waiting)].tolist()
-        if free:
+        enough = min(BEGUN_TOGETHER, len(self._kernel) // 8, len(self.waiting))
+        if free and (len(free) >= enough or not self._running):
             walks = self._complete([self.waiting.popleft() for _ in free])
             begun = {
                 world: (place, WalkRun(self.batch.worlds[world], setup, keep))

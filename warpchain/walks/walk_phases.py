@@ -58,18 +58,24 @@ class Progress:
     sprocket_height: float = math.nan
 
 
-_features = functools.cache(Features)
-
-
 def phase_features(setup: Setup) -> dict[str, Features]:
     """What kernels are compiled for in those phases that a walk has: `driven`, `moving` (beside a sprocket), `free`."""
     scene, options, columns = setup.scene, setup.options, layout.padded_width(setup.scene.links)
-    features = partial(_features, options.method, columns, self_contact=options.self_contact, is_mixed=options.is_mixed)
-    body, tilts = setup.floor.body, scene.plane == "tilting"
+    body, tilts = "floor" if scene.is_level else setup.floor.body, scene.plane == "tilting"
+    own = options.method, columns, options.self_contact, options.is_mixed
+    return _kernels(*own, body, tilts, setup.has_drive, scene.release is not None)
+
+
+@functools.cache
+def _kernels(
+    method: str, columns: int, contact: bool, is_mixed: bool, body: str, tilts: bool, has_drive: bool, moves: bool
+) -> dict[str, Features]:
+    """See `phase_features`; `moves`: whether the sprocket moves after the release."""
+    features = partial(Features, method, columns, self_contact=contact, is_mixed=is_mixed)
     found = {"free": features(body, tilts=tilts)}
-    if setup.has_drive:
+    if has_drive:
         found["driven"] = features("sprocket")
-        if scene.release is not None:
+        if moves:
             found["moving"] = features(body, tilts=tilts, moving_sprocket=True)
     return found
 
