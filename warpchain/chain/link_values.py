@@ -72,7 +72,7 @@ class LinkValues:
 def _of_rows(values: Array, alike: Callable[[Array], Array], unlike: Callable[[Array], float]) -> Any:
     """A number of each row of values (…, k): of rows of equal values by that value, as arrays, of others one by one."""
     found = np.array(alike(values[..., 0]))
-    for place in zip(*np.nonzero((values != values[..., :1]).any(-1)), strict=True):
+    for place in map(tuple, np.argwhere((values != values[..., :1]).any(-1))):
         found[place] = unlike(values[place])
     return found[()]
 
