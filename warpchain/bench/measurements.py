@@ -22,7 +22,6 @@ import numpy as np
 import warp as wp
 
 from warpchain.chain.start_shapes import ellipse, lay_chain
-from warpchain.chain.starts import Motion
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import gpu_turn, start_device
 from warpchain.engine.processors import processors
@@ -37,6 +36,8 @@ from warpchain.status import Status
 from warpchain.version import package_versions
 
 Row = dict[str, Any]
+Motion = tuple[Array, Array]
+"""Position x, y [m], θ [rad] of each link and their rates, (n, 3) each."""
 Report = Callable[[str], None]
 """Called with a line of progress."""
 

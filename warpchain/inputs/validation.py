@@ -214,7 +214,7 @@ def with_numbers(model: SectionT, numbers: Mapping[str, float], path: str) -> Se
     return changed
 
 
-_bounds_of = functools.cache(lambda name: field_bounds(FIELDS[name]))
+_bounds_of = functools.cache(lambda name: field_bounds(_FIELDS[name]))
 _OWN: Final = frozenset((float, int, str, bool, type(None)))
 
 
