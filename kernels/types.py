@@ -92,7 +92,7 @@ class Drive:
     steady_window: wp.array(dtype=wp.float64)  # over which means are taken in the hold's second part [s]
     steady_time: wp.array(dtype=wp.float64)  # for which its shape must then stay [s]; negative: see events.release
     steady_tolerance: wp.array(dtype=wp.float64)  # greatest relative change of the shape of a stationary loop
-    further_hold: wp.array(dtype=wp.float64)  # how long a stationary loop is held further [s]
+    extra_hold: wp.array(dtype=wp.float64)  # how long a stationary loop is held further [s]
     release_phase: wp.array(dtype=wp.float64)  # and after that, in loop periods
     hold_softness: wp.array(dtype=wp.float64)  # of the joints from the hold to the release, 1 to 2; 0: own values
     loaded_softness: wp.array(dtype=wp.float64)  # of the joints under load

@@ -15,8 +15,16 @@ import pytest
 import warpchain
 from tests.support.setups import setup_walk
 from warpchain.chain.resolution import resolve
+from warpchain.inputs.distributions import DRAWABLE
 from warpchain.inputs.fields import SECTION_OF, SECTIONS
-from warpchain.inputs.validation import LONGEST_LINE, InputError, field_limits
+from warpchain.inputs.validation import (
+    LONGEST_LINE,
+    InputError,
+    field_bounds,
+    field_limits,
+    validated,
+    with_numbers,
+)
 from warpchain.inputs.yaml_files import LARGEST_FILE, read_yaml
 from warpchain.kernels.methods.method import find_method, method_names
 from warpchain.sweeps.plan import load_sweep
@@ -314,3 +322,22 @@ def test_numbers_aliases_and_dates_mean_what_they_say(tmp_path: Path) -> None:
     }  # fmt: skip
     path.write_bytes(b"\xff\xfe\xff")
     assert refusal(lambda: read_yaml(path)).startswith(str(path))
+
+
+@pytest.mark.parametrize("name", DRAWABLE)
+def test_drawn_values_are_checked_as_given_ones(name: str) -> None:
+    """Within, at and beyond its bounds, and not a number: what is drawn is taken, or refused, as if it were given."""
+    setup = setup_walk("paper", {"links": 60, "start": "ellipse"})
+    section, model = SECTION_OF[name], SECTIONS[SECTION_OF[name]]
+    usual, (least, most) = getattr(setup, section), field_bounds(FIELDS[name])
+
+    def taken(check: Callable[[], object]) -> object:
+        try:
+            return vars(check())
+        except InputError as error:
+            return str(error)
+
+    for value in (least, most, math.nextafter(least, -math.inf), math.nextafter(most, math.inf), math.nan, math.inf):
+        drawn = taken(lambda value=value: with_numbers(usual, {name: value}, section))  # type: ignore[misc]
+        given = taken(lambda value=value: validated(model, vars(usual) | {name: value}, section))  # type: ignore[misc]
+        assert drawn == given, value

@@ -13,7 +13,7 @@ from tests.support.command_line import Command
 from warpchain import InputError, SweepResult, WalkResult
 from warpchain.inputs.validation import InputWarning
 from warpchain.results.sweep_result import merge
-from warpchain.walks.rows import STORED_COLUMNS, fill_row, missing_rows, row_type
+from warpchain.walks.rows import STORED_COLUMNS, fill_outcomes, missing_rows, row_type
 
 SWEEP: dict[str, Any] = {
     "links": 12,
@@ -37,8 +37,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def assert_same_numbers(walk: WalkResult, result: SweepResult, place: tuple[int, ...]) -> None:
     """A walk has all numbers of a row, to the bit."""
-    (row,) = missing_rows(row_type(()), np.zeros(1, row_type(())))
-    fill_row(row, walk, {})
+    row = missing_rows(row_type(()), np.zeros(1, row_type(())))
+    fill_outcomes(row, [0], vars(walk))
     for name in ("status", *STORED_COLUMNS):
         assert row[name].tobytes() == result.columns[name][place].astype(row[name].dtype).tobytes(), name
 

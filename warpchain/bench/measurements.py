@@ -22,7 +22,6 @@ import numpy as np
 import warp as wp
 
 from warpchain.chain.start_shapes import ellipse, lay_chain
-from warpchain.chain.starts import Motion
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import gpu_turn, start_device
 from warpchain.engine.processors import processors
@@ -37,6 +36,8 @@ from warpchain.status import Status
 from warpchain.version import package_versions
 
 Row = dict[str, Any]
+Motion = tuple[Array, Array]
+"""Position x, y [m], θ [rad] of each link and their rates, (n, 3) each."""
 Report = Callable[[str], None]
 """Called with a line of progress."""
 
@@ -135,7 +136,8 @@ def _errors(end: Motion, aim: Motion) -> Row:
 def walk_rate(device: str, report: Report) -> Row:
     """Method, tolerance, walks, those at rest, wall time [s] and walks a second of a sweep, kernels loaded before.
 
-    On a CPU all processors take part. Errors as of :func:`warpchain.sweep`.
+    `waited` is the share of that time in which the host waited for a GPU, and had nothing else to do. On a CPU all
+    processors take part. Errors as of :func:`warpchain.sweep`.
     """
     options, walks = Options.model_validate({"device": device}), WALKS["gpu" if on_gpu(device) else "cpu"]
     seen: list[SweepProgress] = []
@@ -145,6 +147,7 @@ def walk_rate(device: str, report: Report) -> Row:
     return {
         **{"method": options.method, "tolerance": options.tolerance, "walks": walks},
         **{"at_rest": result.summary()["at_rest"], "seconds": seen[-1].seconds, "walks_per_second": seen[-1].rate},
+        "waited": seen[-1].waited / seen[-1].seconds,
     }
 
 

@@ -23,7 +23,7 @@ from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL, Options
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import Scene, check_links_on_gpu
 from warpchain.inputs.unit_slips import check_units
-from warpchain.inputs.validation import InputError, InputWarning, shown, validated
+from warpchain.inputs.validation import InputError, InputWarning, shown, validated, with_numbers
 from warpchain.kernels.methods.method import find_method
 
 DEFAULT_PRESET: Final = "paper"
@@ -64,7 +64,8 @@ class Setup:
     @cached_property
     def link_values(self) -> LinkValues:
         """What each link and joint of the chain has of its own."""
-        return link_values(self.scene, self.parameters)
+        own = link_values([self.scene], [self.parameters])
+        return LinkValues(*(values[0] for values in vars(own).values()))
 
     @cached_property
     def floor(self) -> Floor:
@@ -145,9 +146,9 @@ class Setup:
         sections: dict[str, dict[str, float]] = {"parameters": {}, "scene": {}}
         for name, value in drawn.items():
             sections[SECTION_OF[name]][name] = value
-        parameters = validated(Parameters, {**vars(self.parameters), **sections["parameters"]}, "parameters")
-        scene = validated(Scene, {**vars(self.scene), **sections["scene"]}, "scene")
-        return replace(self, parameters=parameters, scene=scene).checked(asks_units=False)
+        parameters = with_numbers(self.parameters, sections["parameters"], "parameters")
+        scene = with_numbers(self.scene, sections["scene"], "scene")
+        return Setup(self.preset, parameters, scene, self.options, self.start).checked(asks_units=False)
 
     def placed(self, distributions: Mapping[str, Distribution]) -> dict[str, Distribution]:
         """The distributions with means and bounds for this chain.

@@ -28,6 +28,7 @@ WALKS: Final = {
     "at rest": "{[at_rest]:,}",
     "s": "{[seconds]:.1f}",
     "walks/s": "{[walks_per_second]:.3g}",
+    "waits for GPU": "{[waited]:.0%}",
 }
 """Heading of each column of a table → its text, filled in from a row."""
 
@@ -99,7 +100,7 @@ def bench(
     Steps are attempted steps of one chain in free flight (4000 chains on a GPU), with Table 1's values and the
     method's default tolerance. Errors are the largest errors of a link's position and velocity after 1 ms, compared
     with SciPy's DOP853 at 1e-10 on a NumPy model. Walks have 60 links at 15 Hz, the default method and a warm kernel
-    cache.
+    cache; beside their rate stands the share of the time in which the host waited for a GPU.
     """
     from warpchain.bench.measurements import machine, step_costs, walk_rate
     from warpchain.cli.output import print_table

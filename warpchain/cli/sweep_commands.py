@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 _FILE: Final = "Sweep file, or the bare name of a sweep that comes with warpchain, e.g. figure6."
 _FILES: Final = "Sweep files, or bare names of sweeps that come with warpchain. Default: all of the latter."
 _KIND: Final = (
-    f"Draw only this figure of a walk. {'; '.join(f'{word}: {kind.described}' for word, kind in KINDS.items())}. "
-    "Default: all figures that the walk has."
+    f"The only figure of a walk to draw. {'; '.join(f'{word}: {kind.described}' for word, kind in KINDS.items())}. "
+    "Default: all that the walk has data for."
 )
 _DEVICE: Final = "cpu, cuda (the first GPU) or cuda:N, instead of the device in the sweep file."
 
@@ -156,7 +156,7 @@ def plot(
     """Draw all figures of a sweep or of a saved walk.
 
     For a sweep these are the distance as in the paper's Figure 6, maps, lines over any axes, and sensitivity. For a
-    walk there is a file for each --kind. A line names each figure that cannot be drawn, and why.
+    walk there is a file for each --kind that it has. A line names each figure that cannot be drawn, and why.
     """
     from warpchain.cli.output import draw_figures, saved
     from warpchain.files import make_folder

@@ -45,11 +45,11 @@ _OUTPUT: Final = (
     "draws the other figures, `warpchain animate` an animation."
 )
 _FILM: Final = "File to write; its name ends in .gif, .mp4 or .html. Default: walk.gif beside the walk."
-_FRAMES_WITH_FORCES: Final = 1e-4
-"""Default time [s] between two frames with joint forces."""
+_LOADED_FRAMES: Final = 1e-4
+"""Time [s] between two frames with joint forces, unless another is given."""
 _FRAMES: Final = f"Simulated time between two frames, in s; needs a folder. Default: {FRAME_INTERVAL:g}."
 _LOADS: Final = (
-    f"Record the forces and moments of the joints with each frame, by default every {_FRAMES_WITH_FORCES:g} s; needs a "
+    f"Record the forces and moments of the joints with each frame, by default every {_LOADED_FRAMES:g} s; needs a "
     "folder. standard then means explicit, because rigid joints have no forces. 60 links take 24 MB per simulated "
     "second."
 )
@@ -127,7 +127,7 @@ def walk(
     if folder is None and (frame_interval is not None or record_joint_forces):
         name = "--record-joint-forces" if frame_interval is None else "--frame-interval"
         raise InputError(f"{name}: has no folder to write to; add -o DIR")
-    usual = None if folder is None else _FRAMES_WITH_FORCES if record_joint_forces else FRAME_INTERVAL
+    usual = None if folder is None else _LOADED_FRAMES if record_joint_forces else FRAME_INTERVAL
     interval = usual if frame_interval is None else parse_yaml(frame_interval, "frame_interval")
     if folder is not None:
         try_walk_folder(folder)

@@ -152,8 +152,8 @@ class Options(Section):
         all_values = {**defaults, **{name: value for name, value in values.items() if name != "method"}}
         return {"precision": "mixed" if _tightest(all_values) >= LEAST_MIXED_BY_DEFAULT else "double", **all_values}
 
-    @model_validator(mode="after")
-    def _goes_together(self) -> Self:
+    def check_together(self) -> None:
+        """See `Section`."""
         if on_gpu(self.device) and find_method(self.method).has_rigid_flight:
             raise InputError(f"method: {shown(self.method)} runs only on a CPU; use explicit, or device: cpu")
         tightest = _tightest({"tolerance": self.tolerance, "soft_tolerance": self.soft_tolerance})
@@ -165,4 +165,3 @@ class Options(Section):
         if self.soften_drive and self.record_interval > LONGEST_DRIVE_INTERVAL:
             problem = f"joints stiffen at each record_interval, and {self.record_interval} s is too long for that"
             raise InputError(f"soften_drive: {problem}; use at most {LONGEST_DRIVE_INTERVAL} s, or soften_drive: false")
-        return self

@@ -1,9 +1,9 @@
 """The fields of a scene: the chain's length, how it is spun and released, the floor, and when a walk ends."""
 
 import math
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Final, Literal
 
-from pydantic import Field, Strict, model_validator
+from pydantic import Field, Strict
 
 from warpchain.inputs.compound_fields import FloorField, Rows
 from warpchain.inputs.options import on_gpu
@@ -134,8 +134,8 @@ class Scene(Section):
         """Whether the floor is y = 0."""
         return self.floor == "flat" and self.slope == 0
 
-    @model_validator(mode="after")
-    def _goes_together(self) -> Self:
+    def check_together(self) -> None:
+        """See `Section`."""
         for name in ("charm_link", "stiff_joint"):
             if (given := getattr(self, name)) >= self.links:
                 raise InputError(
@@ -160,7 +160,6 @@ class Scene(Section):
             raise InputError(f"release: a motion of the sprocket is not possible with {word}; remove one")
         if self.clearance_of == "hanging" and self.start != "rest":
             raise InputError(f"clearance_of: 'hanging' needs start: rest, got {self.start}; use rest, or 'spinning'")
-        return self
 
 
 COMPOUND: Final = tuple(name for name, field in Scene.model_fields.items() if _COMPOUND in field.metadata)

@@ -11,10 +11,10 @@ import reprlib
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Set, ValuesView
 from pathlib import Path
-from typing import Annotated, Any, Final, TypeVar
+from typing import Annotated, Any, Final, Self, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 from pydantic.fields import FieldInfo
 from pydantic_core import to_jsonable_python
 
@@ -142,6 +142,14 @@ class Section(BaseModel):
                 _SYMBOL_OF[name] = spelled(str(field.json_schema_extra["symbol"]))
                 _NAME_OF_SYMBOL[_SYMBOL_OF[name]] = name
 
+    def check_together(self) -> None:
+        """Raise an `InputError` if fields contradict one another."""
+
+    @model_validator(mode="after")
+    def _goes_together(self) -> Self:
+        self.check_together()
+        return self
+
 
 def full_name(written: Any) -> Any:
     """Name of the field that is written as its name or symbol, `mu_fc` or μ_fc; anything else stays as it is."""
@@ -175,6 +183,7 @@ def suggested_name(written: object, keys: Iterable[str] = ()) -> str:
 
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
+SectionT = TypeVar("SectionT", bound=Section)
 
 
 def validated(model: type[ModelT], values: Mapping[str, object], path: str) -> ModelT:
@@ -183,7 +192,7 @@ def validated(model: type[ModelT], values: Mapping[str, object], path: str) -> M
     NumPy's numbers are taken as `plain` does. If a value is refused, an `InputError` describes the first and counts
     the others; it begins with `path`, where they were given, such as `scene`.
     """
-    own = all(type(value) in _OWN for value in values.values())  # as in the millions of walks of a sweep
+    own = _OWN.issuperset(map(type, values.values()))
     try:
         return model.model_validate(values if own else plain(values, path))
     except ValidationError as error:
@@ -191,6 +200,21 @@ def validated(model: type[ModelT], values: Mapping[str, object], path: str) -> M
         raise InputError(refusals(error, path)[0] + others) from None
 
 
+def with_numbers(model: SectionT, numbers: Mapping[str, float], path: str) -> SectionT:
+    """A model with other numbers, which every walk of a sweep has, in fields of floats; errors as of `validated`."""
+    changed = model.model_copy(update=numbers)
+    for name, number in numbers.items():
+        least, most = _bounds_of(name)
+        if not least <= number <= most:
+            return validated(type(model), vars(changed), path)
+    try:
+        changed.check_together()
+    except InputError:
+        return validated(type(model), vars(changed), path)
+    return changed
+
+
+_bounds_of = functools.cache(lambda name: field_bounds(_FIELDS[name]))
 _OWN: Final = frozenset((float, int, str, bool, type(None)))
 
 

@@ -50,7 +50,7 @@ def run_walk(
         report(Progress("compile", 0.0, 0.0, 0))
         compile_kernels([setup])
         started = time.perf_counter()
-        ((_, run),) = run_setups([setup], keeps=[keep], watch=lambda run: report(run.progress()))
+        (((_, run),),) = run_setups([setup], keeps=[keep], watch=lambda run: report(run.progress()))
         return WalkResult(
             **vars(run.outcome()),
             **run.motion(),

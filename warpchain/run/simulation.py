@@ -146,7 +146,7 @@ def simulate(
         setup.floor.check_above(state.position, chain.link_length, "position")
     with gpu_turn([options.device]):
         batch = Batch(1, state.links, options, faces=len(setup.floor.laws))
-        batch.worlds[0].set_up(setup)
+        batch.several([0]).set_up([setup])
         batch.worlds[0].load(state.position, state.velocity, stop_time=instants[0], stop_status=Status.FINISHED)
         return _follow(batch, "none" if floor is False else setup.floor.body, instants, end)
 
@@ -205,9 +205,9 @@ class Chains:
         self.time, self._links = 0.0, links
         with gpu_turn([options.device]):
             self._batch = Batch(worlds, links, options)
-            for world, state in zip(self._batch.worlds, states, strict=True):
-                world.set_up(state.setup)
-                world.load(state.position, state.velocity, stop_time=0.0, stop_status=Status.FINISHED)
+            every = self._batch.several(range(worlds))
+            every.set_up([state.setup for state in states])
+            every.load(position, velocity, stop_time=0.0, stop_status=Status.FINISHED)
             self._features = self._batch.features(fixed_body="floor" if floor else "none")
             self._batch.run(range(worlds), self._features)
 

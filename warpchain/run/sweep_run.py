@@ -9,6 +9,7 @@ import math
 import os
 import re
 import time
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import ExitStack
@@ -36,11 +37,12 @@ from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
 from warpchain.store.shards import Part, Shard, check_numerics, opened_shard, rows_of, stamp, write_shard
 from warpchain.sweeps.block import is_axis
-from warpchain.sweeps.plan import PlannedWalk, Source, Sweep, load_sweep
+from warpchain.sweeps.plan import Source, Sweep, load_sweep
 from warpchain.sweeps.sweep_file import VERSION, BlockKeys
 from warpchain.walks.landmarks import LENGTHS
-from warpchain.walks.rows import MISSING, derived_columns, faults_of_columns, fill_row, missing_rows
+from warpchain.walks.rows import derived_columns, faults_of_columns, fill_drawn, fill_outcomes, missing_rows
 from warpchain.walks.scheduler import compile_kernels, run_setups
+from warpchain.walks.walk_phases import outcomes
 
 Tasks = Iterator[tuple[Future[None], list[Shard]]]
 
@@ -281,26 +283,33 @@ def run_shards(planned: Sweep, directory: str, seal: str, shards: Sequence[Shard
     stop = None if pulse is None else pulse.stop
     walks = list(planned.undrawn(index for shard in shards for index in shard.walks.tolist()))
     setups, keeps = [walk.setup for walk in walks], [planned.keep(walk) for walk in walks]
-    places = [(shard, row) for shard in shards for row in range(len(shard))]
-    rows = {shard: missing_rows(shard.kind, shard.keys) for shard in shards}
-    motions: dict[Shard, dict[int, dict[str, Any]]] = {shard: {} for shard in shards}
-    under_way: dict[int, PlannedWalk] = {}
+    of_walk = np.repeat(np.arange(len(shards)), [len(shard) for shard in shards])
+    firsts = np.flatnonzero(np.diff(of_walk, prepend=-1))
+    rows = missing_rows(shards[0].kind, np.concatenate([shard.keys for shard in shards]))
+    motions: dict[int, dict[int, dict[str, Any]]] = defaultdict(dict)
+    missing = np.bincount(of_walk)
 
-    def draw(number: int) -> Setup:
-        under_way[number] = planned.with_draws(walks[number])
-        return under_way[number].setup
+    def draw(places: Sequence[int]) -> list[Setup]:
+        drawn = [planned.with_draws(walks[place]) for place in places]
+        fill_drawn(rows, places, [walk.draws for walk in drawn])
+        return [walk.setup for walk in drawn]
 
     with gpu_turn((setup.options.device for setup in setups), stop):
         compile_kernels(setups)  # all at once: a walk that needs one would wait for it alone
-        for number, run in run_setups(setups, draw=draw, keeps=keeps, stop=stop):
-            shard, row = places[number]
+        waited = (lambda seconds: None) if pulse is None else pulse.wait
+        for over in run_setups(setups, draw=draw, keeps=keeps, stop=stop, waited=waited):
+            places = [place for place, _ in over]
+            fill_outcomes(rows, places, outcomes([run for _, run in over]))
             if pulse is not None:
-                pulse.beat()
-            fill_row(rows[shard][row], run.outcome(), under_way.pop(number).draws)
-            if keeps[number].series_every is not None:
-                motions[shard][row] = run.motion()
-            if (rows[shard]["status"] != MISSING).all():
-                write_shard(directory, seal, shard, rows.pop(shard), motions.pop(shard))
+                pulse.beat(len(over))
+            for place, run in over:
+                if keeps[place].series_every is not None:
+                    motions[of_walk[place]][place - firsts[of_walk[place]]] = run.motion()
+            np.subtract.at(missing, of_walk[places], 1)
+            for number in np.unique(of_walk[places]):
+                if missing[number] == 0:
+                    shard, first = shards[number], firsts[number]
+                    write_shard(directory, seal, shard, rows[first : first + len(shard)], motions.pop(number, {}))
 
 
 def _follow(
@@ -337,7 +346,7 @@ def _follow(
                 progress.inaccurate += int(np.any([*found.values()], axis=0).sum())
                 written += len(shard)
             progress.done = progress.before + max(written, pulse.over)
-            progress.seconds = time.perf_counter() - began
+            progress.seconds, progress.waited = time.perf_counter() - began, pulse.waited
             report(progress)
     finally:
         for future in pending:

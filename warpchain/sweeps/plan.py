@@ -10,9 +10,10 @@ and the index only: no table of walks exists, and a walk is the same whoever ask
 
 import bisect
 import hashlib
+import itertools
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any, Final
 
@@ -107,25 +108,27 @@ class Sweep:
         row, member = divmod(walk.sample, sampler.walks(len(block.drawn)))
         is_designed = sampler.engine is not None
         points, setups = self._first_possible(block, walk.cell, fixed, walk.laws, row, is_designed)
-        return replace(walk, setup=setups[member], draws=points[member])
+        return PlannedWalk(walk.index, walk.block, walk.cell, walk.sample, setups[member], walk.laws, points[member])
 
     def undrawn(self, indices: Iterable[int]) -> Iterator[PlannedWalk]:
         """Walks without their draws, which take most of the time; options and number of links never depend on them."""
 
         @lru_cache(2**12)
-        def of_cell(number: int, cell: Cell) -> tuple[Setup, Mapping[str, Distribution]]:
-            """What all samples of a cell have in common."""
-            setup = self.blocks[number].fixed(cell)
-            return setup, setup.placed(self.blocks[number].distributions)
-
-        for index in map(int, indices):
-            sample, place = divmod(index, self.blocks[0].stride)
+        def of_cell(place: int) -> tuple[int, Cell, Setup, Mapping[str, Distribution]]:
+            """What all samples of a cell have in common, and their block."""
             number = bisect.bisect_right(self.blocks, place, key=lambda block: block.first_cell) - 1
             block = self.blocks[number]
-            if not 0 <= sample < block.samples:
-                raise IndexError(f"walk {index} of a sweep of {self.walk_count} walks")
             cell = tuple(map(int, np.unravel_index(place - block.first_cell, block.shape[:-1])))
-            yield PlannedWalk(index, number, cell, sample, *of_cell(number, cell), {})
+            setup = block.fixed(cell)
+            return number, cell, setup, setup.placed(block.distributions)
+
+        stride = self.blocks[0].stride
+        for index in map(int, indices):
+            sample, place = divmod(index, stride)
+            number, cell, setup, laws = of_cell(place)
+            if not 0 <= sample < self.blocks[number].samples:
+                raise IndexError(f"walk {index} of a sweep of {self.walk_count} walks")
+            yield PlannedWalk(index, number, cell, sample, setup, laws, {})
 
     def keep(self, walk: PlannedWalk) -> Keep:
         """What is kept of the motion of a walk."""
@@ -185,12 +188,13 @@ class Sweep:
         rng, problem = random_generator(self.seed, stream, row), ""
         own = {name: laws[name] for name in block.independent}
         of_cell = random_generator(self.seed, stream, row, 1, *cell) if own else rng
-        makers: list[Callable[[], Point]] = [lambda: draw(laws, rng)] * DRAW_LIMIT
+        makers: Iterable[Callable[[], Point]] = itertools.repeat(lambda: draw(laws, rng), DRAW_LIMIT)
         if is_designed:
             given = block.samples_given, len(laws), block.randomisations
             matrix = design_points(block.sampler, self.seed, stream, *given)
             fractions = iter(matrix[row].tolist())
-            makers = [lambda: {name: each.quantile(next(fractions)) for name, each in laws.items()}, *makers]
+            designed_point = lambda: {name: each.quantile(next(fractions)) for name, each in laws.items()}  # noqa: E731
+            makers = itertools.chain([designed_point], makers)
         for point in makers:
             points = [point() | draw(own, of_cell)]
             if SAMPLERS[block.sampler].crosses:  # rows of A and B, and A with one value of B, of each quantity in turn

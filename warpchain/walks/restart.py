@@ -13,7 +13,7 @@ from warpchain.engine.devices import gpu_turn
 from warpchain.inputs.validation import InputError, checked
 from warpchain.status import Status
 from warpchain.walks.moving_plane import state_of_plane
-from warpchain.walks.walk_phases import WalkRun
+from warpchain.walks.walk_phases import WalkRun, go_on
 
 
 def state_at(setup: Setup, t: object, end: float) -> State:
@@ -39,10 +39,12 @@ def state_at(setup: Setup, t: object, end: float) -> State:
         world = batch.worlds[0]
         run = WalkRun(world, setup)
         attempts = batch.attempts_of_launch
-        for features in run.phases():
+        while run.status == Status.RUNNING:
+            go_on([run])
             while not (has_come := run.is_free and world.time >= time) and world.status == Status.RUNNING:
                 before = world.snapshot() if run.is_free else None
-                batch.launch([0], features, attempts)
+                assert run.features is not None
+                batch.launch([0], run.features, attempts)
                 if before is not None and world.time >= time and attempts > 1:
                     world.restore(before)
                     attempts = max(1, attempts // 8)

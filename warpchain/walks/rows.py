@@ -1,6 +1,6 @@
 """Rows of a sweep: the numbers of each walk, keyed by its block, its cell and its sample."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import reduce
 from operator import getitem
@@ -93,13 +93,17 @@ def missing_rows(kind: np.dtype[np.void], keys: Rows) -> Rows:
     return rows
 
 
-def fill_row(row: Any, outcome: Outcome, drawn: Mapping[str, float]) -> None:
-    """Write the numbers of a walk, and what was drawn for it, into one of `missing_rows`."""
-    row["status"] = outcome.status
+def fill_outcomes(rows: Rows, places: Sequence[int], outcomes: Mapping[str, Any]) -> None:
+    """Write the numbers of walks, of `outcomes_of`, into those of `missing_rows` at their places."""
+    rows["status"][places] = outcomes["status"]
     for name, column in STORED_COLUMNS.items():
-        row[name] = reduce(getitem, column.path, vars(outcome))
-    for name, value in drawn.items():
-        row[drawn_column(name)] = value
+        rows[name][places] = reduce(getitem, column.path, outcomes)
+
+
+def fill_drawn(rows: Rows, places: Sequence[int], points: Sequence[Mapping[str, float]]) -> None:
+    """Write what was drawn for each of some walks into `missing_rows` at their places."""
+    for name in dict.fromkeys(name for point in points for name in point):
+        rows[drawn_column(name)][places] = [point.get(name, np.nan) for point in points]
 
 
 def derived_columns(columns: Columns) -> dict[str, NDArray[np.float64]]:
