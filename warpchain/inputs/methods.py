@@ -34,4 +34,5 @@ and if joint forces are recorded, which `hybrid` does not have.
 
 def meant_by(method: object, *, can_be_rigid: bool) -> object:
     """The method that a word means where rigid flights are possible, or where they are not: `standard` differs."""
-    return "explicit" if method == "standard" and not can_be_rigid else method
+    is_standard = isinstance(method, str) and method == "standard"  # it is not checked yet
+    return "explicit" if is_standard and not can_be_rigid else method
