@@ -105,7 +105,7 @@ def test_parameter_sets(tmp_path):
     words = warpchain.sweep(
         points={"method": ["explicit", "explicit"]}, links=30, samples=1, **SHORT, out=tmp_path / "words"
     )
-    with pytest.raises(InputError, match=r"method: its values are words, .*; take to_xarray"):
+    with pytest.raises(InputError, match=r"method: its values are words, .*; use to_xarray"):
         words.design()
     data = result.to_xarray()
     assert data.floor_friction.dims == ("point",) and (data.floor_friction == table["mu_fc"]).all()
