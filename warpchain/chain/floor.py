@@ -24,7 +24,7 @@ ENDLESS: Final = 1e9
 
 
 class Floor:
-    """A floor, as all else knows it: points joined by straight lines, which go on beyond the first and the last point.
+    """A floor: points joined by straight lines, of which the first and the last extend to infinity.
 
     Nothing hangs over. Another kind of floor is a subclass with a body of its own and all that asks for the points. The
     body is a name among the `BODIES` of `warpchain.kernels.contacts.fixed_body`, of two points a slope; points are x

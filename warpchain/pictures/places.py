@@ -8,7 +8,7 @@ from warpchain.walks.walk_numbers import WalkNumbers as Walk
 
 
 def checked_joints(walk: Walk) -> Array:
-    """The joints of a walk in the room [m], shape (f, n, 3); z = 0 if its plane is fixed.
+    """Joints of a walk in the laboratory frame [m], shape (f, n, 3); z = 0 if its plane is fixed.
 
     A `ValueError` says that the walk has no frames or broken ones.
     """

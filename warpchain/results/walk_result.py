@@ -187,7 +187,7 @@ class WalkResult(WalkNumbers):
 
 
 def load_walk(path: str | os.PathLike[str]) -> WalkResult:
-    """Read a walk that `WalkResult.save` wrote, or the `walk.h5` of a folder; every number comes back to the bit.
+    """Load a walk that `WalkResult.save` wrote, or the `walk.h5` of a folder, with bitwise identical numbers.
 
     Raises:
         OSError: the file cannot be read.

@@ -1,4 +1,4 @@
-"""Runs a sweep: hands its shards to workers and follows their progress; a sweep that was killed can go on.
+"""`warpchain.sweep`: hands the shards of a sweep to workers and follows their progress; an interrupted sweep resumes.
 
 A worker runs the walks of shards, writes each shard to an immutable file and returns nothing. So
 any executor in the style of ``concurrent.futures`` will do, on this machine or another that sees the same folder.

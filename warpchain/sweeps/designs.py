@@ -1,4 +1,4 @@
-"""Designed samples: points that fill the space of the drawn quantities more evenly than random ones.
+"""Designed samples: points that fill the space of the sampled quantities more evenly than random ones.
 
 A design is a matrix of points in the unit cube, one row for each sample of a cell and one column for each drawn
 quantity; a sample's values are the quantiles of the distributions at its row. `saltelli` rows have twice as many
@@ -80,7 +80,7 @@ def independent_groups(sampler: str, walks: int, dimensions: int, randomisations
 
 
 def check_design(sampler: str, samples: int, dimensions: int, randomisations: int, path: str) -> None:
-    """Check that a sampler can make a number of samples of so many drawn quantities, in so many randomisations.
+    """Check that a sampler can make a number of samples of so many sampled quantities, in so many randomisations.
 
     An `InputError`, which begins with `path`, says that samples would be equal, too many, or no balanced sequence.
     """

@@ -186,7 +186,7 @@ class BlockKeys(WalkKeys):
         dict[str, Any], _mapping_of("distributions", {"all": _Word, **dict.fromkeys(DRAWABLE, _Drawn)})
     ] = Field({}, description="what samples draw, see below")
     independent: list[str] = Field(
-        [], description="drawn quantities that every cell draws by itself, even along axes with the same samples"
+        [], description="quantities that are sampled separately in every cell, even along axes with the same samples"
     )
     grid: Annotated[
         dict[str, list[Value] | dict[str, Value]], _mapping_of("grid", {"preset": axis(_Preset), **_AXES})

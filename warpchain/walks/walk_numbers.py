@@ -87,7 +87,7 @@ class WalkNumbers(Outcome):
 
     @property
     def joints_lab(self) -> Array | None:
-        """Joints x, y, z [m] in the room, (f, n, 3), if the plane tilts; else None: `frame_joints` are in the room."""
+        """Joints x, y, z in the laboratory frame [m], (f, n, 3), if the plane tilts; else None, see `frame_joints`."""
         if self.setup.scene.plane == "fixed":
             return None
         return self.frame_origin[:, None, :] + self.frame_joints @ self.frame_axes
