@@ -1,4 +1,4 @@
-"""The floor of a walk and its kinds: flat, an endless slope, or a profile given by points.
+"""The floor of a walk: flat, an infinite slope, or a profile given by points.
 
 No other module knows the kinds. A new one is a branch of `FloorField` in `warpchain.inputs.compound_fields`, a subclass
 of `Floor`, a line of `floor_from`.

@@ -1,4 +1,4 @@
-"""The command of the live page."""
+"""The command `live`, which serves or exports the live page."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-"""The commands of the command line that are about sweeps: sweep, compile, info, plot, report, merge."""
+"""The commands for sweeps: sweep, compile, info, plot, report and merge."""
 
 import contextlib
 import sys

@@ -1,4 +1,4 @@
-"""The commands about single walks: walk, animate, and the figures of a saved walk."""
+"""The commands for single walks: walk and animate."""
 
 import json
 import sys

@@ -1,4 +1,4 @@
-"""What every check of a user's values shares: the error, fields with units, and refusals in one line.
+"""Shared parts of all input checks: `InputError`, fields with units, and refusals in one line.
 
 A refusal reads `path.of.field: what is wrong; what to do`. Validators raise an `InputError` that begins with the name
 of a field, or a `ValueError` about their own field; `refusals` makes lines of these and of pydantic's own errors.

@@ -1,4 +1,4 @@
-"""The live page as text, and the page of walks that needs neither a server nor Python."""
+"""The HTML of the live page, and of the exported page that needs neither a server nor Python."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""Where a chain, its sprocket and the floor are, for pictures of all kinds; nothing heavy is imported."""
+"""Positions of chain, sprocket and floor for all figures; this module imports nothing heavy."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""The report of a sweep: one HTML page that loads nothing else.
+"""The report of a sweep: one self-contained HTML page.
 
 It has figures and tables of the walks that are there, the failed walks and what to try, parameters, the sweep file and
 the software; on demand also one walk in motion. The same folder always gives the same page.

@@ -1,4 +1,4 @@
-"""The folder of a sweep, as the one process that runs the sweep holds it.
+"""The folder of a sweep, as seen by the process that runs the sweep.
 
     DIR/sweep.h5       what the folder belongs to, see `Manifest`; written first, replaced when the sweep grows
     DIR/sweep.yaml     the resolved sweep, for people and to run again

@@ -1,4 +1,4 @@
-"""Designed samples: points that fill the space of the sampled quantities more evenly than random ones.
+"""Quasi-random designs, whose points fill the space of the sampled quantities more evenly than random ones.
 
 A design is a matrix of points in the unit cube, one row for each sample of a cell and one column for each drawn
 quantity; a sample's values are the quantiles of the distributions at its row. `saltelli` rows have twice as many

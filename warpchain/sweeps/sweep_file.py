@@ -1,4 +1,4 @@
-"""The grammar of sweep files: `SweepFile` says it once, for checks, the JSON schema of editors and the reference page.
+"""The grammar of sweep files, `SweepFile`, from which checks, the JSON schema and the reference page are made.
 
 `read_sweep` makes `Block`s of a file, with every range written out and every distribution resolved. An error is a line
 that begins with the path of the offending value, such as `sweep.blocks[0].grid.frequency[3]`. Sweeps that come with the
