@@ -80,7 +80,7 @@ def test_a_state_of_the_rest_is_that_of_the_walk(fall: WalkResult, tmp_path: Pat
 def test_a_perturbed_state_is_another_walk_with_a_ledger_of_its_own(
     settings: Mapping[str, Any], tmp_path: Path
 ) -> None:
-    """Δx changes, energy counts from the perturbed state, clock and events go on; it is repeated to the bit as well."""
+    """Δx changes, energy counts from the perturbed state, clock and events go on; it is repeated bit for bit as well."""
     whole = warpchain.walk(**settings)
     state = whole.state(0.4 * whole.walk_time)
     perturbed = replace(state, velocity=1.01 * state.velocity)
