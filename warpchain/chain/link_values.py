@@ -20,7 +20,7 @@ from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import OF_LINKS, Scene
 
 LEAST_INERTIA: Final = 0.5
-"""Part of its rotary inertia that a link must keep under multiplied loads."""
+"""Part of its rotary inertia that a link must keep under scaled loads."""
 
 
 @dataclass(frozen=True)
