@@ -50,7 +50,7 @@ class Sampler(NamedTuple):
         return 2 * dimensions if self.crosses else dimensions
 
 
-_SALTELLI: Final = "points for Sobol indices: each sample of d drawn quantities takes d + 2 walks; "
+_SALTELLI: Final = "points for Sobol indices: each sample of d sampled quantities takes d + 2 walks; "
 SAMPLERS: Final[Mapping[str, Sampler]] = {
     "random": Sampler("independent samples"),
     "sobol": Sampler("scrambled Sobol' sequences; a power of two of samples", "Sobol", is_balanced=True),
