@@ -146,7 +146,7 @@ def test_all_errors_are_told_at_once(tmp_path):
     [
         ({}, "sweep.samples: missing"),
         ({"samples": 1, "grid": {"links": [28]}}, "sweep.grid.links[0]: 28 links do not reach around"),
-        ({"samples": 1, "same_samples_along": ["links"]}, "sweep.same_samples_along: 'links' is no axis"),
+        ({"samples": 1, "same_samples_along": ["links"]}, "sweep.same_samples_along: 'links' is not an axis"),
         ({"preset": "soft", "links": 60, "source": {"version": 1}}, "preset, links: not possible with a source"),
         ({"samples": 1, "start": ...}, "sweep.scene.start: expected"),
         ({"samples": 1, "part": "3/2"}, "part: expected k/N"),
