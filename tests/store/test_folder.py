@@ -243,7 +243,7 @@ def test_a_sweep_that_is_refused_now_is_named(tmp_path: Path, monkeypatch: pytes
     with monkeypatch.context() as patched:
         patched.setattr(Sweep, "canonical", lambda sweep: content)
         path.write_bytes(Manifest(SWEEP, SHARD_SIZE).image())
-    with refused(InputError, tmp_path, f"{path}: sweep.blocks[0].options.method: 'rodas5p' is unknown", "version"):
+    with refused(InputError, tmp_path, f"{path}: sweep.blocks[0].options.method: unknown method 'rodas5p'", "version"):
         load(tmp_path)
 
 

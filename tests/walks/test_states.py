@@ -81,7 +81,7 @@ def test_a_state_of_the_rest_is_that_of_the_walk(fall: WalkResult, tmp_path: Pat
 def test_a_perturbed_state_is_another_walk_with_a_ledger_of_its_own(
     settings: Mapping[str, Any], tmp_path: Path
 ) -> None:
-    """Δx changes, energy counts from the perturbed state, clock and events go on; it is repeated to the bit as well."""
+    """Δx changes, energy counts from the perturbed state, clock and events go on; it is repeatable bit for bit."""
     whole = warpchain.walk(**settings)
     state = whole.state(0.4 * whole.walk_time)
     perturbed = replace(state, velocity=1.01 * state.velocity)
@@ -194,7 +194,7 @@ def test_a_chain_on_an_outline_falls_to_rest() -> None:
     ("joints", "problem"),
     [
         (RING * 1000, "joints: the loop is not closed, or lengths are not in m"),
-        (outline(11, LENGTH), "joints: 11 is odd"),
+        (outline(11, LENGTH), "joints: expected an even number, got 11"),
         (RING[:, :1], r"joints: expected shape .*, got \(12, 1\)"),
         (RING * np.nan, "joints: holds a number that is not finite"),
         ("ring", "joints: not an array"),
@@ -210,8 +210,8 @@ def test_outlines_that_are_no_chain_are_refused(joints: Any, problem: str) -> No
 @pytest.mark.parametrize(
     ("settings", "problem"),
     [
-        ({"links": 12, "clearance": 0.1}, "links, clearance: given together with a state"),
-        ({"seed": 1}, "seed: given together with a state"),
+        ({"links": 12, "clearance": 0.1}, "links, clearance: not possible with a state"),
+        ({"seed": 1}, "seed: not possible with a state"),
         ({"walk_limit": 0.1}, "walk_limit: 0.1 s is before the state"),
         ({"floor": [[-1, 0.5], [1, 0.5]]}, r"start: link \d+ starts 0\.\d+ m inside the floor; raise"),
     ],

@@ -1,4 +1,4 @@
-"""Closed chains of rigid links laid along a curve, at rest or circulating; walks begin from them.
+"""Lays closed chains of rigid links along a curve, at rest or circulating, as initial states of walks.
 
 Joints must close the loop to rounding: at k = 1e9 N/m an opening of 0.1 mm holds 5 J. So Newton's method solves for the
 joints' places on the curve together with the curve's size. The circulating velocities are the exact rigid motion along

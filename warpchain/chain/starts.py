@@ -1,4 +1,4 @@
-"""How chains lie and move when their walks begin, for many walks at once."""
+"""Initial positions and velocities of chains, for many walks at once."""
 
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence

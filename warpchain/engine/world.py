@@ -1,7 +1,7 @@
 """One chain of a batch, as the host sees it between launches: what is set before, read behind, taken out and put back.
 
 Phases of walks, recorders, experiments with given chains and `bench` work on worlds. The names of arrays, such as
-`state/time`, are those of the structs in `warpchain.kernels.types`; no other wing knows them.
+`state/time`, are those of the structs in `warpchain.kernels.types`; no other subpackage knows them.
 """
 
 import hashlib

@@ -1,4 +1,4 @@
-"""What a user may write for `method`: an integrator, or one word for an integrator with its settings.
+"""Possible values of `method`: integrators, and solver profiles, i.e. integrators with settings.
 
 The integrators are those of `warpchain.kernels`. Nothing heavy is imported here, because help texts need the names.
 """

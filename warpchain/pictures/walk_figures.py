@@ -247,7 +247,7 @@ def film_strip(walk: Walk, figure: Figure | None = None) -> Figure:
 
     In the strip the centre of mass moves equally far from each instant to the next. Above each chain stands its time;
     outer links are darker than inner ones. The close-ups show the first touch of the floor, the first self-contact, the
-    collapse and the end, if they happen. A sprocket that goes on after the release is a circle in the chain's colour;
+    collapse and the end, if they happen. A sprocket that moves after the release is a circle in the chain's colour;
     stretches of the floor with coefficients of their own are thick and have labels. A chain whose plane tilts is seen
     from above instead, to the same scale: z grows downwards. A figure to draw into is empty; by default a new one suits
     the walk. A `ValueError` says that the walk has no frames or broken ones.

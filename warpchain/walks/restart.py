@@ -1,6 +1,6 @@
 """States of a walk: taken by running it again until then, with all that its rest depends on.
 
-`WalkResult.state` takes one; `WalkRun` goes on from one.
+`WalkResult.state` takes one; `WalkRun` continues from one.
 """
 
 from dataclasses import replace

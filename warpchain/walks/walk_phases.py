@@ -44,8 +44,8 @@ class Progress:
         speed: Speed [m/s] along the loop, in phase ``"walk"`` of the centre of mass.
         attempts: Attempted steps so far.
         frame_time: Times [s] since the release of the frames recorded since the last call, shape (f,).
-        frame_joints: Joints in the room [m] of these frames, as in `WalkResult`: x, y, shape (f, n, 2), and z, shape
-            (f, n, 3), if the plane tilts.
+        frame_joints: Joints of these frames in the laboratory frame [m], as in `WalkResult`: x, y, shape (f, n, 2);
+            if the plane tilts x, y, z, shape (f, n, 3).
         sprocket_height: Height [m] of the sprocket's centre at the release; NaN before it, and without a sprocket.
     """
 
