@@ -27,6 +27,7 @@ def test_reference_is_that_of_the_code(generator: ModuleType) -> None:
     for name, text in pages.items():
         committed = (generator.FOLDER / name).read_text(encoding="utf-8")
         assert committed == text, f"{name} is out of date; run python docs/generate_reference.py"
+    assert generator.STUB.read_text(encoding="utf-8") == generator.stub(), "run python docs/generate_reference.py"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)

@@ -29,6 +29,10 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
+    from warpchain.typed import Columns
+else:
+    Columns = object
+
 RANDOMISATION: Final = "randomisation"
 _NUMBERED: Final = {
     "sample": "number of the sample in its cell",
@@ -42,7 +46,7 @@ _Variables = dict[str, tuple[tuple[str, ...], AnyArray, dict[str, Any]]]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class BlockResult:
+class BlockResult(Columns):
     """A block of a sweep. Every column is an attribute, an array of shape `shape`: `block.dx`, `block.status`.
 
     Columns are those of `warpchain.walks.rows.COLUMNS`, and NAME_drawn for each drawn quantity. A missing walk has −1
@@ -83,12 +87,14 @@ class BlockResult:
         """Number of values of each axis, then the number of samples."""
         return self.columns["index"].shape
 
-    def __getattr__(self, name: str) -> AnyArray:
-        """A column."""
-        columns: dict[str, AnyArray] = self.__dict__.get("columns", {})
-        if name not in columns:
-            raise AttributeError(f"{name}: no such column; columns are {', '.join(columns)}", name=name, obj=self)
-        return columns[name]
+    if not TYPE_CHECKING:  # a type checker knows the columns, and what is none
+
+        def __getattr__(self, name: str) -> AnyArray:
+            """A column."""
+            columns = self.__dict__.get("columns", {})
+            if name not in columns:
+                raise AttributeError(f"{name}: no such column; columns are {', '.join(columns)}", name=name, obj=self)
+            return columns[name]
 
     def __dir__(self) -> list[str]:
         """Attributes, columns among them."""

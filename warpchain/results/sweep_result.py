@@ -13,14 +13,16 @@ import json
 import os
 import time
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
+from warpchain.chain.setup import Setup
 from warpchain.files import AnyPath, Kind, checked_output, clear_parts, given_path, write_whole
 from warpchain.hdf5_files import Format, hdf5_image, kind_of_hdf5, reading_hdf5
 from warpchain.inputs.arrays import AnyArray
@@ -40,6 +42,29 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure, SubFigure
 
+    from warpchain.typed import Columns
+
+    class _OnlyBlock(Columns):
+        """What a sweep with one block has of it, to type checkers."""
+
+        axes: dict[str, AnyArray]
+        drawn: tuple[str, ...]
+        columns: dict[str, AnyArray]
+        dims: tuple[str, ...]
+        shape: tuple[int, ...]
+        is_there: NDArray[np.bool_]
+        kept: NDArray[np.bool_]
+        inaccurate: NDArray[np.bool_]
+        faults: dict[str, NDArray[np.bool_]]
+        meaning: Callable[[str], str]
+        series: Callable[..., WalkResult]
+        statistics: Callable[..., CellStatistics]
+        design: Callable[[], xarray.DataArray]
+        setup_at: Callable[[tuple[int, ...]], Setup]
+        kept_motions: Callable[[Iterable[int]], Iterator[tuple[int, h5py.Group]]]
+else:
+    _OnlyBlock = object
+
 MERGED: Final = Format.of("warpchain sweep result", COLUMNS, MOTION)
 REMEDY: Final = "merge the folders again, or fetch another copy of the file"
 TRIES, PAUSE = 100, 0.02
@@ -48,7 +73,7 @@ WANTED: Final = "give a folder of a sweep or a merged file; a saved walk is for 
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class SweepResult:
+class SweepResult(_OnlyBlock):
     """What is there of a sweep. If it has just one block, everything of the block is an attribute here, too.
 
     Attributes:
@@ -76,13 +101,15 @@ class SweepResult:
         """Its seed."""
         return int(self.sweep["seed"])
 
-    def __getattr__(self, name: str) -> Any:
-        """An attribute of the only block."""
-        blocks: dict[str, BlockResult] = self.__dict__.get("blocks", {})
-        if len(blocks) == 1:
-            return getattr(next(iter(blocks.values())), name)
-        problem = f"{name}: no such attribute; there are several blocks, blocks[…] with {', '.join(blocks)}"
-        raise AttributeError(problem, name=name, obj=self)
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """An attribute of the only block."""
+            blocks = self.__dict__.get("blocks", {})
+            if len(blocks) == 1:
+                return getattr(next(iter(blocks.values())), name)
+            problem = f"{name}: no such attribute; there are several blocks, blocks[…] with {', '.join(blocks)}"
+            raise AttributeError(problem, name=name, obj=self)
 
     def __dir__(self) -> list[str]:
         """Attributes, those of the only block among them."""

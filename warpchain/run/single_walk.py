@@ -1,49 +1,47 @@
 """One walk, from a user's few words to its result."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Never, Unpack
 
-from warpchain.chain.resolution import continued, resolve, takes_fields
+from warpchain.chain.resolution import MAY_BE_NONE, continued, resolve
 from warpchain.chain.setup import DEFAULT_PRESET, Setup, State
 from warpchain.inputs.distributions import Seed
-from warpchain.inputs.starts import StartWord
+from warpchain.inputs.keywords import takes_fields
 from warpchain.inputs.validation import InputError, by_name, by_section, checked, shown
 from warpchain.results.one_walk import OnProgress, run_walk
 from warpchain.results.walk_result import WalkResult
 from warpchain.run.progress_bar import changing_line, walk_progress_text
 from warpchain.sweeps.block import refuse_axes
 
+if TYPE_CHECKING:
+    from warpchain.typed import WalkFields
+
 
 @takes_fields("parameters", "scene", "options")
 def walk(
     *,
-    links: int | None = None,
-    frequency: float | None = None,
     preset: str | None = None,
-    method: str | None = None,
-    tolerance: float | None = None,
-    start: StartWord | State | None = None,
     setup: Setup | None = None,
     seed: int | None = None,
     frame_interval: float | None = 2e-3,
     record_before: float | None = None,
     record_loads: bool = False,
     on_progress: OnProgress | None = None,
-    **settings: Any,
+    **settings: "Unpack[WalkFields[Never]]",
 ) -> WalkResult:
     """Simulate one walk: hang a chain on its sprocket, spin it up, release it and follow it to rest.
 
     Args:
-        links: Number of links n, even where two kinds alternate; None: 60.
-        frequency: Turns of the sprocket per second [Hz]; None: 15.
+        links: Number of links n, even where two kinds alternate.
+        frequency: Turns of the sprocket per second [Hz].
         preset: None or ``"paper"`` (Table 1), or ``"soft"`` (softer joints, with ``reference`` 15 to 19
             times fewer steps).
-        method: None or ``"standard"`` (``"hybrid"`` at 3e-3, with joints softened on the sprocket and in the pile; on a
+        method: ``"standard"`` (``"hybrid"`` at 3e-3, with joints softened on the sprocket and in the pile; on a
             GPU, and with ``record_loads``, the next), ``"explicit"`` (``"os32"`` at 3e-3, softened likewise),
             ``"reference"`` (``"rkf78"`` at 1e-6, as in the paper), or an integrator: a key of
             ``warpchain.inputs.methods.METHODS``, such as ``"dp5"``.
         tolerance: Error allowed in a step, absolute (SI units) and relative alike; None: the method's, 1e-6 for an
             integrator, 1e-4 for ``"hybrid"``, and of ``"standard"`` and ``"explicit"`` 3e-3 while joints are soft.
-        start: None or ``"rest"``, ``"spinning"`` or ``"ellipse"``; or a :class:`State`, from which the walk goes on to
+        start: ``"rest"``, ``"spinning"`` or ``"ellipse"``; or a :class:`State`, from which the walk goes on to
             its end, by itself the rest of the same walk to the bit. Beside a state only parameters, options, limits
             of the walk, floors and what its links have of their own are taken, and nothing is drawn.
         setup: ``setup`` of another walk, which is repeated to the bit, whatever was drawn for it. It is complete: no
@@ -70,10 +68,10 @@ def walk(
     Raises:
         InputError: A value is refused; nothing has been computed. It is a ``ValueError``.
     """
-    named = {"links": links, "frequency": frequency, "method": method, "tolerance": tolerance, "start": start}
-    given = by_name({**{name: value for name, value in named.items() if value is not None}, **settings})
+    given = by_name({name: value for name, value in settings.items() if value is not None or name not in MAY_BE_NONE})
     refuse_axes(given)
     loads, seed = checked(record_loads, "record_loads", bool), checked(seed, "seed", Seed | None)
+    start = given.get("start")
     if isinstance(start, State) and setup is None:
         for name, value in {"preset": preset, "seed": seed}.items():
             if value is not None:

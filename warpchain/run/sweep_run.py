@@ -15,16 +15,17 @@ from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final, Unpack
 
 import numpy as np
 from pydantic import Field
 
-from warpchain.chain.resolution import Values, takes_fields
+from warpchain.chain.resolution import MAY_BE_NONE, Values
 from warpchain.chain.setup import DEFAULT_PRESET, Setup
 from warpchain.engine.devices import gpu_turn, has_gpu_turn, start_device
 from warpchain.engine.processors import free_memory, processors
 from warpchain.files import AnyPath
+from warpchain.inputs.keywords import takes_fields, types_of
 from warpchain.inputs.options import Options, on_gpu
 from warpchain.inputs.validation import (
     SECTION_OF,
@@ -47,17 +48,20 @@ from warpchain.store.folder import SweepFolder
 from warpchain.store.shards import Part, Shard, check_numerics, opened_shard, rows_of, stamp, write_shard
 from warpchain.sweeps.block import is_axis
 from warpchain.sweeps.plan import PlannedWalk, Source, Sweep, load_sweep
-from warpchain.sweeps.sweep_file import VERSION, BlockKeys
+from warpchain.sweeps.sweep_file import VERSION, BlockKeys, SweepFile
 from warpchain.walks.landmarks import LENGTHS
 from warpchain.walks.rows import MISSING, derived_columns, faults_of_columns, fill_row, missing_rows
 from warpchain.walks.scheduler import compile_kernels, run_setups
+
+if TYPE_CHECKING:
+    from warpchain.typed import SweepFields
 
 Tasks = Iterator[tuple[Future[None], list[Shard]]]
 
 KEYS: Final = (*BlockKeys.model_fields, "same_samples_along", "record", "name", "seed")
 """Keys of a sweep file that are keywords."""
-OF_WALKS: Final = ("links", "frequency", "start", "method", "tolerance")
-"""Fields of which None is the default, as of `warpchain.walk`."""
+OF_FILE: Final = {name: f"{kind.removesuffix(' | None')} | None" for name, kind in types_of(SweepFile).items()}
+"""Types of the keys of a sweep file as keywords."""
 BYTES_OF_WALK = 1500
 """Memory that each walk of a sweep takes in the end, about: its row of some 700 bytes, read and put into columns."""
 SHARD_WALKS = 256
@@ -70,19 +74,18 @@ SHARDS = 32
 """Least number of shards of a sweep, about, if it has as many walks: the grain of a restart."""
 
 
-@takes_fields("scene", "parameters", "options", beside=KEYS)
+@takes_fields("scene", "parameters", "options", beside={name: (OF_FILE[name], None) for name in KEYS})
 def sweep(
     source: str | os.PathLike[str] | Mapping[str, Any] | Sweep | None = None,
     out: str | os.PathLike[str] | None = None,
     *,
     part: str | None = None,
-    device: str | None = None,
     executor: Any = None,
     workers: int | None = None,
     fresh: bool = False,
     progress: bool = True,
     on_progress: OnProgress | None = None,
-    **settings: Any,
+    **settings: "Unpack[SweepFields]",
 ) -> SweepResult:
     """Run a sweep, or what is left of it, and load its results.
 
@@ -133,7 +136,7 @@ def sweep(
     if executor is not None and not hasattr(executor, "submit"):
         wanted = "one with submit, such as concurrent.futures.ProcessPoolExecutor(), or a Dask client"
         raise InputError(f"executor: expected {wanted}; got {shown(executor)}")
-    planned, folder, own, count = _checked_call(source, out, settings, device, workers, part)
+    planned, folder, own, count = _checked_call(source, out, settings, settings.pop("device", None), workers, part)
     if hasattr(executor, "get_executor"):
         count = count or sum(executor.nthreads().values())
         executor = executor.get_executor(pure=False)  # pure: a task that failed would fail again, unrun
@@ -153,7 +156,7 @@ def _checked_call(
         return planned if device is None else on_device(planned, device)
 
     problems, found = list[str](), list[Any]()
-    settings = {name: value for name, value in given.items() if value is not None or name not in (*KEYS, *OF_WALKS)}
+    settings = {name: value for name, value in given.items() if value is not None or name not in (*KEYS, *MAY_BE_NONE)}
     replaced = {name: plain(settings[name], name) for name in ("seed", "samples") if name in settings}
     if source is not None and (others := [name for name in settings if name not in replaced]):
         names = ", ".join(others)
