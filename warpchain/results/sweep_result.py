@@ -6,7 +6,8 @@ A merged file is one HDF5 file with a whole sweep: columns with named axes, and 
 dimension scales; units and meanings are attributes of every dataset, and the resolved sweep, versions and counts by
 status those of the file. A single block is in the root group, which `xarray.open_dataset(path, engine="h5netcdf")`
 opens; several are in groups of their names (`group=`). The kept motions of a block are in its group `motion`, those of
-each walk in a group named by the place of the walk in a flat column, as in a saved walk.
+each walk in a group named by the place of the walk in a flat column, as in a saved walk. `xarray.open_datatree(path)`
+opens all of them.
 """
 
 import json
@@ -34,7 +35,7 @@ from warpchain.store.shards import Manifest, read_manifest, stamp, stored_sweep
 from warpchain.sweeps.plan import Sweep
 from warpchain.walks.cell_statistics import CellStatistics
 from warpchain.walks.rows import COLUMNS, STORED_COLUMNS, derived_columns, drawn_column, quantity_of
-from warpchain.walks.walk_numbers import MOTION
+from warpchain.walks.walk_numbers import MOTION, read_motion, write_motion
 
 if TYPE_CHECKING:
     import h5py
@@ -382,7 +383,8 @@ def _fill(file: "h5py.File", whole: SweepResult) -> None:
         for name, (dims, values, notes) in {**coordinates, **variables}.items():
             _put(group, name, values, notes, () if dims == (name,) else dims)
         for place, motion in block.kept_motions(np.flatnonzero(block.kept)):
-            group.copy(motion, group.require_group("motion"), str(place))
+            copied = group.create_group(f"motion/{place}", track_order=True)
+            write_motion(copied, read_motion(motion, 0), np.float32)  # HDF5 copies no names of dimensions
 
 
 def _put(group: "h5py.Group", name: str, values: AnyArray, notes: Mapping[str, Any], dims: Sequence[str]) -> None:

@@ -3,7 +3,8 @@
 A saved walk has the groups `series` (time series), `frames` (joint positions), `summary` (numbers), `parameters` (the
 chain's quantities with their symbols) and, if that was kept, `before_release`; every dataset has its unit and meaning.
 The attributes `setup`, `seed` and `versions`, in JSON, say how to make the walk again. Shards and merged files of
-sweeps keep the motion of a walk in the same groups.
+sweeps keep the motion of a walk in the same groups. All dimensions have names and coordinates, so that
+`xarray.open_datatree(path)` reads the file.
 
 Its fields are those of `warpchain.walks.walk_numbers`.
 """
@@ -19,7 +20,7 @@ import numpy as np
 from warpchain.chain.resolution import SECTIONS
 from warpchain.chain.setup import Setup, State
 from warpchain.files import write_whole
-from warpchain.hdf5_files import Format, hdf5_image, put, read_fields, reading_hdf5, write_fields
+from warpchain.hdf5_files import Format, dataset_of, hdf5_image, put, read_fields, reading_hdf5, write_fields
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import InputError, checked_path, json_value, validated
 from warpchain.loop.stationary_loop import FIELDS
@@ -27,10 +28,12 @@ from warpchain.pictures.labels import Kind
 from warpchain.status import Status
 from warpchain.walks.landmarks import MOST_ENERGY_ERROR
 from warpchain.walks.restart import state_at
-from warpchain.walks.walk_numbers import NUMBERS, STORED, WalkNumbers, read_motion, write_motion
+from warpchain.walks.walk_numbers import MOTION, NUMBERS, STORED, WalkNumbers, read_motion, write_motion
 
 if TYPE_CHECKING:
     import h5py
+    import pandas
+    import xarray
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -163,6 +166,28 @@ class WalkResult(WalkNumbers):
         )
         return plain
 
+    def to_xarray(self) -> "xarray.Dataset":
+        """Numbers, time series and frames as a data set with named coordinates, units and meanings.
+
+        Its dimensions are `time`, `frame_time`, `joint` and `axis`, and `room_axis` if the plane tilts. What a number
+        has by key is named as in `energy_residual`; status, setup, seed and versions are attributes. The motion
+        `before_release` has a data set of its own, `walk.before_release.to_xarray()`.
+        """
+        return dataset_of(vars(self), STORED).assign_attrs(self._notes())
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """The time series as a table with a row for each time; x and y have a column each, such as `center_x`."""
+        import pandas
+
+        columns: dict[str, Any] = {}
+        for name in (name for name, each in MOTION.items() if each.shape in ("t", "t 2") and name != "time"):
+            values = getattr(self, name)
+            if values.ndim == 1:
+                columns |= {name: values} if len(values) == len(self.time) else {}
+            else:
+                columns |= {f"{name}_{axis}": values[:, place] for place, axis in enumerate("xy")}
+        return pandas.DataFrame(columns, pandas.Index(self.time, name="time"))
+
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the walk to an HDF5 file, whole or not at all; an older file of that name is replaced.
 
@@ -171,11 +196,19 @@ class WalkResult(WalkNumbers):
         """
         write_whole(path, hdf5_image(_FORMAT, self._fill))
 
+    def _notes(self) -> dict[str, str]:
+        """Attributes of a file or a data set: how the walk ended, and how to make it again."""
+        return {
+            "status": self.status.label,
+            "status_sentence": self.status.sentence,
+            "setup": json.dumps(_setup_as_dict(self.setup), allow_nan=False),
+            "seed": json.dumps(self.seed),
+            "versions": json.dumps(self.versions),
+        }
+
     def _fill(self, file: "h5py.File") -> None:
         """Fill an empty file."""
-        file.attrs["status"], file.attrs["status_sentence"] = self.status.label, self.status.sentence
-        file.attrs["setup"] = json.dumps(_setup_as_dict(self.setup), allow_nan=False)
-        file.attrs["seed"], file.attrs["versions"] = json.dumps(self.seed), json.dumps(self.versions)
+        file.attrs.update(self._notes())
         write_fields(file, vars(self), NUMBERS)
         write_motion(file, vars(self))
         if self.setup.start is not None:
@@ -228,9 +261,14 @@ def write_state(file: "h5py.File", state: State) -> None:
     put(file, f"{_GROUP}/time", state.time, "s", "time since the release")
     for name, (unit, meaning) in _STATE.items():
         if (values := getattr(state, name)) is not None:
-            put(file, f"{_GROUP}/{name}", values, unit, meaning)
+            put(file, f"{_GROUP}/{name}", values, unit, meaning, _numbered(name, values))
     for name, values in state.memory.items():
-        put(file, f"{_GROUP}/memory/{name}", values, "1", "what else the walk had then")
+        put(file, f"{_GROUP}/memory/{name}", values, "1", "what else the walk had then", _numbered(name, values))
+
+
+def _numbered(name: str, values: Any) -> tuple[str, ...]:
+    """Names of dimensions that have no meaning but for `State`, different for each array."""
+    return tuple(f"{name.rpartition('/')[2]}_{place}" for place in range(np.ndim(values)))
 
 
 def read_state(file: "h5py.File", setup: Setup) -> State | None:
@@ -240,7 +278,7 @@ def read_state(file: "h5py.File", setup: Setup) -> State | None:
     group, memory = file[_GROUP], {}
 
     def remember(name: str, node: object) -> None:
-        if hasattr(node, "dtype"):
+        if hasattr(node, "dtype") and not node.is_scale:
             memory[name] = np.array(node)
 
     if "memory" in group:
