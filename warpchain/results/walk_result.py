@@ -277,7 +277,7 @@ def read_state(file: "h5py.File", setup: Setup) -> State | None:
         return None
     group, memory = file[_GROUP], {}
 
-    def remember(name: str, node: object) -> None:
+    def remember(name: str, node: Any) -> None:
         if hasattr(node, "dtype") and not node.is_scale:
             memory[name] = np.array(node)
 
