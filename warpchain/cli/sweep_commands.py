@@ -1,6 +1,7 @@
 """The commands of the command line that are about sweeps: sweep, compile, info, plot, report, merge."""
 
 import contextlib
+import re
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final, Literal
@@ -146,21 +147,29 @@ def plot(
         Literal["film_strip", "height_and_speed", "loop", "energy", "tilt"] | None,
         typer.Option(help="Only figure of a walk to draw. Default: all that it has something for."),
     ] = None,
+    width: Annotated[
+        str | None,
+        option("WIDTH", "Width on paper, such as 85mm for a column: texts have 6 pt at least. Default: as suits."),
+    ] = None,
+    format: Annotated[
+        Literal["png", "pdf", "svg"], typer.Option(help="Format of the files. Default: png.", show_default=False)
+    ] = "png",
 ) -> None:
     """Draw all figures of a sweep or of a saved walk.
 
-    Of a sweep: the distance as in the paper's Figure 6, maps, lines over any axes, sensitivity. Of a walk:
-    film_strip.png, height_and_speed.png, loop.png, energy.png and, if the plane tilts, tilt.png; a line says what is
-    left out and why.
+    Of a sweep: the distance as in the paper's Figure 6, maps, lines over any axes, sensitivity. Of a walk: film_strip,
+    height_and_speed, loop, energy and, if the plane tilts, tilt; a line says what is left out and why.
     """
     from warpchain.cli.output import draw_figures, saved
     from warpchain.files import make_folder
     from warpchain.inputs.validation import InputError, printable
     from warpchain.pictures.labels import kinds_of
+    from warpchain.pictures.style import on_paper
     from warpchain.reports.sweep_figures import figures
     from warpchain.results.walk_result import WalkResult
 
     path, *others = paths
+    paper = None if width is None else _millimetres(width)
     if others:
         from warpchain.results.sweep_result import load
 
@@ -168,24 +177,38 @@ def plot(
     else:
         found = saved(path, "give the folder of a sweep, a merged file, or the file of a saved walk")
     folder = folder or (path.parent if path.is_file() else path)
-    if isinstance(found, WalkResult):
-        if quantity is not None:
-            raise InputError("--quantity: a saved walk has no columns; leave it out, or give the folder of a sweep")
-        drawn = draw_figures(found, folder, kinds_of(found) if kind is None else (kind,))
-    else:
-        if kind is not None:
-            raise InputError("--kind: a sweep has none; leave it out, or give the file of a saved walk")
-        pictures = list(figures(found, quantity or "dx"))
-        if not pictures:
-            name = path if quantity is None else f"--quantity: {quantity}"
-            raise InputError(f"{name}: no walk at rest has a value, or no axis has several; give another --quantity")
-        drawn = (picture.save(folder) for picture in pictures)
-    make_folder(folder)
+    is_walk = isinstance(found, WalkResult)
+    if is_walk and quantity is not None:
+        raise InputError("--quantity: a saved walk has no columns; leave it out, or give the folder of a sweep")
+    if not is_walk and kind is not None:
+        raise InputError("--kind: a sweep has none; leave it out, or give the file of a saved walk")
     count = 0
-    for count, drawing in enumerate(drawn, 1):  # noqa: B007
-        print(printable(str(drawing)))
+    with on_paper(paper) as inches:
+        if isinstance(found, WalkResult):
+            kinds = kinds_of(found) if kind is None else (kind,)
+            drawn = draw_figures(found, folder, kinds, format, inches)
+        else:
+            pictures = list(figures(found, quantity or "dx", inches))
+            if not pictures:
+                name = path if quantity is None else f"--quantity: {quantity}"
+                problem = "no walk at rest has a value, or no axis has several"
+                raise InputError(f"{name}: {problem}; give another --quantity")
+            drawn = (picture.save(folder, format) for picture in pictures)
+        make_folder(folder)
+        for count, drawing in enumerate(drawn, 1):  # noqa: B007
+            print(printable(str(drawing)))
     if not count:
         raise typer.Exit(FAILED)
+
+
+def _millimetres(text: str) -> float:
+    """A width on paper [mm], given in mm, cm or in; an `InputError` if it is none."""
+    from warpchain.inputs.validation import InputError, shown
+
+    found = re.fullmatch(r"(\d+(?:\.\d*)?) ?(mm|cm|in|)", text.strip())
+    if found is None:
+        raise InputError(f"--width: expected a width such as 85mm, got {shown(text)}; use mm, cm or in")
+    return float(found[1]) * {"mm": 1.0, "cm": 10.0, "in": 25.4, "": 1.0}[found[2]]
 
 
 def report(

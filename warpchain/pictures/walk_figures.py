@@ -21,7 +21,7 @@ from warpchain.inputs.arrays import Array
 from warpchain.inputs.validation import InputError, shown
 from warpchain.loop.stationary_loop import StationaryLoop
 from warpchain.pictures import chain
-from warpchain.pictures.labels import Kind, setting
+from warpchain.pictures.labels import Kind, math_symbol, setting
 from warpchain.pictures.places import center_in_room, checked_joints, circle_radii, stretches, walk_box
 from warpchain.pictures.style import (
     BLUE,
@@ -31,10 +31,14 @@ from warpchain.pictures.style import (
     GREEN,
     GROUND,
     INK,
+    NARROW,
     RED,
+    STROKES,
     InlineFigure,
     checked_figure,
+    text_scale,
     tidy,
+    wrapped,
 )
 from warpchain.status import Status
 from warpchain.walks.walk_numbers import WalkNumbers as Walk
@@ -42,8 +46,6 @@ from warpchain.walks.walk_numbers import WalkNumbers as Walk
 FALLEN: Final = 45.0
 """Tilt beyond which a chain has fallen over [degrees]."""
 SIMULATED: Final[dict[str, Any]] = {"color": BLUE, "linewidth": 2.2}
-BOTTOM: Final = 0.25
-"""The curvature is shown this far [m] from the lowest point, or as far as the loop is free."""
 IN_LINKS: Final = 2.0
 """The tension is shown this many links away from the sprocket: averages near it include links that touch it."""
 _WIDTH: Final = 10.0
@@ -60,8 +62,10 @@ _CLOSE_UP_LINKS, _CLOSE_UP_ASPECT = 9, 1.5
 """Width of a close-up [links], and its width over its height."""
 
 
-def draw(walk: Walk, kind: Kind, *, figure: Figure | None = None, ax: Axes | None = None) -> Figure:
-    """Draw a walk; arguments and errors as of `WalkResult.plot`."""
+def draw(
+    walk: Walk, kind: Kind, *, figure: Figure | None = None, ax: Axes | None = None, width: float | None = None
+) -> Figure:
+    """Draw a walk; arguments and errors as of `WalkResult.plot`, but for the width of a new figure [inches]."""
     if kind not in get_args(Kind):
         raise ValueError(f"kind: {kind!r} is unknown; give {', '.join(map(repr, get_args(Kind)))}")
     if kind not in ("film_strip", "loop") and len(walk.time) == 0:
@@ -75,11 +79,13 @@ def draw(walk: Walk, kind: Kind, *, figure: Figure | None = None, ax: Axes | Non
     if ax is not None and not isinstance(ax, Axes):
         raise InputError(f"ax: expected matplotlib Axes, got {shown(ax)}")
     if kind == "film_strip":
-        return film_strip(walk, figure)
+        return film_strip(walk, figure, width)
     if ax is not None:
         _energy(walk, ax)
         return ax.figure.figure if isinstance(ax.figure, SubFigure) else ax.figure
     size = {"loop": (10.0, 6.4), "energy": (6.4, 4.0)}.get(kind, (6.4, 5.0))
+    if width is not None:
+        size = width, size[1] * (0.8 if kind == "loop" and width < NARROW else max(0.62, min(1.2, width / size[0])))
     figure = InlineFigure(figsize=size, layout="constrained") if figure is None else figure
     if kind == "energy":
         _energy(walk, figure.subplots())
@@ -119,13 +125,13 @@ def _energy(walk: Walk, ax: Axes) -> None:
     """
     ledger, whole = walk.energy, walk.kinetic_energy + walk.gravitational_energy + walk.spring_energy
     released = ledger["kinetic_at_release"] + ledger["potential_at_release"]
-    for name, values, color in (
-        ("kinetic", walk.kinetic_energy, BLUE),
-        ("gravitational", walk.gravitational_energy, GREEN),
-        ("joint springs", walk.spring_energy, RED),
-        ("lost since the release", released - whole, INK),
+    for name, values, color, line in (
+        ("kinetic", walk.kinetic_energy, BLUE, "-"),
+        ("gravitational", walk.gravitational_energy, GREEN, STROKES[3]),
+        ("joint springs", walk.spring_energy, RED, DOTS),
+        ("lost since the release", released - whole, INK, DASHES),
     ):
-        ax.plot(walk.time, values, label=name, color=color, linewidth=1.4, linestyle=DASHES if color == INK else "-")
+        ax.plot(walk.time, values, label=name, color=color, linewidth=1.4, linestyle=line)
     lost = released - ledger["kinetic_at_end"] - ledger["potential_at_end"] - ledger["residual"]
     ax.plot(walk.time[-1:], [lost], "o", color=INK, clip_on=False, label="sum of all losses", zorder=4)
     ax.set_ylabel("energy / J")
@@ -145,7 +151,7 @@ def _tilt(walk: Walk, figure: Figure) -> None:
     for limit in (-FALLEN, FALLEN):
         angles.axhline(limit, color=FAINT, linewidth=0.8, linestyle=DOTS)
     angles.plot(walk.time, np.degrees(walk.tilt), color=BLUE, linewidth=1.4, label="tilt, to the left")
-    angles.plot(walk.time, np.degrees(walk.yaw), color=GREEN, linewidth=1.4, label="yaw, to the left")
+    angles.plot(walk.time, np.degrees(walk.yaw), color=GREEN, linewidth=1.4, label="yaw, to the left", linestyle=DASHES)
     drift.plot(walk.time, walk.center_z, color=INK, linewidth=1.4)
     events = ((walk.fell_at, "fell over (45°)", "-"), (walk.collapsed_at, "loop collapsed", DASHES))
     for axes in (angles, drift):
@@ -165,7 +171,8 @@ def _finish(walk: Walk, *panels: Axes) -> None:
     """Title, grids, and the common axis of time up to the end of the walk."""
     for axes in panels:
         tidy(axes, grid="both")
-    panels[0].set_title(setting(walk), fontsize="medium", loc="left")
+    title = wrapped(setting(walk, math_symbol), panels[0].figure, 0.8)
+    panels[0].set_title(title, fontsize="medium", loc="left")
     panels[-1].set(xlabel="time since release $t$ / s", xlim=(0.0, float(walk.time[-1]) or None))
 
 
@@ -178,7 +185,11 @@ def _loop(walk: Walk, figure: Figure) -> None:
     kink = loop.kink()
     width, height = np.ptp(loop.position, axis=0)
     share = float(np.clip(0.56 * (width + 0.08) / (height + 0.08), 0.23, 0.42))
-    left, right = np.asarray(figure.subfigures(1, 2, width_ratios=[share, 1 - share]))
+    figure.suptitle(wrapped(setting(walk, math_symbol), figure), fontsize="medium", x=0.01, ha="left")
+    if figure.get_figwidth() < NARROW:
+        left, right = np.asarray(figure.subfigures(2, 1, height_ratios=[2, 3]))
+    else:
+        left, right = np.asarray(figure.subfigures(1, 2, width_ratios=[share, 1 - share]))
     shape = left.subplots()
     bend, pull = right.subplots(2, 1)
 
@@ -186,13 +197,16 @@ def _loop(walk: Walk, figure: Figure) -> None:
     x, y = (float(np.interp(kink.dip_at, loop.s, values)) for values in (loop.position - loop.center).T)
     _mark(shape, x, y, "kink")
     spread = 1e3 * float(loop.spread[loop.is_free].max())
-    shape.set_title(f"{setting(walk)}\njoints within {spread:.2g} mm (s.d.)", fontsize="small", loc="left")
+    shape.set_title(f"blue band: joints\n± {spread:.2g} mm (s.d.)", fontsize="small", loc="left")
     tidy(shape)
+    if figure.get_figwidth() < NARROW:
+        shape.set_xticks([0.0])
 
-    reach = 1.6 * max(BOTTOM, abs(kink.dip_at))
-    low, high = max(-reach, loop.free[0] - 0.03), min(reach, loop.free[1] + 0.03)
+    low, high = loop.free[0] - 0.03, loop.free[1] + 0.03
     _draw_line(bend, loop.curvature, loop, (loop.s >= low) & (loop.s <= high))
-    _mark(bend, kink.dip_at, kink.dip, f"kink: ${kink.dip:.1f}$ m$^{{-1}}$ at ${100 * kink.dip_at:.1f}$ cm")
+    _mark(bend, kink.dip_at, kink.dip, "kink")
+    at_kink = f"kink: ${kink.dip:.1f}$ m$^{{-1}}$ at ${100 * kink.dip_at:.1f}$ cm"
+    bend.set_title(f"grey: on the sprocket; {at_kink}", fontsize="small", loc="left")
     bend.set(xlim=(low, high), ylabel="curvature $\\kappa$ / m$^{-1}$")
 
     inset = IN_LINKS * loop.parameters.link_length
@@ -200,8 +214,8 @@ def _loop(walk: Walk, figure: Figure) -> None:
     _draw_line(pull, loop.effective_tension, loop, inside)
     carried = loop.density * loop.speed**2
     pull.set_title(f"$\\rho v^2$ = {carried:.2f} N", fontsize="small", loc="left")
-    pull.set(xlim=(loop.free[0] - 0.03, loop.free[1] + 0.03), ylabel="tension $T - \\rho v^2$ / N")
-    pull.set_xlabel("arc length $s$ from the lowest point, along the motion / m")
+    pull.set(xlim=(low, high), ylabel="tension $T - \\rho v^2$ / N")
+    pull.set_xlabel("arc length $s$ from the lowest point / m")
     pull.set_ylim(bottom=min(0.0, 1.1 * float(loop.effective_tension[inside].min())))
 
 
@@ -239,7 +253,7 @@ def _mark(axes: Axes, x: float, y: float, text: str) -> None:
     axes.annotate(text, (x, y), (8, -4), textcoords="offset points", va="top", color=INK, fontsize="small")
 
 
-def film_strip(walk: Walk, figure: Figure | None = None) -> Figure:
+def film_strip(walk: Walk, figure: Figure | None = None, width: float | None = None) -> Figure:
     """The chain along a walk with frames, drawn to scale, and close-ups of up to four moments.
 
     In the strip the centre of mass moves equally far from each instant to the next. Above each chain stands its time;
@@ -255,27 +269,34 @@ def film_strip(walk: Walk, figure: Figure | None = None) -> Figure:
     moments = [] if tilts else _moments(walk)
     size = high - low
     broad = max(size[2], 0.15 * size[0]) if tilts else 0.0
-    across = _WIDTH - _LEFT - _RIGHT
+    whole, text = _WIDTH if width is None else width, text_scale()
+    is_narrow = whole < NARROW
+    left, top, below, foot = _LEFT * text, (_TOP + 0.35 * is_narrow) * text, _BELOW * text, (_FOOT + 0.5) * text
+    across = whole - left - _RIGHT * text
     scale = min(across / size[0], _HIGHEST / size[1], (_DEEPEST - _FLOOR) / (size[1] + broad))
-    close_up_width = min((across + 0.1) / max(1, len(moments)), _WIDTH / 3)
-    lower = 0.5 + (scale * broad if tilts else (close_up_width - 0.1) / _CLOSE_UP_ASPECT)
-    width, height, depth, top = scale * size[0], scale * size[1] + _FLOOR + _CLOCK, _FLOOR / scale, _CLOCK / scale
-    paper = np.array([_WIDTH, _TOP + height + _BELOW + lower + _FOOT])
+    in_row = min(max(1, len(moments)), max(1, int(across / (1.7 * text))))
+    close_up_width = min((across + 0.1) / in_row, _WIDTH / 3)
+    rows, close_up_height = -(-len(moments) // in_row), (close_up_width - 0.1) / _CLOSE_UP_ASPECT
+    pitch = close_up_height + 1.05 * text
+    lower = scale * broad if tilts else close_up_height + (rows - 1) * pitch
+    wide, high_up, depth = scale * size[0], scale * size[1] + (_FLOOR + _CLOCK) * text, _FLOOR * text / scale
+    paper = np.array([whole, top + high_up + below + lower + foot])
     figure = InlineFigure(tuple(paper)) if figure is None else figure
 
     def panel(left: float, bottom: float, width: float, height: float) -> Axes:
         return figure.add_axes((left / paper[0], bottom / paper[1], width / paper[0], height / paper[1]))
 
-    left = _LEFT + (across - width) / 2
-    bottom = _FOOT + lower + _BELOW
-    side = panel(left, bottom, width, height)
-    side.set(xlim=(low[0], high[0]), ylim=(low[1] - depth, high[1] + top), xlabel="x / m", ylabel="y / m")
-    views = [(setting(walk), side, chain.SIDE)]
+    middle = left + (across - wide) / 2
+    side = panel(middle, foot + lower + below, wide, high_up)
+    side.set(
+        xlim=(low[0], high[0]), ylim=(low[1] - depth, high[1] + _CLOCK * text / scale), xlabel="x / m", ylabel="y / m"
+    )
+    views = [(setting(walk, math_symbol), side, chain.SIDE)]
     chain.draw_ground(side, walk, walk.setup.floor.line(low[0], high[0]), low[1] - depth)
     _draw_distance(side, walk, low[1], 0.5 * depth)
     if tilts:
         z = (low[2] + high[2]) / 2 + np.array([0.5, -0.5]) * broad
-        above = panel(left, _FOOT + 0.5, width, scale * broad)
+        above = panel(middle, foot, wide, scale * broad)
         above.set(xlim=(low[0], high[0]), ylim=z, xlabel="x / m", ylabel="z / m", facecolor=GROUND)
         above.yaxis.set_major_locator(MaxNLocator(5))
         views.append(("from above", above, chain.ABOVE))
@@ -284,7 +305,7 @@ def film_strip(walk: Walk, figure: Figure | None = None) -> Figure:
     center = center_in_room(walk)
     path = np.stack([np.interp(walk.frame_time, walk.time, row) for row in center.T], axis=1)
     radius = circle_radii(walk)
-    shown = _instants(path, float(np.ptp(joints[0, :, 0])))
+    shown = _instants(path, float(np.ptp(joints[0, :, 0])), (4, 6) if is_narrow else (6, 12))
     for title, axes, view in views:
         for frame in shown:
             chain.draw_chain(axes, joints[frame], radius, view, _link_colors(colors[frame]), edge=0.25)
@@ -292,9 +313,11 @@ def film_strip(walk: Walk, figure: Figure | None = None) -> Figure:
         chain.draw_release(axes, walk, view)
         axes.plot(*(view @ center.T)[:2], color=INK, linewidth=1.4, linestyle=DOTS, label="centre of mass", zorder=4)
         tidy(axes)
-        axes.set_title(title, fontsize="medium", loc="left")
+        axes.set_title(wrapped(title, figure, 0.8), fontsize="medium", loc="left")
     for number, (frame, title, spot) in enumerate(moments):
-        axes = panel(_LEFT + number * close_up_width, _FOOT + 0.5, close_up_width - 0.1, lower - 0.5)
+        row, column = divmod(number, in_row)
+        place = left + column * close_up_width, foot + (rows - 1 - row) * pitch
+        axes = panel(*place, close_up_width - 0.1, close_up_height)
         half = 0.5 * _CLOSE_UP_LINKS * walk.setup.parameters.link_length
         line = walk.setup.floor.line(spot[0] - half, spot[0] + half)
         half_height = half / _CLOSE_UP_ASPECT
@@ -303,11 +326,19 @@ def film_strip(walk: Walk, figure: Figure | None = None) -> Figure:
         chain.draw_sprocket(axes, walk, walk.frame_time[frame], facecolor="none", edgecolor=colors[frame])
         chain.draw_ground(axes, walk, line, min(bottom, line[:, 1].min()))
         axes.set(xlim=line[[0, -1], 0], ylim=(bottom, bottom + 2 * half_height), yticks=[], xlabel="x / m")
-        axes.set_xticks([x for x in MaxNLocator(4).tick_values(*line[[0, -1], 0]) if abs(x - spot[0]) < 0.8 * half])
-        axes.set_title(f"{title}, {walk.frame_time[frame]:.3f} s", fontsize="medium", loc="left")
-    _write_times(side, walk.frame_time[shown], joints[shown, :, :2], colors[shown], 1.2 * radius.max(), 1 / scale)
+        axes.set_xticks(
+            [
+                x
+                for x in MaxNLocator(2 if is_narrow else 4).tick_values(*line[[0, -1], 0])
+                if abs(x - spot[0]) < 0.8 * half
+            ]
+        )
+        axes.tick_params(labelsize=10.0 * text)
+        title = f"{title},{chr(10) if is_narrow else ' '}{walk.frame_time[frame]:.3f} s"
+        axes.set_title(title, fontsize="small" if is_narrow else "medium", loc="left")
+    _write_times(side, walk.frame_time[shown], joints[shown, :, :2], colors[shown], 1.2 * radius.max(), text / scale)
     style: dict[str, Any] = {"frameon": False, "ncols": 2, "borderaxespad": 0.0, "fontsize": "small"}
-    place = (1 - _RIGHT / paper[0], 1 - 0.08 / paper[1])
+    place = (1 - _RIGHT * text / paper[0], 1 - 0.08 / paper[1])
     figure.legend(*side.get_legend_handles_labels(), loc="upper right", bbox_to_anchor=place, **style)
     return figure
 
@@ -317,13 +348,13 @@ def _link_colors(color: Array) -> tuple[Array, Array, Array]:
     return 1 - 0.45 * (1 - color), color, 0.6 * color
 
 
-def _instants(path: Array, width: float) -> list[int]:
-    """6 to 12 frames between which the centre of mass moves equally far along its path, the first and last among them.
+def _instants(path: Array, width: float, bounds: tuple[int, int]) -> list[int]:
+    """Frames between which the centre of mass moves equally far along its path, the first and last among them.
 
-    They are as many as stay legible with chains of this width [m] in the first frame.
+    Within some bounds they are as many as stay legible with chains of this width [m] in the first frame.
     """
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-    marks = np.linspace(0.0, way[-1], int(np.clip(1 + way[-1] / (0.6 * width), 6, 12)))[1:-1]
+    marks = np.linspace(0.0, way[-1], int(np.clip(1 + way[-1] / (0.6 * width), *bounds)))[1:-1]
     return sorted({0, *(int(np.argmin(np.abs(way - mark))) for mark in marks), len(way) - 1})
 
 
@@ -332,7 +363,9 @@ def _write_times(axes: Axes, times: Array, joints: Array, colors: Array, gap: fl
     taken = np.array([text.get_position() for text in axes.texts]).reshape(-1, 2)
     for moment, its_joints, color in zip(times, joints, colors, strict=True):
         place = its_joints[np.argmax(its_joints[:, 1])] + (0.0, gap)
-        while np.any(np.all(np.abs(taken - place) < np.array([0.38, 0.13]) * inch, axis=1)):
+        room = np.array([0.07 * len(f"{moment:.2f} s") + 0.06, 0.17]) * inch  # of the text, and a gap
+        place[0] = np.clip(place[0], *(np.array(axes.get_xlim()) + room[0] * np.array([0.5, -0.5])))
+        while np.any(np.all(np.abs(taken - place) < room, axis=1)):
             place[1] += 0.02 * inch
         taken = np.append(taken, [place], axis=0)
         halo = [withStroke(linewidth=2.5, foreground="white")]

@@ -3,7 +3,7 @@
 import math
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
@@ -41,6 +41,8 @@ _NUMBERED: Final = {
 }
 """Coordinates that number something → their meaning."""
 
+_MOST_NAMED: Final = 3
+"""Most quantities of a parameter set that its name has."""
 _Variables = dict[str, tuple[tuple[str, ...], AnyArray, dict[str, Any]]]
 """Name → axes, values and attributes, as xarray takes them."""
 
@@ -276,6 +278,22 @@ class BlockResult(Columns):
         is_bounded = name == "dx" and (status == Status.DISTANCE_LIMIT).any()
         farthest = self._farthest() if is_bounded else np.array(np.nan)
         return CellStatistics.of(self.axes, unit, column, status, self.planned.groups, farthest)
+
+    def named_sets(self, cells: CellStatistics) -> CellStatistics:
+        """The statistics of some cells, with parameter sets named by their values, as figures show them."""
+        from warpchain.pictures.labels import math_symbol, short_texts, unit_text
+
+        if POINT not in self.axes:
+            return cells
+        units = {name: unit_text(name) for name in self.planned.points}
+        texts = [
+            [f"{math_symbol(name)} = {text} {units[name]}".rstrip() for text in short_texts(values)]
+            for name, values in self.planned.points.items()
+        ]
+        names = [", ".join(parts) for parts in zip(*texts[:_MOST_NAMED], strict=True)]
+        if len(texts) > _MOST_NAMED or len(set(names)) < len(names):
+            names = [f"{number}: {name}" for number, name in enumerate(names)]
+        return replace(cells, axes=cells.axes | {POINT: np.array(names)})
 
     def _farthest(self) -> NDArray[np.float64]:
         """Distance [m] that walks which ended by it had come, in each cell; NaN where the floor may rise ahead.

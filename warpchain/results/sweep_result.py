@@ -187,7 +187,11 @@ class SweepResult(_OnlyBlock):
         return located(list(self.blocks.values()), index)
 
     def plot(
-        self, quantity: str = "dx", x: str | None = None, figure: "Figure | SubFigure | None" = None
+        self,
+        quantity: str = "dx",
+        x: str | None = None,
+        figure: "Figure | SubFigure | None" = None,
+        width: float | None = None,
     ) -> "Figure | SubFigure":
         """Draw the mean of a quantity over the grids of all blocks, with its standard error.
 
@@ -196,6 +200,7 @@ class SweepResult(_OnlyBlock):
             x: the axis along x, such as `frequency`; by default the frequency if it has three values or more, else the
                 longest axis of numbers.
             figure: an empty figure to draw into; by default a new one.
+            width: of a new figure [mm], such as 85 for a column of a paper; texts then have 6 pt at least.
 
         Returns:
             The figure.
@@ -205,8 +210,24 @@ class SweepResult(_OnlyBlock):
                 no walk that has the quantity.
         """
         from warpchain.pictures.grid_figure import draw_grid
+        from warpchain.pictures.style import on_paper
 
-        return draw_grid(self.cell_statistics(quantity), quantity_of(quantity), x=full_name(x), figure=figure)
+        found = {name: self.blocks[name].named_sets(cells) for name, cells in self.cell_statistics(quantity).items()}
+        with on_paper(width) as inches:
+            title = self.setting([*found])
+            return draw_grid(found, quantity_of(quantity), full_name(x), figure=figure, title=title, width=inches)
+
+    def setting(self, blocks: Sequence[str]) -> str:
+        """What the walks of some blocks have in common that differs from the defaults, and how many they are."""
+        from warpchain.pictures.labels import differences, math_symbol
+
+        given = [block for block in self.sweep["blocks"] if block["name"] in blocks]
+        alike = [differences(block["scene"] | block["parameters"], block.get("preset"), math_symbol) for block in given]
+        common = [text for text in alike[0] if all(text in others for others in alike)]
+        samples = sorted({self.blocks[name].shape[-1] for name in blocks})
+        failed = sum(int(self.blocks[name].statistics().failed.sum()) for name in blocks)
+        many = f"{'–'.join(map(str, samples[:: max(1, len(samples) - 1)]))} sample{'s' * (samples != [1])} in each cell"
+        return ", ".join([*common, many, *[f"{failed:,} walks failed"] * (failed > 0)])
 
     def to_xarray(self) -> "xarray.Dataset | xarray.DataTree":
         """The only block as a data set, or several as a tree with one child each."""

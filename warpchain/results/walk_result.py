@@ -90,7 +90,12 @@ class WalkResult(WalkNumbers):
         return state_at(self.setup, t, self.walk_time if is_released else np.nan)
 
     def plot(
-        self, kind: Kind = "height_and_speed", *, figure: "Figure | None" = None, ax: "Axes | None" = None
+        self,
+        kind: Kind = "height_and_speed",
+        *,
+        figure: "Figure | None" = None,
+        ax: "Axes | None" = None,
+        width: float | None = None,
     ) -> "Figure":
         """Draw the walk.
 
@@ -100,6 +105,7 @@ class WalkResult(WalkNumbers):
                 of a plane that tilts.
             figure: an empty matplotlib figure to draw into; by default a new one, which a notebook shows.
             ax: where to draw `energy`, the only figure with one pair of axes.
+            width: of a new figure [mm], such as 85 for a column of a paper; texts then have 6 pt at least.
 
         Returns:
             The figure, that of `ax` if it is given.
@@ -108,9 +114,11 @@ class WalkResult(WalkNumbers):
             ValueError: the kind is unknown, the walk does not have what it shows (frames, `before_release`,
                 energies), or `ax` does not suit the kind.
         """
+        from warpchain.pictures.style import on_paper
         from warpchain.pictures.walk_figures import draw
 
-        return draw(self, kind, figure=figure, ax=ax)
+        with on_paper(width) as inches:
+            return draw(self, kind, figure=figure, ax=ax, width=inches)
 
     def animate(self, path: str | os.PathLike[str], *, fps: float = 30.0, slow: float = 4.0) -> None:
         """Write a moving picture of the walk; the suffix of `path` gives the format: .gif, .mp4 or .html.
