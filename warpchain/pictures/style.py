@@ -66,7 +66,7 @@ _USUAL_WIDTH: Final = 7.0
 """Width [inches] from which on texts have their own size."""
 NARROW: Final = 6.0
 """Width [inches] below which parts of a figure stand below one another."""
-LEAST_TEXT: Final = 0.72
+LEAST_TEXT: Final = 0.721
 """Least size of texts, relative to their own: the smallest then have 6 pt."""
 _MM: Final = 1 / 25.4
 

@@ -190,7 +190,10 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[str]], *, right: bool = 
     """A table of texts in HTML, to the right or left; without a head if that is empty; bad rows stand out."""
 
     def cells(tag: str, texts: Sequence[str]) -> str:
-        return "".join(f'<{tag} style="text-align:{side}">{escape(text)}</{tag}>' for text in texts)
+        return "".join(
+            f'<{tag}{" class=failed" * (name == "failed")} style="text-align:{side}">{escape(text)}</{tag}>'
+            for name, text in zip(head, texts, strict=True)
+        )
 
     side = "right" if right else "left"
     top = f"<thead><tr>{cells('th', head)}</tr></thead>" if any(head) else ""
