@@ -3,6 +3,7 @@
 import contextlib
 import re
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final, Literal
 
@@ -109,14 +110,13 @@ def compile_kernels(
     folder of the cache. A kernel serves only the versions of warpchain, Warp and Python that compiled it, and
     processors or GPUs of the same kind.
     """
-    from warpchain.run.progress_bar import changing_line
+    from warpchain.run.progress_bar import COMPILING, changing_line
     from warpchain.run.sweep_run import compile_sweep
     from warpchain.sweeps.sweep_file import shipped_sweeps
 
     for source in sources or map(Path, shipped_sweeps()):
         with changing_line() as show:
-            show(f"{source}: compiling kernels")
-            planned = compile_sweep(source, device)
+            planned = compile_sweep(source, device, partial(show, f"{source}: {COMPILING}", True))
         print(f"{planned.name}: kernels compiled")
 
 

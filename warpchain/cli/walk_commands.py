@@ -130,7 +130,7 @@ def walk(
             seed=number,
             frame_interval=interval,
             record_loads=record_loads,
-            on_progress=lambda progress: show(walk_progress_text(progress)),
+            on_progress=lambda progress: show(walk_progress_text(progress), progress.phase == "compile"),
         )
     paths: list[Path] = []
     try:

@@ -47,8 +47,7 @@ def run_walk(
     keep = Keep.asked(interval, earlier, record_loads, setup.options.record_interval)
     report = on_progress or (lambda progress: None)
     with gpu_turn([setup.options.device]):
-        report(Progress("compile", 0.0, 0.0, 0))
-        compile_kernels([setup])
+        compile_kernels([setup], on_compile=lambda: report(Progress("compile", 0.0, 0.0, 0)))
         started = time.perf_counter()
         ((_, run),) = run_setups([setup], keeps=[keep], watch=lambda run: report(run.progress()))
         return WalkResult(

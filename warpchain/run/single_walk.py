@@ -57,8 +57,8 @@ def walk(
         record_loads: Whether ``frame_forces`` and ``frame_moments``, the loads of the joints, are kept with each frame
             after the release. No method with rigid joints has them: ``"standard"`` then is ``"explicit"``. The picture
             of waves needs frames some 1e-4 s apart; with 60 links they take 24 MB for each second of the walk.
-        on_progress: Called before kernels are compiled and after each launch, several times a second; by default a
-            notebook shows a line of progress.
+        on_progress: Called before kernels are compiled, if any are, and after each launch, several times a second; by
+            default a notebook shows a line of progress.
         settings: Any other field of :class:`Parameters`, :class:`Scene` or :class:`Options`, by its name or the
             paper's symbol, such as ``mu_fc``; ``warpchain parameters`` lists them.
 
@@ -93,5 +93,6 @@ def walk(
             frame_interval=frame_interval,
             record_before=record_before,
             record_loads=loads,
-            on_progress=on_progress or (lambda progress: show(walk_progress_text(progress))),
+            on_progress=on_progress
+            or (lambda progress: show(walk_progress_text(progress), progress.phase == "compile")),
         )

@@ -9,7 +9,7 @@ import math
 import os
 import re
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import ExitStack
 from dataclasses import replace
@@ -126,7 +126,7 @@ def sweep(
         fresh: Delete what another sweep left in the folder.
         progress: Show a bar in a terminal or a notebook, elsewhere a line a minute on standard error, unless
             ``on_progress`` is given.
-        on_progress: Called before kernels are compiled, when the walks begin, and about every second.
+        on_progress: Called before kernels are compiled, if any are, when the walks begin, and about every second.
 
     Raises:
         InputError: The sweep or the folder is refused; one line with the remedy for each value. It is a ``ValueError``.
@@ -141,7 +141,9 @@ def sweep(
         count = count or sum(executor.nthreads().values())
         executor = executor.get_executor(pure=False)  # pure: a task that failed would fail again, unrun
     with progress_bar.changing_line(every=progress_bar.LINE_EVERY if progress else math.inf) as show:
-        report = on_progress or (lambda seen: show(progress_bar.progress_text(seen)) if progress else None)
+        report = on_progress or (
+            lambda seen: show(progress_bar.progress_text(seen), seen.compiling) if progress else None
+        )
         _run_in_folder(planned, folder, executor, count, fresh, own, report)
     return load(folder)
 
@@ -235,10 +237,7 @@ def _run_in_folder(
         progress = SweepProgress(walks=walks, done=before, before=before)
         store.log(f"{len(missing)} shards to do, {before} of {walks} walks done")
         if missing and executor is None:
-            progress.compiling = True
-            report(progress)
-            compile_kernels(kinds, walks - before)
-            progress.compiling = False
+            compile_kernels(kinds, walks - before, lambda: report(replace(progress, compiling=True)))
             executor, pulse = held.enter_context(pulsing_threads(at_once))
         if missing:
             tasks = _tasks(planned, missing, at_once if pulse is None else 1)  # threads take turns on a GPU
@@ -255,13 +254,16 @@ def kinds_of_kernels(planned: Sweep) -> list[Setup]:
     return [setup for block in planned.blocks for setup in block.fixed_in(block.cells_along(axes))]
 
 
-def compile_sweep(source: Source, device: str | None = None) -> Sweep:
-    """Put the kernels of a sweep's walks into the cache, for a device or that of the sweep; errors as of `sweep`."""
+def compile_sweep(source: Source, device: str | None = None, on_compile: Callable[[], None] = lambda: None) -> Sweep:
+    """Put the kernels of a sweep's walks into the cache, for a device or that of the sweep; errors as of `sweep`.
+
+    If any is missing there `on_compile` is called before, perhaps several times.
+    """
     planned = load_sweep(source) if device is None else on_device(load_sweep(source), device)
     kinds = kinds_of_kernels(planned)
     for name in {setup.options.device for setup in kinds}:
         start_device(name)
-    compile_kernels(kinds, planned.walk_count)
+    compile_kernels(kinds, planned.walk_count, on_compile)
     return planned
 
 
