@@ -14,20 +14,21 @@ import typer
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from warpchain.chain.keep import FRAME_INTERVAL
 from warpchain.chain.resolution import MAY_BE_NONE
 from warpchain.cli.main import app
 from warpchain.inputs.distributions import DRAWABLE, TABLE, Uniform
+from warpchain.inputs.fields import FIELDS
 from warpchain.inputs.keywords import walk_keywords
 from warpchain.inputs.methods import METHODS, METHODS_BY_NEED
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS, Parameters
 from warpchain.inputs.scene import COMPOUND, Scene
-from warpchain.inputs.validation import FIELDS, field_limits, field_unit, spelled
-from warpchain.run.sweep_run import KEYS as KEYWORDS
-from warpchain.run.sweep_run import OF_FILE
+from warpchain.inputs.validation import field_limits, field_unit, spelled
+from warpchain.run.sweep_run import FILE_KEYS, OF_FILE
 from warpchain.status import Status
 from warpchain.sweeps.designs import SAMPLERS
-from warpchain.sweeps.recording import FRAME_INTERVAL, SERIES_INTERVAL, Frames
+from warpchain.sweeps.recording import SERIES_INTERVAL, Frames
 from warpchain.sweeps.sweep_file import BlockKeys, BlockOfFile, SweepFile
 from warpchain.walks.rows import COLUMNS, drawn_column
 from warpchain.walks.walk_numbers import STORED
@@ -36,14 +37,6 @@ FOLDER = Path(__file__).parent / "reference"
 STUB = Path(__file__).parents[1] / "warpchain/typed.pyi"
 NOTE = "<!-- Written by docs/generate_reference.py; change the code, then run that script. -->\n"
 JSON = "--json"  # An option of most commands, which is explained once
-
-SAMPLER_MEANINGS = {
-    "random": "independent samples",
-    "sobol": "scrambled Sobol' sequences; a power of two of samples",
-    "latin_hypercube": "latin hypercubes",
-    "saltelli": "points for Sobol indices: each sample of d drawn quantities takes d + 2 walks; a power of two of "
-    "samples",
-}
 
 
 def listing(rows: Iterable[tuple[str, object]]) -> str:
@@ -189,7 +182,7 @@ PARTS = {
     "scene_numbers": named(name for name, field in Scene.model_fields.items() if field.annotation is float),
     "uniform": ", ".join(f"`{name}` uniformly in [{law.lower:g}, {law.upper:g}]" for name, law in EVEN.items()),
     "gaussian": named(name for name in TABLE if name not in EVEN),
-    "samplers": listing((f"`{name}`", SAMPLER_MEANINGS[name]) for name in SAMPLERS),
+    "samplers": listing((f"`{name}`", sampler.meaning) for name, sampler in SAMPLERS.items()),
     "series_interval": f"{SERIES_INTERVAL:g}",
     "frame_interval": f"{FRAME_INTERVAL:g}",
     "frames": listing(
@@ -235,7 +228,7 @@ def stub() -> str:
         'Start = StartWord | State\nFloor = Literal["flat"] | List\n\n'
         f"class SolverFields(TypedDict, Generic[T], total=False):\n{fields(solver, 'T | ')}\n"
         f"class WalkFields(SolverFields[T], total=False):\n{fields(types, 'T | ')}\n"
-        f"class SweepFields(WalkFields[Any], total=False):\n{fields({name: OF_FILE[name] for name in KEYWORDS})}\n"
+        f"class SweepFields(WalkFields[Any], total=False):\n{fields({name: OF_FILE[name] for name in FILE_KEYS})}\n"
         "class Columns:\n" + "".join(f"    {name}: NDArray[Any]\n" for name in columns)
     )
 

@@ -45,11 +45,10 @@ class Features:
 
     @property
     def acceleration(self) -> Any:
-        """Warp function of what accelerates a link besides its joints, see :func:`physics.load.weight`."""
+        """Warp function of what accelerates a link besides its joints and the motion of its plane."""
         from warpchain.kernels.physics.load import LOADS
-        from warpchain.kernels.physics.plane import plane_load
 
-        return plane_load if self.tilts else LOADS[self.load].acceleration
+        return LOADS[self.load].acceleration
 
     @property
     def has_floor(self) -> bool:

@@ -3,6 +3,7 @@
 World (one chain instance) is always axis 0. W: number of worlds; n: links of a world (``link_count``); N: greatest n.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 import warp as wp
@@ -22,7 +23,7 @@ LOADING_TIME = wp.constant(wp.float64(0.25))
 class Chain:
     """One world's constants; in a kernel also under its present loads and with its present softness.
 
-    The host fills a field from the parameter of its name, or as ``Batch.set_chain`` says, or else with 0.
+    The host fills a field from the parameter of its name, or as ``World.set_chain`` of the engine says, or else with 0.
     """
 
     link_count: wp.int32  # n
@@ -91,7 +92,7 @@ class Drive:
     steady_window: wp.array(dtype=wp.float64)  # over which means are taken in the hold's second part [s]
     steady_time: wp.array(dtype=wp.float64)  # for which its shape must then stay [s]; negative: see events.release
     steady_tolerance: wp.array(dtype=wp.float64)  # greatest relative change of the shape of a stationary loop
-    further_hold: wp.array(dtype=wp.float64)  # how long a stationary loop is held further [s]
+    extra_hold: wp.array(dtype=wp.float64)  # how long a stationary loop is held further [s]
     release_phase: wp.array(dtype=wp.float64)  # and after that, in loop periods
     hold_softness: wp.array(dtype=wp.float64)  # of the joints from the hold to the release, 1 to 2; 0: own values
     loaded_softness: wp.array(dtype=wp.float64)  # of the joints under load
@@ -196,31 +197,34 @@ def read_ground(model: Model, world: int) -> Ground:
     return Ground(model.faces[world], model.cells[world])
 
 
+STEP_ARGUMENTS: dict[str, Any] = {
+    "worlds": Integers,  # (launched,): worlds to carry on
+    "model": Model,
+    "drive": Drive,
+    "state": State,
+    "record": Record,
+    "scratch": wp.array3d(dtype=wp.float64),  # (W, rows, columns): belongs to a world until its run ends, see layout
+    "lists": wp.array2d(dtype=wp.int32),  # (W, size): likewise, see contacts.list_layout
+    "control": Control,
+}
+"""Arguments of every step kernel, in this order."""
+
+
+def with_step_arguments(function: Callable[..., None]) -> Callable[..., None]:
+    """Decorator that gives a step kernel's function the types of :data:`STEP_ARGUMENTS`."""
+    function.__annotations__.update(STEP_ARGUMENTS)
+    return function
+
+
 def make_entry(module: wp.Module, is_block: bool):
     """Kernel without a body: name, arguments, threads of a step kernel; ``is_block``: for ``wp.launch_tiled``."""
 
-    def advance(
-        worlds: wp.array(dtype=wp.int32),
-        model: Model,
-        drive: Drive,
-        state: State,
-        record: Record,
-        scratch: wp.array3d(dtype=wp.float64),
-        lists: wp.array2d(dtype=wp.int32),
-        control: Control,
-    ):
+    @with_step_arguments
+    def advance(worlds, model, drive, state, record, scratch, lists, control):
         _world = wp.tid()
 
-    def advance_block(
-        worlds: wp.array(dtype=wp.int32),
-        model: Model,
-        drive: Drive,
-        state: State,
-        record: Record,
-        scratch: wp.array3d(dtype=wp.float64),
-        lists: wp.array2d(dtype=wp.int32),
-        control: Control,
-    ):
+    @with_step_arguments
+    def advance_block(worlds, model, drive, state, record, scratch, lists, control):
         _block, _lane = wp.tid()
 
     function = advance_block if is_block else advance

@@ -20,10 +20,11 @@ from tests.support.setups import setup_walk
 from tests.support.sweep_content import blocks, content
 from warpchain.chain.resolution import resolve
 from warpchain.cli.main import main
+from warpchain.inputs.fields import FIELDS, NAME_OF_SYMBOL
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
 from warpchain.inputs.scene import Scene
-from warpchain.inputs.validation import FIELDS, LONGEST_LINE, NAME_OF_SYMBOL, InputError
+from warpchain.inputs.validation import LONGEST_LINE, InputError
 from warpchain.results import one_walk
 from warpchain.sweeps.plan import load_sweep
 
@@ -121,7 +122,7 @@ def test_content_of_a_sweep(content: Any) -> None:
     sweep = taken(lambda: load_sweep(content))
     if sweep is not None:
         again, last = load_sweep(json.loads(json.dumps(sweep.canonical()))), int(sweep.indices[-1])
-        assert again.digest() == sweep.digest() and again.planned(last) == sweep.planned(last)
+        assert again.digest() == sweep.digest() and again.walk(last) == sweep.walk(last)
 
 
 @hostile_inputs

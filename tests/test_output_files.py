@@ -38,7 +38,7 @@ def test_only_regular_files_are_replaced(tmp_path: Path, kind: str, reason: str)
             server.bind(str(path))
     before = path.lstat()
     with pytest.raises(
-        NotReplaceable, match=rf"^{path}: cannot be written \(.*{reason}.*\); give another path"
+        NotReplaceable, match=rf"^{path}: cannot be written \(.*{reason}.*\); use another path"
     ) as caught:
         make_walk().save(path)
     assert "\n" not in str(caught.value)

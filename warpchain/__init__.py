@@ -20,7 +20,7 @@ To read:
     load(folder)     results of a sweep, as far as it has run
     load_walk(path)  a walk that `WalkResult.save` wrote
     preset(name)     the parameters of a named preset, "paper" or "soft"
-    films            a module: friction of the floor and parameters of a chain from films of walks
+    video            a module: estimates floor friction and chain parameters from videos of walks
 
 What they return, take and raise:
 
@@ -41,7 +41,7 @@ from typing import TYPE_CHECKING, Any
 from warpchain import version as _version
 
 if TYPE_CHECKING:
-    from warpchain import films as films
+    from warpchain import video as video
     from warpchain.chain.setup import State as State
     from warpchain.inputs.parameters import Parameters as Parameters
     from warpchain.inputs.parameters import preset as preset
@@ -66,7 +66,7 @@ if not (_HOME / "kernels").is_dir():
     __path__.append(str(_HOME.parent))
 
 _NAMES = {
-    "films": "films",
+    "video": "video",
     "inputs.parameters": "Parameters preset",
     "chain.setup": "State",
     "inputs.validation": "InputError",

@@ -29,7 +29,7 @@ class NotReplaceable(OSError):  # noqa: N818 - the path is refused, nothing went
     """Something is at a path that a new file must not replace; one line that names it."""
 
 
-class Kind(NamedTuple):
+class FileKind(NamedTuple):
     """A kind of file by its content: what it is called, and whether the regular file at a path is of it."""
 
     name: str
@@ -42,11 +42,11 @@ def given_path(path: AnyPath) -> Path:
     if not text:
         raise OSError("a path is empty; name a file or folder")
     if re.search("[\0\ud800-\udc7f\udd00-\udfff]", text):
-        raise OSError(f"{ascii(text)[:100]}: has a NUL or a lone surrogate; leave it out")
+        raise OSError(f"{ascii(text)[:100]}: has a NUL or a lone surrogate; remove it")
     return Path(path)
 
 
-def checked_output(path: AnyPath, only: Kind | None = None) -> Path:
+def checked_output(path: AnyPath, only: FileKind | None = None) -> Path:
     """The path, if a file may be written there; everything that writes files for a user asks here.
 
     Replaced may be any regular file, or `only` one of a kind; a `NotReplaceable` says that something else is there. An
@@ -61,14 +61,14 @@ def checked_output(path: AnyPath, only: Kind | None = None) -> Path:
             return target
     if not stat.S_ISREG(mode):
         kind = "a folder" if stat.S_ISDIR(mode) else "a symbolic link" if stat.S_ISLNK(mode) else "no regular file"
-        raise NotReplaceable(f"{target}: cannot be written (it is {kind}); give another path")
+        raise NotReplaceable(f"{target}: cannot be written (it is {kind}); use another path")
     if only is not None and not only.has(target):
-        raise NotReplaceable(f"{target}: is there and is no {only.name}; give another name")
+        raise NotReplaceable(f"{target}: already exists and is not a {only.name}; use another name")
     return target
 
 
 @contextmanager
-def replacing(path: AnyPath, only: Kind | None = None) -> Iterator[Path]:
+def replacing(path: AnyPath, only: FileKind | None = None) -> Iterator[Path]:
     """Yield the path of an empty part beside `path`, which becomes `path` if the block ends without an error.
 
     The data reach the disk before the part is renamed. So `path` is at any moment, even after a power cut, either the
@@ -125,7 +125,7 @@ def clear_parts(path: AnyPath) -> None:
                     part.unlink()
 
 
-def write_whole(path: AnyPath, content: bytes | str, only: Kind | None = None) -> None:
+def write_whole(path: AnyPath, content: bytes | str, only: FileKind | None = None) -> None:
     """Write a file, see `replacing`; text in UTF-8."""
     data = content.encode() if isinstance(content, str) else content
     with replacing(path, only) as part:
@@ -152,7 +152,7 @@ def naming(target: AnyPath, verb: Literal["written", "read"] = "written") -> Ite
         yield
     except OSError as error:
         number = error.errno or errno.EIO  # without a number: a library that writes a format failed
-        remedy = _REMEDIES.get(number, "see to the disk") if verb == "written" else "give the path of a readable file"
+        remedy = _REMEDIES.get(number, "check the disk") if verb == "written" else "use the path of a readable file"
         reason = os.strerror(error.errno) if error.errno else " ".join(str(error).split())  # HDF5 has a paragraph
         problem = type(error)(f"{target}: cannot be {verb} ({reason}); {remedy}")
         problem.errno = number
@@ -164,13 +164,13 @@ def described(error: OSError) -> str:
     if not error.strerror or not error.errno:
         return str(error)
     where = f"{os.fsdecode(error.filename)}: " if error.filename else ""
-    return f"{where}cannot be read or written ({error.strerror}); {_REMEDIES.get(error.errno, 'see to the disk')}"
+    return f"{where}cannot be read or written ({error.strerror}); {_REMEDIES.get(error.errno, 'check the disk')}"
 
 
 _REMEDIES: Final = {
-    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), "make room"),
+    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), "free disk space"),
     **dict.fromkeys((errno.EROFS, errno.EACCES, errno.EPERM), "make the folder writable"),
-    **dict.fromkeys((errno.ENOENT, errno.ENOTDIR, errno.EEXIST), "give a folder that is there"),
-    errno.ENAMETOOLONG: "give a shorter path",
+    **dict.fromkeys((errno.ENOENT, errno.ENOTDIR, errno.EEXIST), "use a folder that exists"),
+    errno.ENAMETOOLONG: "use a shorter path",
 }
 """Errno with which the system refuses to write → what to do."""

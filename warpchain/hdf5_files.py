@@ -45,6 +45,10 @@ _LABELS: Final = {"axis": ["x", "y"], "room_axis": ["x", "y", "z"]}
 _FIXED: Final[dict[str, Any]] = {"libver": ("v108", "v108"), "track_order": True}
 """Version bounds without which equal content would not give equal bytes; they also leave out times."""
 
+WALK_FILE: Final = "walk.h5"
+SWEEP_FILE: Final = "sweep.h5"
+"""Names of the file of a saved walk, and of the manifest of a sweep, in their folders."""
+
 
 @dataclass(frozen=True)
 class Stored:
@@ -232,13 +236,13 @@ def reading_hdf5(path: AnyPath, form: Format | None, remedy: str, wanted: str | 
 def _check_format(file: "h5py.File", path: AnyPath, form: Format | None, remedy: str, wanted: str | None) -> None:
     """Check format and version of a file; errors as of `reading_hdf5`."""
     if form is not None and (found := file.attrs["format"]) != form.kind:
-        raise InputError(f"{path}: a {found}, not a {form.kind}; {wanted or 'move it out of this folder'}")
+        raise InputError(f"{path}: expected a {form.kind}, got a {found}; {wanted or 'move it out of this folder'}")
     if (version := int(file.attrs["format_version"])) != FORMAT_VERSION:
         later = f", but this warpchain reads {FORMAT_VERSION}; update warpchain"
         earlier = f" of an earlier warpchain, which reads it; {remedy}"
         raise InputError(f"{path}: format version {version}{later if version > FORMAT_VERSION else earlier}")
     if form is not None and file.attrs.get("format_digest") != form.digest:
-        raise InputError(f"{path}: has other fields than this warpchain reads, of the same version; {remedy}")
+        raise InputError(f"{path}: has other fields than this warpchain reads; {remedy}")
 
 
 def _check(content: BinaryIO, path: AnyPath, remedy: str, wanted: str | None) -> None:
@@ -257,7 +261,7 @@ def _check(content: BinaryIO, path: AnyPath, remedy: str, wanted: str | None) ->
     if place < 0 and (size or wanted):  # in the folder of a sweep an empty file is torn
         what = "of an earlier warpchain, or damaged" if b"warpchain " in head else "not an HDF5 file of warpchain"
         what = what if head.startswith(_SIGNATURE) else "not an HDF5 file"
-        raise InputError(f"{path}: {what}; {wanted or 'move it out of this folder, or give another folder'}")
+        raise InputError(f"{path}: {what}; {wanted or 'move it out of this folder, or use another folder'}")
     end = int.from_bytes(head[28:36], "little")  # of the content, as the HDF5 library notes it in its head
     if end == size and not head[place:].startswith(_CHECKSUM.format(size, "").encode()):
         raise ChangedFileError(f"{path}: another program has changed it; {remedy}")
@@ -287,8 +291,8 @@ def open_regular(path: AnyPath) -> BinaryIO:
             at_once = getattr(os, "O_NONBLOCK", 0)  # which Windows does not have
             file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | at_once))
     except IsADirectoryError:
-        raise InputError(f"{path}: is a folder, not a file; give another path") from None
+        raise InputError(f"{path}: expected a file, got a folder; use another path") from None
     if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
         file.close()
-        raise InputError(f"{path}: a pipe or a device, not a file; give another path")
+        raise InputError(f"{path}: expected a file, got a pipe or a device; use another path")
     return file

@@ -1,4 +1,4 @@
-"""How a run ended: the codes of the kernels, each with a sentence."""
+"""The statuses with which a run ends. Every result has one; its sentence says what happened and what to try."""
 
 from enum import IntEnum
 from typing import Final
@@ -7,7 +7,7 @@ from warpchain.kernels import codes
 
 
 class Status(IntEnum):
-    """What ended the run of one chain; the first error of a run is the one that stays."""
+    """What ended the run of one chain; after several errors, the first one counts."""
 
     RUNNING = codes.RUNNING
     AT_REST = codes.AT_REST
@@ -37,30 +37,28 @@ class Status(IntEnum):
 
 
 _SENTENCES: Final[dict[Status, str]] = {
-    Status.RUNNING: "The run has not ended yet; let it go on.",
+    Status.RUNNING: "The run has not ended yet; resume it.",
     Status.AT_REST: "The chain came to rest.",
-    Status.FINISHED: "The run reached its planned end.",
+    Status.FINISHED: "The run reached its intended end.",
     Status.TIME_LIMIT: (
-        "The chain was still moving at the time limit of the walk; raise scene.walk_limit, "
-        "give more floor_friction if it slides without end, or scene.distance_limit on a steep slope."
+        "The chain was still moving at the time limit of the walk; raise scene.walk_limit, raise floor_friction if it "
+        "keeps sliding, or set scene.distance_limit on a steep slope."
     ),
     Status.STEP_LIMIT: (
-        "The walk used up its steps; raise options.step_limit, loosen options.tolerance or soften the joints."
+        "The walk reached options.step_limit; raise it, raise options.tolerance, or soften the joints."
     ),
     Status.STEP_TOO_SMALL: (
-        "The error stayed too large down to options.smallest_step; lower that if you raised it, loosen "
-        "options.tolerance, or bring stiffness, damping and friction of the joints closer to those of a preset."
+        "The error was still too large at options.smallest_step; lower that if you raised it, raise options.tolerance, "
+        "or bring stiffness, damping and friction of the joints closer to those of a preset."
     ),
     Status.NOT_FINITE: (
-        "A position or velocity stopped being a finite number; start from lower speeds, "
-        "or bring extreme parameters closer to those of a preset."
+        "A position or velocity is no longer a finite number; start from lower speeds, or bring extreme parameters "
+        "closer to those of a preset."
     ),
     Status.NOT_STEADY: (
         "The chain did not circulate steadily on the sprocket within scene.hold_limit; raise that limit if you lowered "
-        "it. A chain that whirls, as with a heavy charm, needs start: ellipse, or a third of the frequency."
+        "it. A chain that whips, e.g. with a heavy point mass, needs start: ellipse, or a third of the frequency."
     ),
-    Status.DISTANCE_LIMIT: "The chain was still moving when it was scene.distance_limit away.",
-    Status.LIST_OVERFLOW: (
-        "More links came close to one another than the neighbour list can hold; lower options.skin."
-    ),
+    Status.DISTANCE_LIMIT: "The chain was still moving when it reached scene.distance_limit.",
+    Status.LIST_OVERFLOW: ("More links came close to each other than the neighbour list can hold; lower options.skin."),
 }

@@ -49,14 +49,14 @@ class WalkFields(SolverFields[T], total=False):
     load_factor: T | Float | None
     steady_time: T | Float | None
     steady_tolerance: T | Float
-    further_hold: T | Float
+    extra_hold: T | Float
     hold_limit: T | Float
     walk_limit: T | Float
     release: T | List | None
     floor: T | Floor
     slope: T | Float
     distance_limit: T | Float | None
-    walk_until: T | Float | None
+    stop_time: T | Float | None
     plane: T | Literal["fixed", "tilting"]
     lateral_speed: T | Float
     tilt: T | Float
@@ -67,7 +67,7 @@ class WalkFields(SolverFields[T], total=False):
     charm_inertia: T | Float
     charm_radius: T | Float | None
     stiff_joint: T | Int
-    stiff_joint_factor: T | Float
+    joint_friction_factor: T | Float
     mass_gradient: T | Float
     link_masses: T | List | None
     link_inertias: T | List | None
@@ -220,7 +220,7 @@ class Columns:
     ellipse_aspect_drawn: NDArray[Any]
     spin_up_time_drawn: NDArray[Any]
     steady_tolerance_drawn: NDArray[Any]
-    further_hold_drawn: NDArray[Any]
+    extra_hold_drawn: NDArray[Any]
     hold_limit_drawn: NDArray[Any]
     walk_limit_drawn: NDArray[Any]
     slope_drawn: NDArray[Any]
@@ -230,5 +230,5 @@ class Columns:
     yaw_rate_drawn: NDArray[Any]
     charm_mass_drawn: NDArray[Any]
     charm_inertia_drawn: NDArray[Any]
-    stiff_joint_factor_drawn: NDArray[Any]
+    joint_friction_factor_drawn: NDArray[Any]
     mass_gradient_drawn: NDArray[Any]

@@ -15,6 +15,7 @@ from warpchain.kernels import layout
 from warpchain.kernels.contacts import terrain
 from warpchain.kernels.contacts.impulse import Touching, struck
 from warpchain.kernels.contacts.terrain import SMALLEST, Face, read_face
+from warpchain.kernels.hooks import Hooks, hook
 from warpchain.kernels.physics.elementary import ONE, TWO, ZERO, quotient
 from warpchain.kernels.types import Chain, Drive, Ground
 
@@ -72,17 +73,17 @@ def unmoved(face: Face, _drive: Drive, _world: int, _time: wp.float64) -> Face:
 
 
 @wp.func
-def turning_sprocket(still: Face, drive: Drive, world: int, time: wp.float64) -> Face:
+def turning_sprocket(face: Face, drive: Drive, world: int, time: wp.float64) -> Face:
     """The sprocket, whose angular velocity is a smooth step 3s² − 2s³ from 0 to its final value."""
     ramp = drive.spin_up_time[world]
     since = time - drive.spin_up_start[world]
     s = ONE
     if ramp > ZERO and since < ramp:
         s = wp.max(since, ZERO) / ramp
-    face = still
-    face.turning = drive.sprocket_speed[world] * s * s * (wp.float64(3.0) - TWO * s)
-    face.push_rate = drive.push_rate[world]
-    return face
+    moving = face
+    moving.turning = drive.sprocket_speed[world] * s * s * (wp.float64(3.0) - TWO * s)
+    moving.push_rate = drive.push_rate[world]
+    return moving
 
 
 @wp.func
@@ -99,38 +100,43 @@ def on_cubic(drive: Drive, world: int, k: int, place: int, velocity: int, s: wp.
 
 
 @wp.func
-def moved_sprocket(still: Face, drive: Drive, world: int, time: wp.float64) -> Face:
+def moved_sprocket(face: Face, drive: Drive, world: int, time: wp.float64) -> Face:
     """The sprocket on its given motion: places on cubics between the rows, turning at a rate that changes evenly."""
     k = int(0)
     while k + 2 < layout.MOTION_ROWS and time >= drive.motion[world, k + 1, layout.MOTION_TIME]:
         k += 1
     span = drive.motion[world, k + 1, layout.MOTION_TIME] - drive.motion[world, k, layout.MOTION_TIME]
     s = (time - drive.motion[world, k, layout.MOTION_TIME]) / span
-    face = still
+    moving = face
     x, u = on_cubic(drive, world, k, layout.MOTION_X, layout.MOTION_U, s, span)
     y, v = on_cubic(drive, world, k, layout.MOTION_Y, layout.MOTION_V, s, span)
-    face.x = x
-    face.y = y
-    face.u = u
-    face.v = v
+    moving.x = x
+    moving.y = y
+    moving.u = u
+    moving.v = v
     turning = drive.motion[world, k, layout.MOTION_TURNING]
-    face.turning = turning + s * (drive.motion[world, k + 1, layout.MOTION_TURNING] - turning)
-    face.push_rate = drive.push_rate[world]
-    return face
+    moving.turning = turning + s * (drive.motion[world, k + 1, layout.MOTION_TURNING] - turning)
+    moving.push_rate = drive.push_rate[world]
+    return moving
 
 
 @dataclass(frozen=True)
-class Body:
-    """A body."""
+class Body(Hooks):
+    """A body that no impulse moves, as Warp functions and facts that step loops are made of."""
 
-    surface: Any  # see above
-    face: Any = nowhere  # ``face(ground)`` → its Face but for its motion
-    motion: Any = unmoved  # ``motion(face, drive, world, time)`` → its Face at a time [s]
+    # → gap, normal, velocity, e, μ of a circle, see the head of this module; None: there is no body
+    surface: Any = hook(chain=Chain, face=Face, circle_x=wp.float64, circle_y=wp.float64)
+    # → its Face but for its motion
+    face: Any = hook(ground=Ground, otherwise=nowhere)
+    # → its Face at a time [s]
+    motion: Any = hook(face=Face, drive=Drive, world=int, time=wp.float64, otherwise=unmoved)
     in_cells: bool = False  # whether it has many faces, found through cells, and corners
     is_plane: bool = False  # then rigid flights bound their steps by the speed of approach, not by any speed
     is_driven: bool = False  # whether it holds and drives a chain before its release, and is no floor
-    # ``lesser_gap(chain, left_x, left_y, right_x, right_y)``, if that is less work than two surfaces
-    lesser_gap: Any = None
+    # → the lesser gap [m] of two circles, if that is less work than two surfaces
+    lesser_gap: Any = hook(
+        chain=Chain, left_x=wp.float64, left_y=wp.float64, right_x=wp.float64, right_y=wp.float64, otherwise=None
+    )
 
 
 BODIES = {

@@ -9,6 +9,7 @@ import warp as wp
 from warpchain.kernels.cpu.implicit.rigid_layout import first_stage_row
 from warpchain.kernels.cpu.increments import steps_in_increments
 from warpchain.kernels.cpu.stage_rows import rows_of_stages
+from warpchain.kernels.hooks import Hooks, hook
 from warpchain.kernels.methods.controller import step_controller
 from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.physics.elementary import ZERO
@@ -19,21 +20,32 @@ NOTHING_KNOWN, STAGE_KNOWN, ROUNDED = 0, 1, 2
 
 
 @dataclass(frozen=True)
-class Joints:
+class Joints(Hooks):
     """Warp functions of the joints, in the order in which a step calls them."""
 
-    take_constants: Any  # ``(K, chain)`` when those of links and joints have changed
-    settle: Any  # ``(K, chain, state, world)`` before a step
-    first_stage: Any  # ``(K, chain, state, world)`` evaluates the first stage of a step on springs, if it is not known
-    shift_first_stage: Any  # ``(K, before, now)`` changes it from one plane to another
-    attempt: Any  # ``(K, chain, state, control, world, h, tolerance)`` → error ratio as ordered bits
-    shrinkage: Any  # ``(state, world, error)`` → factor of the step after rejection, see :mod:`methods.controller`
-    # ``(K, chain, state, control, world, h, error)`` accepts the state that the last attempt found and places its ends
-    # → factor of the step, whether the joints may stay as they are
-    accept: Any
-    margins: Any  # ``(state, control, world)`` → skin of the neighbour list [m], least slack with which it is kept [m]
-    react: Any  # ``(K, chain, state, world)`` after a step with impulses, or in which the joints may not stay
-    rates_are_finite: Any  # ``(K, chain, state, world)`` whether all accelerations at the start of the step are
+    # when the constants of links and joints have changed
+    take_constants: Any = hook(K=Rows, chain=Chain)
+    # before a step
+    settle: Any = hook(K=Rows, chain=Chain, state=State, world=int)
+    # evaluates the first stage of a step on springs, if it is not known
+    first_stage: Any = hook(K=Rows, chain=Chain, state=State, world=int)
+    # changes the first stage from one plane to another
+    shift_first_stage: Any = hook(K=Rows, before=Chain, now=Chain)
+    # → error ratio as ordered bits
+    attempt: Any = hook(
+        K=Rows, chain=Chain, state=State, control=Control, world=int, h=wp.float64, tolerance=wp.float64
+    )
+    # → factor of the step after rejection, see methods.controller
+    shrinkage: Any = hook(state=State, world=int, error=wp.float64)
+    # accepts the state that the last attempt found and places its ends → factor of the step, whether the joints may
+    # stay as they are
+    accept: Any = hook(K=Rows, chain=Chain, state=State, control=Control, world=int, h=wp.float64, error=wp.float64)
+    # → skin of the neighbour list [m], least slack with which the list is kept [m]
+    margins: Any = hook(state=State, control=Control, world=int)
+    # after a step with impulses, or in which the joints may not stay
+    react: Any = hook(K=Rows, chain=Chain, state=State, world=int)
+    # whether all accelerations at the start of the step are finite
+    rates_are_finite: Any = hook(K=Rows, chain=Chain, state=State, world=int)
 
 
 @functools.cache

@@ -33,7 +33,7 @@ from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step
 from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.physics.elementary import ONE, ZERO
 from warpchain.kernels.physics.scaled_loads import write_links
-from warpchain.kernels.types import Chain, Control, Drive, Integers, Model, Record, Rows, State, read_ground
+from warpchain.kernels.types import Chain, Control, Drive, Model, Record, Rows, State, read_ground, with_step_arguments
 
 
 @wp.func
@@ -59,10 +59,9 @@ def state_is_finite(K: Rows, chain: Chain):
 
 @functools.cache
 def make_advance(features: Features):
-    """Kernel ``advance(worlds, model, drive, state, record, scratch, lists, control)``, one thread per chain.
+    """Kernel with :data:`types.STEP_ARGUMENTS`, one thread per chain.
 
-    worlds: (launched,) int32; those whose status is not RUNNING are left alone. scratch: (W, rows, columns) float64,
-    lists: (W, size) int32; both belong to a world until its run ends, see :mod:`layout`, :mod:`contacts.list_layout`.
+    Worlds whose status is not RUNNING are left alone.
     """
     columns = features.columns
     rows = scratch_rows(features.method, columns, features.is_mixed)
@@ -117,16 +116,8 @@ def make_advance(features: Features):
     @wp.kernel(
         name="advance", module="unique", enable_backward=False, module_options={"cpu_compiler_flags": COMPILER_FLAGS}
     )
-    def advance(
-        worlds: Integers,
-        model: Model,
-        drive: Drive,
-        state: State,
-        record: Record,
-        scratch: wp.array3d(dtype=wp.float64),
-        lists: wp.array2d(dtype=wp.int32),
-        control: Control,
-    ):
+    @with_step_arguments
+    def advance(worlds, model, drive, state, record, scratch, lists, control):
         world = worlds[wp.tid()]
         if state.status[world] != RUNNING:
             return

@@ -9,7 +9,7 @@ from warpchain.kernels.contacts import tilting_floor
 from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.cpu.contacts.proximity import FURTHEST, any_negative, placed_link
 from warpchain.kernels.cpu.joints import Joints
-from warpchain.kernels.cpu.upright import Plane
+from warpchain.kernels.cpu.upright import PlaneHooks
 from warpchain.kernels.layout import LEFT_X, LOST_FIXED, SUMS, SUMS_OF_MOTION, U
 from warpchain.kernels.physics import plane
 from warpchain.kernels.physics.elementary import ZERO, from_order_key, order_key
@@ -94,14 +94,14 @@ def write_touches(K: Rows, chain: Chain, slope: wp.float64):
 
 
 @wp.func
-def resolve_tilting_floor(K: Rows, P: Row, own: Chain, _ground: Ground, _face: Face):
+def resolve_tilting_floor(K: Rows, P: Row, chain: Chain, _ground: Ground, _face: Face):
     """Applies the impulses between rollers and floor to links, plane and sums; returns their number.
 
     The sums must be those of the present places. Lanes of links of which none touches are passed over.
     """
-    chain = plane.on_plane(own, P, 0)
-    slope = tilting_floor.steepness(chain)
-    touching = write_touches(K, chain, slope)
+    present = plane.on_plane(chain, P, 0)
+    slope = tilting_floor.steepness(present)
+    touching = write_touches(K, present, slope)
     if touching == wp.int64(0):
         return touching
     B = tilting_floor.copy_inverse(P, wp.float64(touching))
@@ -116,7 +116,7 @@ def resolve_tilting_floor(K: Rows, P: Row, own: Chain, _ground: Ground, _face: F
             lane = int(0)
             while lane < wp.static(LANES):
                 i = first + lane
-                own = with_circles(chain, K[layout.RADIUS, i])
+                own = with_circles(present, K[layout.RADIUS, i])
                 link = tilting_floor.meet_floor(own, slope, B, placed_link(K, i))
                 touches = K[wp.static(TOUCHES), i] < ZERO
                 for k in range(wp.static(SUMMED_IN_CONTACT)):
@@ -135,7 +135,7 @@ def resolve_tilting_floor(K: Rows, P: Row, own: Chain, _ground: Ground, _face: F
 
 
 @functools.cache
-def tilting_plane(joints: Joints) -> Plane:
+def tilting_plane(joints: Joints) -> PlaneHooks:
     """A plane that may tilt, above a flat floor."""
 
     @wp.func
@@ -158,4 +158,4 @@ def tilting_plane(joints: Joints) -> Plane:
         write_plane_sums(K, P, chain)
         plane.end_step(P, chain.gravity, h)
 
-    return Plane(write_plane_sums, at_start, begin_step, end_step, tilting_gap, resolve_tilting_floor)
+    return PlaneHooks(write_plane_sums, at_start, begin_step, end_step, tilting_gap, resolve_tilting_floor)

@@ -6,27 +6,33 @@ from typing import Any
 
 import warp as wp
 
+from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.cpu.contacts.proximity import fixed_contacts
 from warpchain.kernels.cpu.joints import Joints
-from warpchain.kernels.types import Chain, Row, Rows, State
+from warpchain.kernels.hooks import Hooks, hook
+from warpchain.kernels.types import Chain, Ground, Row, Rows, State
 
 
 @dataclass(frozen=True)
-class Plane:
+class PlaneHooks(Hooks):
     """Warp functions of a chain's plane and of the floor or sprocket that it meets. P: a row of ``State.plane``."""
 
-    begin_run: Any  # ``(K, P, chain)`` when the host has set the links
-    at_start: Any  # ``(P, chain)`` → the chain on the plane where the step begins
-    # ``(K, P, chain, state, world, h)`` evaluates the first stage → the chain on the plane that its links feel in this
-    # step
-    begin_step: Any
-    end_step: Any  # ``(K, P, chain, h)`` carries the plane to the end of an accepted step, whose ends are placed
-    gap: Any  # ``(K, chain, ground, face)`` → least gap [m] of the chain on its plane
-    meet: Any  # ``(K, P, chain, ground, face)`` applies the impulses of the floor or sprocket → their number
+    # when the host has set the links
+    begin_run: Any = hook(K=Rows, P=Row, chain=Chain)
+    # → the chain on the plane where the step begins
+    at_start: Any = hook(P=Row, chain=Chain)
+    # evaluates the first stage → the chain on the plane that its links feel in this step
+    begin_step: Any = hook(K=Rows, P=Row, chain=Chain, state=State, world=int, h=wp.float64)
+    # carries the plane to the end of an accepted step, whose ends are placed
+    end_step: Any = hook(K=Rows, P=Row, chain=Chain, h=wp.float64)
+    # → least gap [m] of the chain on its plane
+    gap: Any = hook(K=Rows, chain=Chain, ground=Ground, face=Face)
+    # applies the impulses of the floor or sprocket → their number
+    meet: Any = hook(K=Rows, P=Row, chain=Chain, ground=Ground, face=Face)
 
 
 @functools.cache
-def upright_plane(fixed_body: str, joints: Joints) -> Plane:
+def upright_plane(fixed_body: str, joints: Joints) -> PlaneHooks:
     """A plane that stays upright, for a key of :data:`contacts.fixed_body.BODIES`."""
     gap, resolve = fixed_contacts(fixed_body)
 
@@ -47,4 +53,4 @@ def upright_plane(fixed_body: str, joints: Joints) -> Plane:
     def end_step(_K: Rows, _P: Row, _chain: Chain, _h: wp.float64):
         return
 
-    return Plane(begin_run, at_start, begin_step, end_step, gap, resolve)
+    return PlaneHooks(begin_run, at_start, begin_step, end_step, gap, resolve)

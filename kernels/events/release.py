@@ -14,7 +14,7 @@ loop is stationary when, over all windows of a watch,
 - the averages of its speed agree to within ``steady_tolerance`` of the sprocket's speed, or 0.02 m/s if that is more,
   and each differs from the sprocket's speed by at most 25 %, or 0.02 m/s. Once free, its speed is watched afresh.
 
-A window that breaks these rules begins a new watch. The loop is released ``further_hold`` + phase × loop period after
+A window that breaks these rules begins a new watch. The loop is released ``extra_hold`` + phase × loop period after
 it is found stationary.
 
 A loop that changes its shape when it becomes free, or is not stationary after eight crossings under load, is held again
@@ -169,7 +169,7 @@ def watch_steadiness(chain: Chain, state: State, drive: Drive, world: int, sampl
         watch[layout.UNLOADED_SINCE] = time
         watch[layout.STEADY_SINCE] = time + LOADING_TIME
     elif is_over:
-        wait = drive.further_hold[world] + drive.release_phase[world] * drive.loop_period[world]
+        wait = drive.extra_hold[world] + drive.release_phase[world] * drive.loop_period[world]
         state.stop_time[world] = time + wait
         state.stop_status[world] = FINISHED
     leaves_shape = is_free and watch[layout.HOLD_LOAD] > ONE and not (is_first or keeps_shape)

@@ -33,7 +33,7 @@ from warpchain.kernels.gpu.upright import block_upright
 from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step, step_controller
 from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.physics.elementary import TWO
-from warpchain.kernels.types import Control, Drive, Integers, Model, Record, State, read_ground
+from warpchain.kernels.types import read_ground, with_step_arguments
 
 
 @functools.cache
@@ -99,16 +99,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         cuda_max_registers=registers,
         module_options={"cpu_compiler_flags": COMPILER_FLAGS},
     )
-    def advance_block(
-        worlds: Integers,
-        model: Model,
-        drive: Drive,
-        state: State,
-        record: Record,
-        scratch: wp.array3d(dtype=wp.float64),
-        lists_of_worlds: wp.array2d(dtype=wp.int32),
-        control: Control,
-    ):
+    @with_step_arguments
+    def advance_block(worlds, model, drive, state, record, scratch, lists, control):
         block, lane = wp.tid()
         world = worlds[block]
         exchange = wp.tile_empty(shape=(wp.static(EXCHANGED * block_dim),), dtype=real, storage="shared")
@@ -120,7 +112,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         if state.status[world] != RUNNING:
             return
         memory = scratch[world]
-        list_row = lists_of_worlds[world]
+        list_row = lists[world]
         board_start = board_address(board)
         touch_start = touch_address(touches)
         if wp.static(not is_shared):

@@ -8,6 +8,7 @@ import warp as wp
 
 from warpchain.kernels.gpu.contacts.proximity import block_contact
 from warpchain.kernels.gpu.stage import Run
+from warpchain.kernels.hooks import Hooks, hook
 from warpchain.kernels.types import Drive
 
 
@@ -24,20 +25,24 @@ def no_motion(_run: Run, _h: wp.float64):
 
 
 @dataclass(frozen=True)
-class BlockPlane:
+class BlockPlane(Hooks):
     """Warp functions of a chain's plane and of the floor or sprocket that it meets, for all threads of a block.
 
     Between a function that uses ``run.M`` and any other use of that memory there must be a barrier.
     """
 
-    # ``(run, drive, time, gap)`` applies the impulses of the floor or sprocket, from which this thread's link has that
-    # gap [m] → number of those of this thread
-    meet: Any
-    load: Any = nothing  # ``(run)`` loads the plane; for one thread
-    store: Any = nothing  # ``(run)`` stores it; for one thread
-    begin_run: Any = nothing  # ``(run)`` when the host has set the links; uses M
-    begin_step: Any = no_motion  # ``(run, h)`` moves the plane to the middle of a step
-    end_step: Any = no_motion  # ``(run, h)`` carries the plane to the end of an accepted step; uses M
+    # applies the impulses of the floor or sprocket, from which this thread's link has that gap [m] → number of those of
+    # this thread
+    meet: Any = hook(run=Run, drive=Drive, time=wp.float64, gap=wp.float32)
+    # loads the plane, and stores it; for one thread
+    load: Any = hook(run=Run, otherwise=nothing)
+    store: Any = hook(run=Run, otherwise=nothing)
+    # when the host has set the links; uses M
+    begin_run: Any = hook(run=Run, otherwise=nothing)
+    # moves the plane to the middle of a step
+    begin_step: Any = hook(run=Run, h=wp.float64, otherwise=no_motion)
+    # carries the plane to the end of an accepted step; uses M
+    end_step: Any = hook(run=Run, h=wp.float64, otherwise=no_motion)
 
 
 @functools.cache

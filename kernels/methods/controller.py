@@ -18,12 +18,6 @@ def error_bits(error: wp.float64, value: wp.float64, rate: wp.float64, h: wp.flo
     return order_bits(wp.abs(error) / (ONE + wp.abs(value) + h * wp.abs(rate)))
 
 
-@wp.func
-def error_scale(value: wp.float64, rate: wp.float64, h: wp.float64):
-    """Divisor 1 + |y| + h |ẏ| of odeint's norm, see :func:`error_bits`."""
-    return ONE + wp.abs(value) + h * wp.abs(rate)
-
-
 @wp.func_native("""
 #if defined(__CUDA_ARCH__)
     float power;
@@ -65,7 +59,8 @@ def step_controller(order: int, error_order: int, real: type = wp.float64):
     Standard: Boost odeint's ``default_step_adjuster`` (K. Ahnert, M. Mulansky, AIP Conf. Proc. 1389 (2011) 1586), which
     lets steps grow only if the error is below half of the tolerance. Proportional-integral: K. Gustafsson, ACM TOMS 17
     (1991) 533, with the exponents 0.7/k and 0.4/k of E. Hairer and G. Wanner, Solving ODEs II, section IV.2. ``order``
-    is of the propagated solution, ``error_order`` of the embedded one; ``real`` is ``wp.float32`` on a GPU.
+    is of the propagated solution, ``error_order`` of the embedded one; ``real`` is ``wp.float32`` on a GPU. odeint's
+    rule has no exponent for an embedded solution of order 1, which takes that of order 2.
     """
     least_error = 5.0**-order
     least_shrinkage = float(LEAST_SHRINKAGE)
@@ -86,7 +81,7 @@ def step_controller(order: int, error_order: int, real: type = wp.float64):
 
     @wp.func
     def shrinkage(error: real):
-        factor = wp.static(real(SAFETY)) * power(error, wp.static(real(-1.0 / (error_order - 1))))
+        factor = wp.static(real(SAFETY)) * power(error, wp.static(real(-1.0 / max(error_order - 1, 1))))
         return wp.max(factor, wp.static(real(least_shrinkage)))
 
     return growth, shrinkage

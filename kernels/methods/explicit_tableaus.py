@@ -71,11 +71,6 @@ class Tableau:
         """b − b̂: weights of the velocities' error estimate, per h."""
         return tuple(float(x) for x in self._error_weights)
 
-    @cached_property
-    def position_errors(self) -> tuple[float, ...]:
-        """(b − b̂)·A: weights of the positions' error estimate, per h²."""
-        return tuple(float(x) for x in self._times_matrix(self._error_weights))
-
     @property
     def _error_weights(self) -> tuple[F, ...]:
         return tuple(b - e for b, e in zip(self.weights, self.embedded, strict=True))
@@ -97,7 +92,7 @@ def register(tableau: Tableau) -> None:
 
     Raises:
         ValueError: The name is taken, a row has the wrong length, the weights of a solution do not add up to one, or
-            the embedded solution is of an order below 2, for which the step controller has no exponent.
+            the embedded solution is of no order between 1 and that of the other.
     """
     name = tableau.name
     if name in {*TABLEAUS, HYBRID}:
@@ -110,8 +105,8 @@ def register(tableau: Tableau) -> None:
     for place, row in solutions:
         if sum(row) != 1:
             raise ValueError(f"{name}.{place}: the entries add up to {sum(row)}, not 1")
-    if tableau.error_order < 2:
-        raise ValueError(f"{name}.error_order: {tableau.error_order} is less than 2")
+    if not 1 <= tableau.error_order < tableau.order:
+        raise ValueError(f"{name}.error_order: expected 1 to {tableau.order - 1}, got {tableau.error_order}")
     TABLEAUS[name] = tableau
 
 

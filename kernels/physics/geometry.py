@@ -37,17 +37,6 @@ def read_link(K: Rows, chain: Chain, i: int) -> Link:
 
 
 @wp.func
-def link_is_finite(K: Rows, i: int, rates: int):
-    """False if the state of link i, or its accelerations from row ``rates`` on, hold an infinity or a NaN."""
-    finite = bool(True)
-    for row in range(6):
-        finite = finite and wp.isfinite(K[row, i])
-    for row in range(3):
-        finite = finite and wp.isfinite(K[rates + row, i])
-    return finite
-
-
-@wp.func
 def put(rows: Rows, first: int, i: int, values: Any):
     """Writes a vector's components into column i of consecutive rows."""
     for k in range(len(values)):

@@ -1,4 +1,4 @@
-"""Joints and links: spring, damper, friction, and the acceleration of a link."""
+"""A joint: spring, damper and friction, in double precision; stages have :mod:`physics.increments`."""
 
 import warp as wp
 
@@ -20,18 +20,3 @@ def joint_force(chain: Chain, opening: wp.float64, opening_rate: wp.float64):
 def friction_torque(viscous: wp.float64, coulomb: wp.float64, spin: wp.float64, inverse_smoothing: wp.float64):
     """f(w) = β w + τ_c tanh(w / ω_c) [N m], with 1/ω_c [s/rad]; w is ω left of the joint less ω right of it [rad/s]."""
     return viscous * spin + coulomb * tanh(spin * inverse_smoothing)
-
-
-@wp.func
-def link_acceleration(
-    inverse_mass: wp.float64, inverse_inertia: wp.float64, arm: wp.vec2d, left: wp.vec3d, right: wp.vec3d
-):
-    """Accelerations (ẍ, ÿ [m/s²], θ̈ [rad/s²]) of a link by its joints, of which each has a force F and a torque f.
-
-    m Ẍ = F_right − F_left and I θ̈ = arm × (F_right + F_left) + f_left − f_right. ``left`` and ``right`` are (F, f) of
-    the joints at its two ends. The arm leads from the link's centre to its right end.
-    """
-    ax = (right[0] - left[0]) * inverse_mass
-    ay = (right[1] - left[1]) * inverse_mass
-    lever = arm[0] * (right[1] + left[1]) - arm[1] * (right[0] + left[0])
-    return ax, ay, (lever + left[2] - right[2]) * inverse_inertia

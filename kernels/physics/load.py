@@ -1,7 +1,8 @@
 """What acts on a link besides its joints: weight, or a load of another name in :data:`LOADS`.
 
-A step kernel is compiled for one load. Links of a plane that tilts feel :func:`physics.plane.plane_load` instead. What
-is not there is −0.0: compilers leave out its sums, which change no bit.
+A step kernel is compiled for one load. On a plane that tilts links feel the plane's motion instead, see
+:attr:`physics.increments.Increments.plane_load`. What is not there is −0.0: compilers leave out its sums, which change
+no bit.
 """
 
 from dataclasses import dataclass
@@ -9,6 +10,7 @@ from typing import Any
 
 import warp as wp
 
+from warpchain.kernels.hooks import Hooks, hook
 from warpchain.kernels.physics.geometry import Link
 from warpchain.kernels.types import Chain
 
@@ -28,11 +30,11 @@ def no_energy(_chain: Chain, _i: int, _link: Link):
 
 
 @dataclass(frozen=True)
-class Load:
-    """Warp functions of a load."""
+class Load(Hooks):
+    """Warp functions of a load, with the arguments of :func:`weight` and :func:`no_energy`."""
 
-    acceleration: Any  # as :func:`weight`
-    energy: Any  # as :func:`no_energy`
+    acceleration: Any = hook(chain=Chain, i=int, link=Link, inverse_mass=wp.float64, inverse_inertia=wp.float64)
+    energy: Any = hook(chain=Chain, i=int, link=Link)
 
 
 LOADS = {"weight": Load(weight, no_energy)}

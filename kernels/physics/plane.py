@@ -43,23 +43,11 @@ import warp as wp
 from warpchain.kernels import layout
 from warpchain.kernels.layout import AHEAD, MOMENTUM, ORIGIN, RATE_XX, SUM_MU, SUM_MV, SUM_MX, SUM_MY, SUM_XX, UP
 from warpchain.kernels.physics.elementary import HALF, ONE, quotient
-from warpchain.kernels.physics.geometry import Link
 from warpchain.kernels.types import Chain, Row, Rows
 
 THIRD = wp.constant(wp.float64(1.0 / 3.0))
 FIVE_SIXTHS = wp.constant(wp.float64(5.0 / 6.0))
 THREE_HALVES = wp.constant(wp.float64(1.5))
-
-
-@wp.func
-def plane_load(chain: Chain, _i: int, link: Link, _inverse_mass: wp.float64, _inverse_inertia: wp.float64):
-    """Accelerations (ẍ, ÿ [m/s²], θ̈ [rad/s²]) of a link by gravity and the motion of its plane."""
-    across = chain.plane_speed + chain.turn_x * link.y - chain.turn_y * link.x
-    about_rod = link.arm_x * chain.turn_x + link.arm_y * chain.turn_y
-    across_rod = link.arm_x * chain.turn_y - link.arm_y * chain.turn_x
-    ax = -chain.gravity * chain.up_x - chain.turn_y * across
-    ay = chain.turn_x * across - chain.gravity * chain.up_y
-    return ax, ay, -(about_rod * across_rod) * chain.inverse_square
 
 
 @wp.func

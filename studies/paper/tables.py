@@ -171,7 +171,8 @@ def walks(numbers: Numbers) -> str:
     total = sum((Counter(content["walks"]) for content in numbers.values()), Counter())
     parts = (f"{count:,} {name.replace('_', ' ')}" for name, count in total.items())
     inaccurate = sum(content["inaccurate"] for content in numbers.values())
-    return f"{', '.join(parts)}; {inaccurate} with an energy error above 5 %"
+    numerics = " and ".join(str(each) for each in sorted({content["numerics_version"] for content in numbers.values()}))
+    return f"{', '.join(parts)}; {inaccurate} with an energy error above 5 %; versions {numerics} of the numerics"
 
 
 def left_open(numbers: Numbers) -> str:

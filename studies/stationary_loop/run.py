@@ -23,12 +23,12 @@ OTHERS = {
     "hardly any Coulomb friction": {"coulomb_friction": 1e-6},
 }
 """Changes of the chain whose loop is shown."""
-UNDAMPED = {"load_factor": 1.0, "steady_time": 0.0, "steady_tolerance": 1.0, "further_hold": 40.0}
+UNDAMPED = {"load_factor": 1.0, "steady_time": 0.0, "steady_tolerance": 1.0, "extra_hold": 40.0}
 
 
 def held(links: int, frequency: float, values: Mapping[str, float]) -> warpchain.WalkResult:
     """A walk of Table 1's chain with softened joints, whose last half second on the sprocket is kept."""
-    settings = {"further_hold": 0.5, "hold_limit": 60.0, "walk_limit": 1e-3} | dict(values)
+    settings = {"extra_hold": 0.5, "hold_limit": 60.0, "walk_limit": 1e-3} | dict(values)
     return warpchain.walk(links=links, frequency=frequency, preset="soft", start="spinning", **settings)
 
 

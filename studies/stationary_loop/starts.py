@@ -46,7 +46,7 @@ def reduced(paths: list[str]) -> Iterator[dict[str, Any]]:
         for name, block in warpchain.load(path).blocks.items():
             names = [name for name in block.columns if name in QUANTITIES or name.endswith(DRAWN)]
             for place, at in common.of_cells(block):
-                key = name, int(at["links"]), float(at["frequency"]), float(at.get("further_hold", 0))
+                key = name, int(at["links"]), float(at["frequency"]), float(at.get("extra_hold", 0))
                 found.setdefault(key, []).append({each: block.columns[each][place].astype(float) for each in names})
     cells = {}
     for key, parts in sorted(found.items()):

@@ -39,7 +39,7 @@ def waves_figure(walk: WalkResult, *, colour: Colour = "curvature", window: tupl
     `velocity` of the joints across the chain, outwards, relative to the centre of mass [m/s].
     """
     if not len(walk.frame_forces):
-        raise ValueError("walk: its joint forces were not recorded; run it again with record_loads")
+        raise ValueError("walk: its joint forces were not recorded; run it again with record_joint_forces")
     label, cmap, wave, rim, touching = _LOOKS[colour]
     parameters, scene = walk.setup.parameters, walk.setup.scene
     shown = (walk.frame_time >= window[0]) & (walk.frame_time <= window[1])

@@ -43,7 +43,7 @@ def main() -> None:
     """Write all tables and draw the figures."""
     tables, dispersion = rings.tables_and_figure()
     scene = {"links": LINKS, "frequency": FREQUENCY, "start": "spinning", "walk_limit": 0.35}
-    walk = warpchain.walk(preset="soft", **scene, record_loads=True, record_before=0.0, frame_interval=1e-4)
+    walk = warpchain.walk(preset="soft", **scene, record_joint_forces=True, record_before=0.0, frame_interval=1e-4)
     show({"speeds": speeds_table(walk)})
     publish(FOLDER, tables, {"dispersion": dispersion})
     publish(FOLDER, {}, {"picture": waves_figure(walk, window=(0.0, 0.25))}, dpi=90)

@@ -6,8 +6,9 @@ import pytest
 
 import warpchain
 from tests.support.setups import setup_walk
+from warpchain.inputs.fields import NAME_OF_SYMBOL, SECTION_OF, SYMBOL_OF
 from warpchain.inputs.parameters import Parameters, preset
-from warpchain.inputs.validation import NAME_OF_SYMBOL, SECTION_OF, SYMBOL_OF, InputError
+from warpchain.inputs.validation import InputError
 from warpchain.sweeps.sweep_file import read_walk_file
 
 SYMBOLS = {
@@ -49,12 +50,12 @@ def test_symbols_stand_for_names(tmp_path: Path, name: str) -> None:
 def test_a_value_is_given_once(tmp_path: Path) -> None:
     """A value by name and by symbol is refused."""
     path = written(tmp_path, "preset: soft\nparameters: {mu_fc: 0.3, floor_friction: 0.3}")
-    with pytest.raises(InputError, match=r"^parameters\.floor_friction: given twice, also as 'mu_fc'; leave one out$"):
+    with pytest.raises(InputError, match=r"^parameters\.floor_friction: given twice, also as 'mu_fc'; remove one$"):
         read_walk_file(path)
     for call in (warpchain.walk, lambda **both: preset("soft").with_values(both)):
-        with pytest.raises(InputError, match=r"^(parameters\.)?gravity: given twice, also as 'g'; leave one out$"):
+        with pytest.raises(InputError, match=r"^(parameters\.)?gravity: given twice, also as 'g'; remove one$"):
             call(gravity=9.0, g=9.0)
-    with pytest.raises(InputError, match=r"^links: given twice, also as 'n'; leave one out$"):
+    with pytest.raises(InputError, match=r"^links: given twice, also as 'n'; remove one$"):
         warpchain.walk(links=60, n=80)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 import warpchain
 from tests.support.command_line import Command
-from warpchain.inputs.validation import SECTION_OF
+from warpchain.inputs.fields import SECTION_OF
 from warpchain.store.folder import SweepFolder
 from warpchain.sweeps.plan import Sweep, load_sweep
 from warpchain.sweeps.sweep_file import sweep_schema
@@ -41,7 +41,7 @@ def test_a_new_sweep_runs_as_it_is(command: Command) -> None:
     text = Path("new.yaml").read_text(encoding="utf-8")
     assert load_sweep("new.yaml").walk_count == 8
     again = command("sweep", "--new", "new.yaml")
-    assert (again.status, again.err) == (2, "error: --new: new.yaml exists; give another name\n")
+    assert (again.status, again.err) == (2, "error: --new: new.yaml already exists; use another name\n")
     assert Path("new.yaml").read_text(encoding="utf-8") == text
     run = command("sweep", "new.yaml", "-o", "results", "--json")
     assert run.status == 0 and json.loads(run.out)["statuses"] == {"at_rest": 8, "missing": 0}

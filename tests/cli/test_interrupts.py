@@ -100,7 +100,7 @@ def test_ctrl_c_at_any_moment_ends_a_sweep(tmp_path: Path) -> None:
         # −2, which a shell shows as 130: Python ends itself so if an import was interrupted
         if process.returncode in (130, -signal.SIGINT):
             is_complete = told.startswith("80 time_limit")  # while its table was printed
-            assert is_complete or told in ("interrupted\n", "the same command goes on with the sweep\ninterrupted\n")
+            assert is_complete or told in ("interrupted\n", "rerun the same command to resume the sweep\ninterrupted\n")
             assert told.endswith("interrupted\n") and told.count("\n") <= 2
             assert not is_complete or data_of(folder) == data_of(tmp_path / "whole")
             interrupted += 1

@@ -74,7 +74,7 @@ def test_a_full_disk_gives_one_line(command: Command, line: str) -> None:
     before = content()
     with small_files(1000):
         answer = command(*line.format(OUTPUTS[line]).split())
-    assert_refused(answer, 1, OUTPUTS[line], "cannot be written (File too large); make room")
+    assert_refused(answer, 1, OUTPUTS[line], "cannot be written (File too large); free disk space")
     assert answer.out == "" and content() | {"folder": None} == before | {"folder": None}
 
 
@@ -89,7 +89,7 @@ def test_a_sweep_goes_on_after_a_full_disk(command: Command) -> None:
         path.unlink()
     with small_files(min(map(len, whole.values())) - 1):
         answer = command("sweep", "some.yaml", "-o", "results")
-    assert_refused(answer, 1, "results/shards/", "cannot be written (File too large); make room")
+    assert_refused(answer, 1, "results/shards/", "cannot be written (File too large); free disk space")
     assert list(Path("results/shards").iterdir()) == []
     assert command("sweep", "some.yaml", "-o", "results").out == expected.out
     assert {path.name: path.read_bytes() for path in Path("results/shards").iterdir()} == whole

@@ -23,7 +23,7 @@ def test_a_walk_that_falls_over_tells_and_draws_it(tmp_path: Path, command: Comm
     assert walk.status == Status.AT_REST and walk.fell_over == 1 and walk.tilt[0] == pytest.approx(0.3)
     assert abs(walk.final_tilt) == pytest.approx(np.pi / 2, abs=0.1)
     assert walk.lateral_drift == pytest.approx(walk.center_z[-1]) and abs(walk.energy_error) < 1e-3
-    room = walk.joints_in_room
+    room = walk.joints_lab
     assert room is not None and room.shape == (*walk.frame_joints.shape[:2], 3)
     radius, width = walk.setup.parameters.circle_radius, walk.setup.parameters.half_width
     assert -2e-4 < room[..., 1].min() - min(radius, width) < 2e-3  # joints stay above the floor by a rim at least
@@ -45,7 +45,7 @@ def test_a_sweep_keeps_planes(tmp_path: Path, command: Command) -> None:
     assert (result.greatest_tilt[0] == 0).all() and result.lateral_drift[0].tolist() == [0.0, 0.0]
     walk = result.series(tilt=0.2)
     assert walk.tilt[0] == pytest.approx(0.2) and len(walk.yaw) == len(walk.time) == len(walk.center_z)
-    room = walk.joints_in_room
+    room = walk.joints_lab
     assert room is not None and np.ptp(room[-1, :, 2]) > 0.05  # it lies
     np.testing.assert_allclose(
         room[0, :, :2], walk.frame_joints[0] @ walk.frame_axes[0][:, :2] + walk.frame_origin[0, :2]

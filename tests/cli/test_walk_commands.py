@@ -41,11 +41,11 @@ def saved(tiny_walk: WalkResult, tmp_path: Path) -> Path:
 def test_a_folder_is_of_a_walk_or_of_a_sweep(command: Command, saved: Path) -> None:
     """Else commands that take a folder would have to guess which is meant."""
     answer = command("sweep", "quickstart", "-o", str(saved.parent))
-    assert answer.status == 2 and "walk.h5: in the way of a sweep; move it away, or give another folder" in answer.err
+    assert answer.status == 2 and "walk.h5: in the way of a sweep; move it away, or use another folder" in answer.err
     Path("swept").mkdir()
     Path("swept/sweep.h5").touch()
     answer = command("walk", "-o", "swept")
-    assert (answer.status, answer.err) == (2, "error: swept: holds a sweep; give another folder\n")
+    assert (answer.status, answer.err) == (2, "error: swept: already holds a sweep; use another folder\n")
 
 
 @pytest.mark.parametrize("options", [(), ("-o", "new/deep")])
@@ -107,7 +107,7 @@ def test_like_changes_single_values(command: Command, tiny_walk: WalkResult, sav
         ("--method reference", {"method": "reference"}),
         ("--method standard --tol 1e-4", {"method": "standard", "tolerance": 1e-4}),
         ("--tol 1e-4", {"method": "dp5", "tolerance": 1e-4}),
-        ("--method standard --record-loads -o new", {"method": "explicit"}),
+        ("--method standard --record-joint-forces -o new", {"method": "explicit"}),
     ],
 )
 def test_a_method_beside_like_brings_its_settings(

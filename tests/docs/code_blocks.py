@@ -17,7 +17,7 @@ REASONS: Final = (
     "needs a cluster",
     "takes minutes",
     "sets up an environment",
-    "needs your film",
+    "needs your video",
     "runs until Ctrl-C",
 )
 """Why a block may not be run."""

@@ -1,13 +1,17 @@
 """What README, docs/, studies/ and CITATION.cff say of the project is so."""
 
 import importlib.util
+import json
 import re
 from pathlib import Path
 from types import ModuleType
 
 import pytest
 
+import warpchain
 from tests.docs.code_blocks import PAGES, ROOT, name_of
+from tests.support.same_walks import GOLDEN, processor
+from warpchain.inputs.methods import METHODS
 
 
 @pytest.fixture(scope="module")
@@ -46,3 +50,31 @@ def anchors(page: Path) -> set[str]:
     """Anchors of a page's headings, as GitHub makes them."""
     headings = re.findall(r"^#+ (.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def test_readme_has_the_numbers_of_its_first_command() -> None:
+    """Δx of its walk as printed, on the kind of processor whose bits are known; elsewhere a walk may be another one."""
+    given = re.search(r"`walk` also prints Δx = ([\d.]+) m", (ROOT / "README.md").read_text(encoding="utf-8"))
+    if processor() != json.loads(GOLDEN.read_text(encoding="utf-8"))["processor"]:
+        pytest.skip("bits of this processor are not known")
+    walk = warpchain.walk(links=60, frequency=15.0, start="spinning", frame_interval=None)
+    assert given is not None and f"{walk.dx:.2f}" == given[1]
+
+
+@pytest.mark.slow
+def test_readme_has_the_numbers_of_its_first_sweep(tmp_path: Path) -> None:
+    """Mean and standard deviation of Δx for 60 links at 15 Hz, to three standard errors on any processor."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    given = re.search(r"For 60 links at 15 Hz it is ([\d.]+) ± ([\d.]+) m \(mean and standard deviation", text)
+    result = warpchain.sweep("quickstart", tmp_path / "sweep", progress=False)
+    found = result.cell_statistics()
+    (cells,) = found.values()
+    place = tuple(int((cells.axes[name] == value).argmax()) for name, value in (("links", 60), ("frequency", 15.0)))
+    assert given is not None
+    assert abs(cells.mean[place] - float(given[1])) < 3 * cells.standard_error[place] + 0.005
+
+
+def test_the_table_of_integrators_has_them_all() -> None:
+    """Who registers another one describes it there."""
+    section = (ROOT / "docs/methods.md").read_text(encoding="utf-8").partition("\n## Integrators\n")[2]
+    assert re.findall(r"^\| `(\w+)` \|", section.partition("\n#")[0], re.MULTILINE) == [*METHODS]

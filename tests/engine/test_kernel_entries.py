@@ -1,18 +1,21 @@
 """Entries launch the kernels that they stand for, and have other names where those would be compiled anew."""
 
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 import warp as wp
 
 from warpchain.engine import kernel_entries
-from warpchain.engine.kernel_entries import kernel_entry, step_module
+from warpchain.engine.kernel_entries import kernel_entry
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
 
+ROOT = Path(__file__).parents[2]
 FEATURES = Features("dp5", layout.padded_width(60), "floor", True)
 
 
@@ -42,11 +45,18 @@ def test_what_would_be_compiled_anew_has_another_name(monkeypatch: pytest.Monkey
     assert name() == names[0]
 
 
-def test_sources_that_changed_are_not_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_sources_that_changed_are_not_compiled(tmp_path: Path) -> None:
     """What was imported before is not what a name would stand for."""
-    monkeypatch.setattr(kernel_entries, "digest_of_sources", lambda: "others")
-    with pytest.raises(RuntimeError, match="changed while this process ran"):
-        step_module(FEATURES, 1, None)
+    for folder in ("warpchain", "kernels"):
+        shutil.copytree(ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__"))
+    program = (
+        "from warpchain.engine.kernel_entries import step_module\n"
+        "from warpchain.kernels.features import Features\n"
+        "with open('kernels/codes.py', 'a') as file: file.write('# changed')\n"
+        "step_module(Features('dp5', 200, 'floor', True), 1, None)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 1 and "changed while this process ran" in done.stderr
 
 
 def test_a_cached_kernel_is_loaded_without_its_source() -> None:

@@ -61,7 +61,7 @@ def test_presets() -> None:
     """`soft` changes joints only; another name is refused with those that exist; none can be changed."""
     changed = {"joint_stiffness": 1e7, "joint_damping": 100.0, "friction_smoothing": 0.1}
     assert preset("soft").model_dump() == {**preset("paper").model_dump(), **changed}
-    with pytest.raises(InputError, match=r"^preset: 'papr' is unknown; presets are paper, soft$"):
+    with pytest.raises(InputError, match=r"^preset: unknown preset 'papr'; use one of paper, soft$"):
         preset("papr")
     assert list(PRESETS) == ["paper", "soft"]
     with pytest.raises(ValidationError):
@@ -99,6 +99,6 @@ def test_fewest_links_is_the_polygon(sides: int, kind: str) -> None:
     outside = parameters.with_values({"sprocket_radius": corner_radius * (1 + 1e-9)})
     reaches, is_short = setup_of(scene, inside).checked(), setup_of(scene, outside)
     assert (reaches.fewest_links, is_short.fewest_links) == (sides, sides + 2)
-    with pytest.raises(InputError, match=rf"^scene\.links: {sides} links .* give at least {sides + 2}$"):
+    with pytest.raises(InputError, match=rf"^scene\.links: {sides} links .* use at least {sides + 2}$"):
         is_short.checked()
     setup_of(Scene.model_validate({**scene.model_dump(), "start": "ellipse"}), outside).checked()

@@ -14,8 +14,17 @@ import pytest
 
 import warpchain
 from tests.support.setups import setup_walk
-from warpchain.chain.resolution import SECTIONS, resolve
-from warpchain.inputs.validation import LONGEST_LINE, SECTION_OF, InputError, field_limits
+from warpchain.chain.resolution import resolve
+from warpchain.inputs.distributions import DRAWABLE
+from warpchain.inputs.fields import SECTION_OF, SECTIONS
+from warpchain.inputs.validation import (
+    LONGEST_LINE,
+    InputError,
+    field_bounds,
+    field_limits,
+    validated,
+    with_numbers,
+)
 from warpchain.inputs.yaml_files import LARGEST_FILE, read_yaml
 from warpchain.kernels.methods.method import find_method, method_names
 from warpchain.sweeps.plan import load_sweep
@@ -52,7 +61,7 @@ def test_each_bound_is_refused_by_name(name: str, limit: str, value: float) -> N
     beyond = math.nextafter(value, math.inf if limit.startswith("l") else -math.inf) if limit in ("ge", "le") else value
     if FIELDS[name].annotation is int:
         beyond = round(value) + (1 if limit == "le" else -1)
-    assert refused(name, beyond).startswith(f"{SECTION_OF[name]}.{name}: Input should be ")
+    assert refused(name, beyond).startswith(f"{SECTION_OF[name]}.{name}: expected ")
 
 
 @pytest.mark.parametrize("name", FIELDS)
@@ -70,41 +79,50 @@ STILL = [0.1, 0, 0, 0]
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"links": 60.5}, "scene.links: Input should be a valid integer; given 60.5"),
-        ({"start": "elipse"}, "scene.start: Input should be 'rest', 'spinning' or 'ellipse'; given 'elipse'"),
-        ({"floor": "hilly"}, "scene.floor: 'hilly' is no floor; give flat, or points such as [[0, 0], [1, 0.1]]"),
-        ({"floor": [[0, 0], [1]]}, "scene.floor[1][1]: missing; give a value"),
-        ({"floor": [[0, 0, 0.1], [1, 0]]}, "scene.floor[0][3]: missing; give a value"),
-        ({"floor": [[0, 0, 1.1, 0.1], [1, 0]]}, "scene.floor[0][2]: Input should be less than or equal to 1"),
-        ({"floor": [[0, 0], [1, 0, 0.1, 0.1]]}, "scene.floor: point 1 begins no line that could have e and μ; give x "),
-        ({"floor": [[0, 0]]}, "scene.floor: a profile has 2 points at least; give more, such as [[0, 0], [1, 0], "),
-        ({"floor": [[0, 0], [1, 0], [0.9, 1]]}, "scene.floor: point 2 lies behind the one before it; let x rise"),
-        ({"floor": [[0, 0], [1, 0], [1, 1e-6], [2, 0]]}, "scene.floor: point 2 is less than 1e-05 m from the one "),
-        ({"floor": [[0, 0], [0, 1], [1, 1]]}, "scene.floor: the first and the last face go on without end; let x rise"),
+        ({"links": 60.5}, "scene.links: expected an integer, got 60.5"),
+        ({"start": "elipse"}, "scene.start: expected 'rest', 'spinning' or 'ellipse', got 'elipse'"),
+        ({"floor": "hilly"}, "scene.floor: expected flat or points, got 'hilly'; use e.g. [[0, 0], [1, 0.1]]"),
+        ({"floor": [[0, 0], [1]]}, "scene.floor[1][1]: missing; set a value"),
+        ({"floor": [[0, 0, 0.1], [1, 0]]}, "scene.floor[0][3]: missing; set a value"),
+        ({"floor": [[0, 0, 1.1, 0.1], [1, 0]]}, "scene.floor[0][2]: expected at most 1"),
+        (
+            {"floor": [[0, 0], [1, 0, 0.1, 0.1]]},
+            "scene.floor: the last point starts no segment, so it has no e and μ; use ",
+        ),
+        ({"floor": [[0, 0]]}, "scene.floor: expected at least 2 points; use e.g. [[0, 0], [1, 0], "),
+        ({"floor": [[0, 0], [1, 0], [0.9, 1]]}, "scene.floor: point 2 lies behind the point before it; let x increase"),
+        ({"floor": [[0, 0], [1, 0], [1, 1e-6], [2, 0]]}, "scene.floor: point 2 is less than 1e-05 m from the point "),
+        (
+            {"floor": [[0, 0], [0, 1], [1, 1]]},
+            "scene.floor: the first and last segments are infinite, so they cannot be vertical; let x",
+        ),
         (
             {"floor": [[0, 0], [1, 0], [1, 1], [1, 0.5], [2, 0]]},
-            "scene.floor: point 3 is the third above one another; ",
+            "scene.floor: point 3 is the third on one vertical line; ",
         ),
-        ({"slope": 5.0, "floor": STEP}, "scene.slope: 5.0 of a floor that is a profile; give slope: 0, or floor: flat"),
-        ({"slope": 5.0, "plane": "tilting"}, "scene.plane: 'tilting' needs a flat floor; give plane: fixed, or "),
-        ({"floor": STEP, "plane": "tilting"}, "scene.plane: 'tilting' needs a flat floor; give plane: fixed, or "),
-        ({"method": "hybrid", "plane": "tilting"}, "options.method: 'hybrid' keeps planes fixed; give "),
-        ({"method": "hybird"}, "options.method: 'hybird' is unknown; did you mean hybrid?"),
-        ({"device": "gpu"}, "options.device: 'gpu' is no device; give cpu, cuda or cuda:N"),
+        ({"slope": 5.0, "floor": STEP}, "scene.slope: not possible with a profile; use slope: 0, or floor: flat"),
+        ({"slope": 5.0, "plane": "tilting"}, "scene.plane: 'tilting' needs a flat floor; use plane: fixed, or "),
+        ({"floor": STEP, "plane": "tilting"}, "scene.plane: 'tilting' needs a flat floor; use plane: fixed, or "),
+        ({"method": "hybrid", "plane": "tilting"}, "options.method: 'hybrid' cannot tilt the plane; use "),
+        ({"method": "hybird"}, "options.method: unknown method 'hybird'; did you mean hybrid?"),
+        ({"device": "gpu"}, "options.device: expected cpu, cuda or cuda:N, got 'gpu'; use one of them"),
         (
             {"soften_drive": True, "record_interval": 5e-3},
-            "options.soften_drive: joints stiffen at each record_interval, and 0.005 s is too long for that; give at "
+            "options.soften_drive: joints stiffen at each record_interval, and 0.005 s is too long for that; use at "
             "most 0.002 s, or ",
         ),
-        ({"contact_step": 1e-13}, "options.smallest_step: 1e-12 s is not below contact_step; give less"),
-        ({"circle_radius": 0.007}, "parameters.circle_radius: 0.007 is not below half a link, 0.00634; give less"),
+        ({"contact_step": 1e-13}, "options.smallest_step: expected less than contact_step, got 1e-12 s; use less"),
+        (
+            {"circle_radius": 0.007},
+            "parameters.circle_radius: expected less than half a link, 0.00634, got 0.007; use less",
+        ),
         # values in other units
         ({"ell": 12.7}, "parameters.link_length: 12.7 m is 1000 times Table 1's; did you mean 0.0127 (12.7 mm)? Else "),
         ({"ell": 1.27}, "parameters.link_length: 1.27 m is 100 times Table 1's; did you mean 0.0127 (1.27 cm)? Else "),
         ({"ell": 0.5}, "parameters.link_length: 0.5 m is 39.4 times Table 1's; did you mean 0.0127 (0.5 inches)? "),
         ({"R": 55.6}, "parameters.sprocket_radius: 55.6 m is 1000 times Table 1's; did you mean 0.0556 (55.6 mm)? "),
         ({"m_inner": 3.7}, "parameters.inner_mass: 3.7 kg is 1000 times Table 1's; did you mean 0.0037 (3.7 g)? Else "),
-        ({"m_outer": 3e-6}, "parameters.outer_mass: 3e-6 kg is 0.000953 times Table 1's; give it in kg, or set "),
+        ({"m_outer": 3e-6}, "parameters.outer_mass: 3e-6 kg is 0.000953 times Table 1's; use kg, or set "),
         (
             {"I_inner": 169},
             "parameters.inner_inertia: 169 kg m² is 1e9 times Table 1's; did you mean 1.69e-7 (169 g mm²)",
@@ -116,26 +134,46 @@ STILL = [0.1, 0, 0, 0]
         ),
         ({"charm_radius": 4.5}, "scene.charm_radius: 4.5 m is 1070 times Table 1's; did you mean 0.0045 (4.5 mm)? "),
         # links that are unlike
-        ({"links": 61}, "scene.links: 61 is odd; give an even number, or link_masses and "),
-        ({"links": 61, "start": "ellipse"}, "scene.links: 61 is odd; give an even number, or link_masses and "),
-        ({"charm_link": 60}, "scene.charm_link: 60 is not among 60 links; give 0 to 59"),
-        ({"stiff_joint": 60}, "scene.stiff_joint: 60 is not among 60 links; give 0 to 59"),
-        ({"link_masses": [1.0, 2.0]}, "scene.link_masses: 2 numbers for 60 links; give one for each"),
-        ({"link_masses": [0.0] * 60}, "scene.link_masses[0]: 0 is too little; give more"),
-        ({"link_radii": [4e-3] * 59 + [0.02]}, "scene.link_radii[59]: 0.02 is not below half a link, 0.00634; give "),
-        ({"charm_radius": 0.02, "start": "ellipse"}, "scene.charm_radius: 0.02 is not below half a link, 0.00634; "),
-        ({"link_inertias": {7: 1e-7}}, "scene.link_inertias: Input should be a valid list, in kg m²; given "),
-        ({"coulomb_frictions": [-1.0] * 60}, "scene.coulomb_frictions[0]: Input should be greater than or equal to 0"),
-        ({"mass_gradient": 1.0}, "scene.mass_gradient: Input should be less than 1; given 1.0"),
-        ({"charm_mass": 0.02, "load_factor": 9.0}, "scene.load_factor: 9 is too much for links of so little rotary "),
+        ({"links": 61}, "scene.links: expected an even number, got 61; use one, or set link_masses and "),
+        (
+            {"links": 61, "start": "ellipse"},
+            "scene.links: expected an even number, got 61; use one, or set link_masses and ",
+        ),
+        ({"charm_link": 60}, "scene.charm_link: expected 0 to 59, the links of the chain, got 60; use"),
+        ({"stiff_joint": 60}, "scene.stiff_joint: expected 0 to 59, the links of the chain, got 60; use"),
+        ({"link_masses": [1.0, 2.0]}, "scene.link_masses: expected 60 numbers, one per link, got 2"),
+        ({"link_masses": [0.0] * 60}, "scene.link_masses[0]: expected more than 0, got 0; use more"),
+        (
+            {"link_radii": [4e-3] * 59 + [0.02]},
+            "scene.link_radii[59]: expected less than half a link, 0.00634, got 0.02; use ",
+        ),
+        (
+            {"charm_radius": 0.02, "start": "ellipse"},
+            "scene.charm_radius: expected less than half a link, 0.00634, got 0.02; ",
+        ),
+        ({"link_inertias": {7: 1e-7}}, "scene.link_inertias: expected a list in kg m², got "),
+        ({"coulomb_frictions": [-1.0] * 60}, "scene.coulomb_frictions[0]: expected at least 0"),
+        ({"mass_gradient": 1.0}, "scene.mass_gradient: expected less than 1, got 1.0"),
+        ({"charm_mass": 0.02, "load_factor": 9.0}, "scene.load_factor: 9 is too much for links with such a small "),
+        # names of development versions
+        ({"walk_until": 1.0}, "'walk_until': unknown name; use stop_time, its new name"),
+        ({"further_hold": 1.0}, "'further_hold': unknown name; use extra_hold, its new name"),
+        ({"stiff_joint_factor": 2}, "'stiff_joint_factor': unknown name; use joint_friction_factor, its new name"),
+        ({"record_loads": True}, "'record_loads': unknown name; use record_joint_forces, its new name"),
         # motions of the sprocket
-        ({"release": [STILL], "start": "ellipse"}, "scene.release: a motion of the sprocket, which start: ellipse"),
-        ({"release": [STILL], "plane": "tilting"}, "scene.release: a motion of the sprocket, which plane: tilting"),
+        (
+            {"release": [STILL], "start": "ellipse"},
+            "scene.release: a motion of the sprocket is not possible with start: ellipse",
+        ),
+        (
+            {"release": [STILL], "plane": "tilting"},
+            "scene.release: a motion of the sprocket is not possible with plane: tilting",
+        ),
         ({"release": [STILL[:3]]}, "scene.release[0][3]: missing"),
-        ({"release": [STILL, STILL]}, "scene.release: row 1: 0.1 s is not after 0.1 s"),
-        ({"release": [[0.0, 0, 0, 0]]}, "scene.release: row 0: 0 s is not after 0 s"),
-        ({"release": [[0.1, 1e9, 0, 0]]}, "scene.release[0][1]: Input should be less than or equal to 10000"),
-        ({"release": []}, "scene.release: no rows; give at least one"),
+        ({"release": [STILL, STILL]}, "scene.release: row 1: expected a time after 0.1 s, got 0.1 s"),
+        ({"release": [[0.0, 0, 0, 0]]}, "scene.release: row 0: expected a time after 0 s, got 0 s"),
+        ({"release": [[0.1, 1e9, 0, 0]]}, "scene.release[0][1]: expected at most 10000"),
+        ({"release": []}, "scene.release: expected at least one row"),
         ({"release": "lift"}, "scene.release: "),
     ],
 )
@@ -149,7 +187,7 @@ def test_refusals_say_what_to_give(settings: dict[str, Any], message: str) -> No
 def test_methods_that_a_gpu_has_no_kernel_for_are_refused_there(method: str) -> None:
     """With what to give instead."""
     text = refusal(lambda: setup_walk("soft", {"method": method, "device": "cuda:1"}))
-    assert text == f"options.method: {method!r} runs on a CPU only; give explicit, or device: cpu"
+    assert text == f"options.method: {method!r} runs only on a CPU; use explicit, or device: cpu"
 
 
 def test_several_problems_and_what_is_no_section() -> None:
@@ -212,8 +250,10 @@ def test_a_refusal_keeps_its_lines() -> None:
     error = InputError("links: 3 is odd", "name: 'a\nb\u2028c\x1b' is no name")
     assert str(error).splitlines() == ["links: 3 is odd", "name: 'a b c\\x1b' is no name"]
     assert str(pickle.loads(pickle.dumps(error))) == str(error)
-    long = str(InputError(f"scene.{'x' * 10**6}: is no name; give another"))
-    assert long.startswith("scene.xxx") and long.endswith("xxx: is no name; give another") and len(long) == LONGEST_LINE
+    long = str(InputError(f"scene.{'x' * 10**6}: is not a name; use another"))
+    assert (
+        long.startswith("scene.xxx") and long.endswith("xxx: is not a name; use another") and len(long) == LONGEST_LINE
+    )
 
 
 # Hostile files
@@ -282,3 +322,22 @@ def test_numbers_aliases_and_dates_mean_what_they_say(tmp_path: Path) -> None:
     }  # fmt: skip
     path.write_bytes(b"\xff\xfe\xff")
     assert refusal(lambda: read_yaml(path)).startswith(str(path))
+
+
+@pytest.mark.parametrize("name", DRAWABLE)
+def test_drawn_values_are_checked_as_given_ones(name: str) -> None:
+    """Within, at and beyond its bounds, and not a number: what is drawn is taken, or refused, as if it were given."""
+    setup = setup_walk("paper", {"links": 60, "start": "ellipse"})
+    section, model = SECTION_OF[name], SECTIONS[SECTION_OF[name]]
+    usual, (least, most) = getattr(setup, section), field_bounds(FIELDS[name])
+
+    def taken(check: Callable[[], object]) -> object:
+        try:
+            return vars(check())
+        except InputError as error:
+            return str(error)
+
+    for value in (least, most, math.nextafter(least, -math.inf), math.nextafter(most, math.inf), math.nan, math.inf):
+        drawn = taken(lambda value=value: with_numbers(usual, {name: value}, section))  # type: ignore[misc]
+        given = taken(lambda value=value: validated(model, vars(usual) | {name: value}, section))  # type: ignore[misc]
+        assert drawn == given, value

@@ -6,8 +6,9 @@ import pytest
 
 from tests.support.sweep_content import content
 from warpchain.chain.resolution import resolve
+from warpchain.inputs.fields import SECTION_OF
 from warpchain.inputs.unit_slips import USUAL
-from warpchain.inputs.validation import SECTION_OF, InputError
+from warpchain.inputs.validation import InputError
 from warpchain.sweeps.plan import load_sweep
 
 
@@ -41,7 +42,7 @@ def test_who_insists_gets_the_value() -> None:
     grid = {"links": [60], "inner_mass": [30.0]}
     with pytest.raises(InputError, match=r"^sweep\.grid\.inner_mass\[0\]: 30 kg is 8110 times Table 1's; "):
         load_sweep(content(grid=grid))
-    assert load_sweep(content(grid=grid, options={"unusual_values": True})).planned(0).setup.parameters.inner_mass == 30
+    assert load_sweep(content(grid=grid, options={"unusual_values": True})).walk(0).setup.parameters.inner_mass == 30
 
 
 def test_distributions_are_asked_about_too() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 import warpchain
 from warpchain.inputs.validation import InputError
-from warpchain.loop.stationary_loop import FIELDS, BeforeRelease
+from warpchain.loop.stationary_loop import LOOP_FIELDS, BeforeRelease
 from warpchain.results.one_walk import run_walk
 
 BRIEF = {
@@ -15,7 +15,7 @@ BRIEF = {
     "frequency": 12.0,
     "preset": "soft",
     "start": "spinning",
-    "further_hold": 0.5,  # under its own loads, and nothing else is kept of the time before the release
+    "extra_hold": 0.5,  # under its own loads, and nothing else is kept of the time before the release
     "walk_limit": 0.05,
 }
 """The first 50 ms of a walk, half a second after its loop has become stationary."""
@@ -49,7 +49,7 @@ def test_a_sweep_keeps_them(tmp_path: Path) -> None:
         "seed": 5,
         "preset": "soft",
         "samples": 2,
-        "scene": {key: BRIEF[key] for key in ("links", "start", "walk_limit", "further_hold")},
+        "scene": {key: BRIEF[key] for key in ("links", "start", "walk_limit", "extra_hold")},
         "grid": {"frequency": [12.0, 14.0]},
         "distributions": {"all": "fixed", "clearance": "table"},
         "record": {"series": True, "frames": {"samples": [0], "before": 0.2}},
@@ -60,12 +60,12 @@ def test_a_sweep_keeps_them(tmp_path: Path) -> None:
     kept, expected = of_sweep.before_release, run_walk(of_sweep.setup, record_before=0.2).before_release
     assert result.series(frequency=12, sample=1).before_release is None
     assert isinstance(kept, BeforeRelease) and expected is not None
-    for name in FIELDS:
+    for name in LOOP_FIELDS:
         ours, theirs = getattr(kept, name), getattr(expected, name)
         single = name.startswith("frame_") and name != "frame_time"
         np.testing.assert_array_equal(ours, theirs.astype(np.float32) if single else theirs)
     assert of_sweep.mean_loop().kink().dip < 0
     with pytest.raises(InputError, match=r"sweep\.record\.series\.before: unknown name"):
         warpchain.sweep(content | {"record": {"series": {"before": 0.1}}}, tmp_path / "three")
-    with pytest.raises(InputError, match=r"sweep\.record\.frames\.before: .*; given -1"):
+    with pytest.raises(InputError, match=r"sweep\.record\.frames\.before: .*, got -1"):
         warpchain.sweep(content | {"record": {"series": True, "frames": {"before": -1}}}, tmp_path / "three")

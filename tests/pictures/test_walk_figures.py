@@ -19,9 +19,9 @@ from warpchain.inputs.parameters import preset
 from warpchain.inputs.scene import Scene
 from warpchain.pictures.animation import Film
 from warpchain.pictures.chain import link_outlines
-from warpchain.pictures.labels import differences, kinds_of
+from warpchain.pictures.labels import differences
 from warpchain.pictures.style import on_paper, save_figure
-from warpchain.pictures.walk_figures import draw, film_strip
+from warpchain.pictures.walk_figures import draw, film_strip, kinds_of
 from warpchain.status import Status
 
 RADIUS = 4.2e-3
@@ -170,7 +170,7 @@ def test_film_strips_of_odd_walks() -> None:
 def test_film_strip_shows_two_sides_of_a_plane_that_tilts() -> None:
     """Two views of the same instants, to one scale."""
     walk = make_tilting_walk()
-    joints = walk.joints_in_room
+    joints = walk.joints_lab
     assert joints is not None
     figure = film_strip(walk)
     side, above = figure.axes

@@ -119,7 +119,7 @@ def test_further_axes_are_panels(tmp_path: Path) -> None:
     grid = {"links": [60, 90], "start": ["rest", "ellipse"], "gravity": GRAVITY, "floor_friction": FRICTION}
     drawn = panels(make_sweep(tmp_path / "four", sweep(grid)).plot())
     assert list(drawn) == [f"$n$ = {n}, start = {start}" for n in (60, 90) for start in ("rest", "ellipse")]
-    counts = {"gravity": 6, "settle_time": 5, "further_hold": 7, "walk_limit": 8}
+    counts = {"gravity": 6, "settle_time": 5, "extra_hold": 7, "walk_limit": 8}
     grid = {name: list(range(1, 1 + count)) for name, count in counts.items()}
     figure = make_sweep(tmp_path / "many", sweep(grid, samples=1), lambda walk: 1.0 + walk.index).plot()
     assert len(panels(figure)) == MOST_PANELS
@@ -177,7 +177,7 @@ def test_any_column_of_numbers(tmp_path: Path, command: Command) -> None:
         ((_, drawn),) = lines(*panels(figure).values())
         np.testing.assert_array_equal(drawn, result.statistics(quantity).mean)
     for name in ("status", "index", "gravity", "walk_tim"):
-        with pytest.raises(InputError, match=rf"^quantity: '{name}' is no column of numbers; "):
+        with pytest.raises(InputError, match=rf"^quantity: '{name}' is not a column of numbers; "):
             result.plot(quantity=name)
     assert command("plot", ".", "-o", "drawn", "--quantity", "walk_time").out == "drawn/walk_time_against_gravity.png\n"
     assert command("plot", ".", "-o", "none", "--quantity", "walk_tim").status == 2 and not Path("none").exists()
@@ -212,7 +212,7 @@ def test_what_a_walk_does_not_have_is_in_no_mean(tmp_path: Path, command: Comman
         assert found.failed.tolist() == [0, 1, 0, 0]
         assert result.plot(quantity=quantity).axes[0].get_xlabel().endswith("\n1 of 12 walks failed, 6 of 12 have none")
     assert result.statistics().count.tolist() == [3, 2, 3, 3] and not result.statistics().absent.any()
-    with pytest.raises(NothingToShow, match="no walk has this quantity; give another"):
+    with pytest.raises(NothingToShow, match="no walk has this quantity; use another"):
         result.plot(quantity="hold_time")
     answer = command("plot", ".", "--quantity", "hold_time")
     assert answer.status == 2 and answer.err.startswith("error: --quantity: hold_time: no walk at rest has a value")
@@ -270,7 +270,7 @@ def test_the_axis_along_x_may_be_chosen(tmp_path: Path) -> None:
     means = result.statistics().mean[..., np.argsort(FRICTION)]
     for row, axes in enumerate(drawn.values()):
         np.testing.assert_array_equal([mean for _, mean in lines(axes)], means[row])
-    with pytest.raises(InputError, match=r"^x: 'gravity' is no axis of several values; give one of links, freq"):
+    with pytest.raises(InputError, match=r"^x: 'gravity' is not an axis with several values; use one of links, freq"):
         result.plot(x="gravity")
 
 

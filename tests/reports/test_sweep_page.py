@@ -42,7 +42,7 @@ def test_walks_that_ended_as_planned_are_no_failures(tmp_path: Path, command: Co
     assert [dict(zip(head, row, strict=True))["ended as asked"] for row in rows] == ["1", "1"]
     answer = command("info", str(directory))
     assert answer.status == 0 and "ended as asked" in answer.out
-    with pytest.raises(InputError, match="no walk has this quantity; give another, such as quantity='walk_time'"):
+    with pytest.raises(InputError, match="no walk has this quantity; use another"):
         load(directory).plot()
 
 
@@ -156,7 +156,7 @@ def test_walk_is_run_again(folder: Path, tmp_path: Path, monkeypatch: pytest.Mon
     asked = with_walk(monkeypatch, make_walk, dx=dx)
     write_report(folder, tmp_path / "report.html", animation_of=5)
     document = Document((tmp_path / "report.html").read_text(encoding="utf-8"))
-    assert asked == [load_sweep(result.sweep).planned(5).setup]
+    assert asked == [load_sweep(result.sweep).walk(5).setup]
     text = document.texts["one-walk"]
     assert f"Walk 5 (block ellipse, n = 120, ν = 20 Hz, sample 0), run again for this page: Δx = {dx:.4f} m" in text
     assert "The sweep has the same, to the bit." in text
@@ -238,6 +238,8 @@ def test_a_report_replaces_reports_only(folder: Path, tmp_path: Path, content: s
     else:
         target.write_text(content, encoding="utf-8")
     before = target.read_bytes()
-    with pytest.raises(OSError, match=r"index\.html: is there and is no page that warpchain report has written; give"):
+    with pytest.raises(
+        OSError, match=r"index\.html: already exists and is not a page that warpchain report has written; use"
+    ):
         write_report(folder, target)
     assert target.read_bytes() == before and list(tmp_path.iterdir()) == [target]

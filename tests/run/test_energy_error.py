@@ -78,7 +78,7 @@ def test_the_smallest_circle_tells_what_sank_in(circles: dict[str, Any], drawn: 
     sweep = load_sweep(
         {"version": 1, "name": "s", "seed": 1, "preset": "paper", "samples": 1, "distributions": draws, **given}
     )
-    setup = sweep.planned(0).setup
+    setup = sweep.walk(0).setup
     narrowest = setup.link_values.radius.min()
     lengths = {name: sweep.blocks[0].parameter(name) for name in LENGTHS}
     for depth, sank in ((0.999 * narrowest, False), (1.001 * narrowest, True)):

@@ -11,7 +11,8 @@ from pydantic.fields import FieldInfo
 
 import warpchain
 from tests.support.sweep_content import content
-from warpchain.inputs.validation import FIELDS, InputError
+from warpchain.inputs.fields import FIELDS
+from warpchain.inputs.validation import InputError
 from warpchain.results.sweep_result import merge
 from warpchain.run.sweep_run import sweep_of_keywords
 from warpchain.sweeps.block import is_axis
@@ -34,7 +35,7 @@ def sweep(out: Path, **changes: Any) -> warpchain.SweepResult:
 
 def test_heaps_slide_down_slopes_with_the_acceleration_of_a_block(tmp_path: Path) -> None:
     """Over slope × friction of the floor, collapsed chains gain g (sin α − μ cos α) a second."""
-    scene = {"start": "ellipse", "links": 12, "frequency": 2, "walk_until": 1.2}
+    scene = {"start": "ellipse", "links": 12, "frequency": 2, "stop_time": 1.2}
     result = sweep(tmp_path, scene=scene, grid={"slope": [25, 35], "floor_friction": [0.1, 0.2]})
     for degrees, friction in np.ndindex(2, 2):
         angle, mu = np.radians(result.axes["slope"][degrees]), result.axes["floor_friction"][friction]
@@ -63,18 +64,18 @@ def test_named_floors_are_an_axis_of_the_walks_that_each_floor_gives_alone(tmp_p
     assert [list(point) for point in again.setup.scene.floor] == STEP and again.dx == result.dx[1, 1, 0]
     texts = [text.get_text() for text in result.plot(x="frequency").legends[0].get_texts()]
     assert texts[:2] == ["flat", "step"]
-    with pytest.raises(InputError, match=r"^floor: 'steps' is not on the axis; give one of flat, step$"):
+    with pytest.raises(InputError, match=r"^floor: 'steps' is not on the axis; use one of flat, step$"):
         result.walk(floor="steps", frequency=6)
 
 
 def test_a_sweep_by_keywords_takes_one_floor_or_names_with_floors() -> None:
     """Points are one floor, names with points an axis; releases and values of links likewise, null among them."""
     one = sweep_of_keywords({"links": [40, 60], "floor": STEP, "samples": 1}, "x")
-    assert list(one.blocks[0].axes) == ["links"] and [*map(list, one.planned(0).setup.scene.floor)] == STEP
+    assert list(one.blocks[0].axes) == ["links"] and [*map(list, one.walk(0).setup.scene.floor)] == STEP
     masses = {"own": None, "heavy": [0.02] * 40}
     lifts = {"none": None, "lift": [[0.1, 0.0, 0.02, 15.0]]}
     both = sweep_of_keywords({"links": 40, "link_masses": masses, "release": lifts, "samples": 1}, "x")
-    scenes = [both.planned(index).setup.scene for index in range(4)]
+    scenes = [both.walk(index).setup.scene for index in range(4)]
     assert [scene.link_masses for scene in scenes] == [None, None, (0.02,) * 40, (0.02,) * 40]
     assert [scene.release for scene in scenes] == [None, ((0.1, 0.0, 0.02, 15.0),)] * 2
     assert load_sweep(both.canonical()).digest() == both.digest() != one.digest()
@@ -94,17 +95,17 @@ def test_a_mapping_that_a_field_takes_is_its_value(monkeypatch: pytest.MonkeyPat
 @pytest.mark.parametrize(
     ("grid", "message"),
     [
-        ({"floor": [STEP]}, r"floor: no names; give each value one, as in floor: \{flat: flat, .*"),
-        ({"floor": {"back": [[0, 0], [-1, 0]]}}, r"floor\.back: point 1 lies behind the one before it; .*"),
+        ({"floor": [STEP]}, r"floor: expected a name for each value; use e\.g\. floor: \{flat: flat, .*"),
+        ({"floor": {"back": [[0, 0], [-1, 0]]}}, r"floor\.back: point 1 lies behind the point before it; .*"),
         ({"floor": {"a step": STEP}}, r"floor\.'a step': String should match pattern .*"),
-        ({"floor": NAMED, "slope": [0, 5]}, r"slope\[1\]: 5\.0 of a floor that is a profile; .*"),
+        ({"floor": NAMED, "slope": [0, 5]}, r"slope\[1\]: not possible with a profile; .*"),
         (
             {"links": [4], "link_radii": {"wide": [4e-3, 7e-3] * 2}},
-            r"link_radii\.wide\[1\]: 0\.007 is not below half a link, .*",
+            r"link_radii\.wide\[1\]: expected less than half a link, .*",
         ),
         (
             {"release": {"lift": [[0.1, 0, 0.02, 0]]}},
-            r"release\.lift: a motion of the sprocket, which start: ellipse .*",
+            r"release\.lift: a motion of the sprocket is not possible with start: ellipse.*",
         ),
     ],
 )
@@ -117,5 +118,5 @@ def test_refusals(grid: dict[str, Any], message: str) -> None:
 @pytest.mark.parametrize("floors", [["flat", STEP], [STEP, STEP[:2]]])
 def test_several_values_by_keyword_need_names(floors: list[Any]) -> None:
     """As an axis of a file does."""
-    with pytest.raises(InputError, match=r"^sweep\.grid\.floor: no names; give each value one, .*"):
+    with pytest.raises(InputError, match=r"^sweep\.grid\.floor: expected a name for each value; .*"):
         sweep_of_keywords({"links": 36, "frequency": 20, "floor": floors}, None)

@@ -3,8 +3,8 @@
 import numpy as np
 
 from tests.support.setups import setup_walk
+from warpchain.inputs.fields import SECTION_OF
 from warpchain.inputs.scene import OF_LINKS
-from warpchain.inputs.validation import SECTION_OF
 
 
 def of_numpy(value):
@@ -19,7 +19,7 @@ def test_every_setting_takes_a_numpy_value():
         | {"unusual_values": True}
         | {"release": [[0.2, 0.0, 0.1, 0.0]], "distance_limit": 5.0}
     )
-    drive = {"load_factor": 2.0, "steady_time": 0.5, "settle_time": 0.2, "walk_until": 1.0, "charm_radius": 2e-3}
+    drive = {"load_factor": 2.0, "steady_time": 0.5, "settle_time": 0.2, "stop_time": 1.0, "charm_radius": 2e-3}
     setup = setup_walk("soft", drive | each, 5)
     given = {**setup.parameters.model_dump(), **setup.scene.model_dump(), **setup.options.model_dump()}
     assert given.keys() == SECTION_OF.keys() and None not in given.values()

@@ -77,7 +77,7 @@ def test_settings_of_a_walk_are_those_of_a_sweep(tmp_path):
     presets = sweep_of_keywords({"samples": 1, "preset": ["soft", "paper"]}, "presets")
     assert presets.blocks[0].axes == {"preset": ("soft", "paper")}
     assert refused(samples=1, links=[60], grid={"links": [60]}, out=tmp_path) == [
-        "links: given twice, also in grid; leave one out"
+        "links: given twice, also in grid; remove one"
     ]
     unsaid = dict.fromkeys(("frequency", "method", "tolerance", "name"))
     assert warpchain.sweep(links=30, samples=1, **SHORT, **unsaid, out=tmp_path / "unsaid").walk_count == 1
@@ -88,7 +88,7 @@ def test_notebooks_complete_the_names():
     """The signatures of walk, sweep and simulate name every field that they take."""
     for function, name, missing in (
         (warpchain.walk, "floor_friction", "soften"),
-        (warpchain.sweep, "walk_until", "soften"),
+        (warpchain.sweep, "stop_time", "soften"),
         (warpchain.simulate, "skin", "links"),
     ):
         names = inspect.signature(function).parameters
@@ -169,12 +169,12 @@ def test_parameter_sets(tmp_path):
     data = result.to_xarray()
     assert data.floor_friction.dims == ("point",) and (data.floor_friction == table["mu_fc"]).all()
     for place, index in np.ndenumerate(result.index):
-        setup = result.origin.planned(int(index)).setup
+        setup = result.origin.walk(int(index)).setup
         assert setup.parameters.floor_friction == table["mu_fc"][place[0]]
     lines = refused(points={"mu_fc": [0.1, 0.2], "R": [0.05]}, mu_fc=0.2, samples=1, out=tmp_path)
-    assert lines == ["sweep.points.floor_friction: also given in parameters; leave one out"]
+    assert lines == ["sweep.points.floor_friction: given twice, also in parameters; remove one"]
     lines = refused(points={"mu_fc": [0.1, 0.2], "R": [0.05]}, samples=1, out=tmp_path)
-    assert lines[0].startswith("sweep.points.sprocket_radius: 1 values, not 2; give as many")
+    assert lines[0].startswith("sweep.points.sprocket_radius: expected 2 values, as floor_friction has, got 1")
 
 
 def test_all_errors_are_told_at_once(tmp_path):
@@ -207,8 +207,8 @@ def test_all_errors_are_told_at_once(tmp_path):
         ({"samples": 1, "grid": {"links": [28]}}, "sweep.grid.links[0]: 28 links do not reach round"),
         ({"samples": 1, "same_samples_along": ["links"]}, "sweep.same_samples_along: 'links' is no axis"),
         ({"preset": "soft", "links": 60, "source": {"version": 1}}, "preset, links: given together with a source"),
-        ({"samples": 1, "start": ...}, "sweep.scene.start: Input should be"),
-        ({"samples": 1, "part": "3/2"}, "part: '3/2' is no part; give k/N"),
+        ({"samples": 1, "start": ...}, "sweep.scene.start: expected"),
+        ({"samples": 1, "part": "3/2"}, "part: expected k/N"),
         ({"samples": 1, "grid": {"device": ["cpu", "cuda"]}, "device": "cpu"}, "sweep.grid: method is "),
     ],
     ids=str,

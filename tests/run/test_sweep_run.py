@@ -43,7 +43,7 @@ def outcome(run) -> tuple:
 
 def outcomes(setups, **how) -> list:
     """What each of the walks gave, in their order."""
-    found = {place: outcome(run) for place, run in run_setups(setups, **how)}
+    found = {place: outcome(run) for over in run_setups(setups, **how) for place, run in over}
     return [found[place] for place in range(len(setups))]
 
 

@@ -10,33 +10,25 @@ from pathlib import Path
 import pytest
 
 import warpchain
-import warpchain.run.sweep_run as runner
 from tests.run.test_sweep_run import TINY
 from warpchain.engine.devices import gpu_turn, has_gpu_turn
-from warpchain.run.sweep_run import run_shards, sweep
-from warpchain.store.shards import Manifest
-from warpchain.sweeps.plan import load_sweep
+from warpchain.run.sweep_run import sweep
 
 
 @pytest.mark.parametrize(("device", "at_most"), [("cuda", 1), ("cpu", 2)])
-def test_threads_take_turns_on_a_gpu(monkeypatch: pytest.MonkeyPatch, device: str, at_most: int) -> None:
-    """Tasks of two threads run at the same time on a CPU, one after the other on a GPU."""
-    planned = load_sweep(TINY | {"options": {"method": "dp5", "device": device}})
+def test_threads_take_turns_on_a_gpu(device: str, at_most: int) -> None:
+    """Two threads with a turn each work at the same time on a CPU, one after the other on a GPU."""
     inside, most = [], []
 
-    def run_walks(*given: object, **named: object) -> list[object]:
-        inside.append(given)
-        time.sleep(0.2)
-        most.append(len(inside))
-        inside.pop()
-        return []
+    def work() -> None:
+        with gpu_turn([device]):
+            inside.append(device)
+            time.sleep(0.2)
+            most.append(len(inside))
+            inside.pop()
 
-    shards = Manifest(planned, 8).wanted
-    monkeypatch.setattr(runner, "compile_kernels", lambda setups: None)
-    monkeypatch.setattr(runner, "run_setups", run_walks)
-    monkeypatch.setattr(runner, "check_numerics", lambda directory: None)
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
-        for task in [pool.submit(run_shards, planned, "", "", [shard]) for shard in shards[:2]]:
+        for task in [pool.submit(work) for _ in range(2)]:
             task.result()
     assert max(most) == at_most and len(most) == 2
 

@@ -38,7 +38,7 @@ def test_more_gpus_than_there_are_are_refused(monkeypatch: pytest.MonkeyPatch, c
     monkeypatch.setattr("warpchain.engine.devices.gpu_count", lambda: 1)
     answer = command("sweep", "figure6", "-o", "sweep", "--gpus", "2")
     assert answer.status == 2 and not Path("sweep").exists()
-    assert answer.err == "error: --gpus: 2 wanted, but this machine has 1; give at most 1\n"
+    assert answer.err == "error: --gpus: expected at most 1, the GPUs of this machine, got 2; use at most 1\n"
 
 
 def test_an_exception_ends_what_workers_are_doing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -59,9 +59,9 @@ def test_a_missing_gpu_leaves_no_folder(given: list[str], monkeypatch: pytest.Mo
     """One line names the option and says that there is no GPU, before the folder is made."""
     monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
     answer = command("sweep", "figure6", "-o", "sweep", *given)
-    problem = f"--gpus: {given[1]} wanted, but this machine has 0; leave it out to run on the CPU"
+    problem = f"--gpus: expected at most 0, the GPUs of this machine, got {given[1]}; remove it to run on the CPU"
     if given[0] == "--device":
-        problem = "options.device: there is no cuda on this machine; give one of cpu"
+        problem = "options.device: cuda is not available on this machine; use one of cpu"
     assert answer.err == f"error: {problem}\n"
     assert answer.status == 2 and not Path("sweep").exists()
 

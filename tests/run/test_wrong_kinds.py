@@ -15,11 +15,11 @@ from tests.support.command_line import Command
 from tests.support.made_sweeps import make_sweep
 from tests.support.presets import SOFT
 from tests.support.sweep_content import content
-from warpchain import films
+from warpchain import video
 from warpchain.inputs.validation import InputError
 from warpchain.reports.sweep_figures import figures as sweep_figures
 
-SHORT: dict[str, Any] = {"start": "ellipse", "walk_until": 0.02, "links": 40, "preset": "soft"}
+SHORT: dict[str, Any] = {"start": "ellipse", "stop_time": 0.02, "links": 40, "preset": "soft"}
 
 
 def joined() -> tuple[Any, Any]:
@@ -33,7 +33,7 @@ def joined() -> tuple[Any, Any]:
     ("call", "problem"),
     [
         (lambda: warpchain.sweep(links=[40], out="never", executor=3), "executor: expected one with submit, such as "),
-        (lambda: films.film_of(3), "walk: expected a WalkResult, got 3"),  # type: ignore[arg-type]
+        (lambda: video.video_of(3), "walk: expected a WalkResult, got 3"),  # type: ignore[arg-type]
         (
             lambda: warpchain.sweep(points={"mu": [0.1]}, out="never"),
             "sweep.points.mu: unknown name; did you mean mu_fc, ",
@@ -43,21 +43,21 @@ def joined() -> tuple[Any, Any]:
         (lambda: warpchain.walk(tau=0.1), "'tau': unknown name; did you mean tau_c?"),
         (
             lambda: warpchain.walk(links=[40, 60]),
-            "scene.links: [40, 60] is several values, and a walk has one; use warpc",
+            "scene.links: expected one value for a walk, got [40, 60]; use warpc",
         ),  # type: ignore[arg-type]
         (
             lambda: warpchain.walk(mu_fc=[0.1, 0.2]),
-            "parameters.floor_friction: [0.1, 0.2] is several values, and a walk h",
+            "parameters.floor_friction: expected one value for a walk, got [0.1, ",
         ),
         (
             lambda: warpchain.simulate("soft", *joined()),
-            "duration: missing, and so is times; give the simulated time in s",
+            "duration: missing; set it in s, or set times",
         ),
-        (lambda: warpchain.load(None), "path: None is no path; give one as text"),  # type: ignore[arg-type]
-        (lambda: warpchain.load(""), "path: '' is no path; give one as text"),
-        (lambda: warpchain.load([]), "path: an empty list; give the folders of a sweep"),
-        (lambda: warpchain.load_walk(None), "path: None is no path; give one as text"),  # type: ignore[arg-type]
-        (lambda: warpchain.load_walk(0), "path: 0 is no path; give one as text"),  # type: ignore[arg-type]
+        (lambda: warpchain.load(None), "path: expected a path, got None; pass it as text"),  # type: ignore[arg-type]
+        (lambda: warpchain.load(""), "path: expected a path, got ''; pass it as text"),
+        (lambda: warpchain.load([]), "path: expected folders of a sweep, got an empty list"),
+        (lambda: warpchain.load_walk(None), "path: expected a path, got None; pass it as text"),  # type: ignore[arg-type]
+        (lambda: warpchain.load_walk(0), "path: expected a path, got 0; pass it as text"),  # type: ignore[arg-type]
     ],
 )
 def test_one_line_has_the_right_name(call: Callable[[], object], problem: str) -> None:

@@ -93,7 +93,7 @@ def test_info_tells_a_damaged_file_from_another(tmp_path: Path, command: Command
     shard = next((tmp_path / "sweep/shards").iterdir())
     answer = command("info", str(shard))
     assert answer.status == 2
-    assert answer.err.startswith(f"error: {shard}: a warpchain shard, not a warpchain sweep result; give")
+    assert answer.err.startswith(f"error: {shard}: expected a warpchain sweep result, got a warpchain shard; use")
 
 
 @pytest.mark.parametrize("version", [FORMAT_VERSION - 1, FORMAT_VERSION + 1])

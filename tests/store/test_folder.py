@@ -202,7 +202,7 @@ def test_only_what_a_sweep_has_written_is_deleted(tmp_path: Path, name: str) -> 
 def test_files_of_others_are_not_touched(tmp_path: Path, name: str, fresh: bool) -> None:
     """A folder that has such a name for something else is refused, even to start anew."""
     (tmp_path / name).write_text("mine: true")
-    with refused(InputError, tmp_path, str(tmp_path / name), "give"):
+    with refused(InputError, tmp_path, str(tmp_path / name), "use"):
         open_folder(tmp_path, fresh=fresh)
     assert (tmp_path / name).read_text() == "mine: true" and os.listdir(tmp_path) == [name]
 
@@ -252,7 +252,7 @@ def test_a_folder_of_an_earlier_version_is_refused(tmp_path: Path) -> None:
     (tmp_path / "sweep.json").write_text("{}")
     with refused(InputError, tmp_path, "a sweep of an earlier warpchain; read it with that version"):
         load(tmp_path)
-    with refused(InputError, tmp_path, "give another folder"):
+    with refused(InputError, tmp_path, "use another folder"):
         open_folder(tmp_path)
 
 

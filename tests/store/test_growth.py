@@ -17,7 +17,7 @@ from warpchain.results import sweep_result
 from warpchain.results.sweep_result import SweepResult, load, merge
 from warpchain.store.folder import SweepFolder
 from warpchain.store.shards import Manifest, read_manifest
-from warpchain.sweeps.designs import EXTENSIBLE
+from warpchain.sweeps.designs import SAMPLERS
 from warpchain.sweeps.plan import PlannedWalk, load_sweep
 
 
@@ -29,7 +29,7 @@ def two_blocks(first: int, second: int, **changes: Any) -> dict[str, Any]:
 
 def drawn_distance(walk: PlannedWalk) -> float:
     """A distance that depends on what the walk is, and not on its number [m]."""
-    return walk.setup.scene.links + walk.setup.scene.frequency / 7 + sum(walk.drawn.values())
+    return walk.setup.scene.links + walk.setup.scene.frequency / 7 + sum(walk.draws.values())
 
 
 def columns(result: SweepResult) -> dict[tuple[str, str], bytes]:
@@ -41,7 +41,7 @@ def columns(result: SweepResult) -> dict[tuple[str, str], bytes]:
     }
 
 
-@pytest.mark.parametrize("sampler", EXTENSIBLE)
+@pytest.mark.parametrize("sampler", [name for name, sampler in SAMPLERS.items() if sampler.grows])
 def test_a_grown_sweep_is_the_larger_one(tmp_path: Path, sampler: str) -> None:
     """Grown twice, in one block or both, a folder gives the larger sweep to the bit; no shard changes."""
     drawn = {"distributions": {"all": "fixed", "floor_friction": UNIFORM, "phase": {"uniform": [0, 1]}}}
@@ -102,10 +102,10 @@ HYPERCUBE = content(samples=8, sampler="latin_hypercube")
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (HYPERCUBE, "but a latin_hypercube does not grow; give samples: 4"),
+        (HYPERCUBE, "but a latin_hypercube design cannot grow; use samples: 4"),
         (
             content(samples=3),
-            "holds 4 samples of each cell of block main, but 3 are asked for; give samples: 4 or more",
+            "holds 4 samples of each cell of block main, but 3 are requested; use samples: 4 or more",
         ),
         (content(samples=8, seed=8), "holds another sweep"),
         (content(samples=8, grid={"links": [60, 90], "frequency": [5, 12]}), "holds another sweep"),

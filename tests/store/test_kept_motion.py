@@ -1,5 +1,6 @@
 """Series and frames that a sweep keeps of its walks: what they are, that they survive, and who reads them."""
 
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -54,8 +55,8 @@ def test_kept_is_what_the_walk_itself_gives(tmp_path: Path) -> None:
 def test_a_coarser_interval_keeps_every_so_many_rows_and_the_last() -> None:
     """Kept are the rows at whole multiples of the interval, as a fine series has them, and the last sample."""
     setup = brief_setup(3, record_interval=1e-4)
-    ((_, fine),) = run_setups([setup], keeps=[Keep(series_every=1)])
-    ((_, coarse),) = run_setups([setup], keeps=[Keep(series_every=7)])
+    (((_, fine),),) = run_setups([setup], keeps=[Keep(series_every=1)])
+    (((_, coarse),),) = run_setups([setup], keeps=[Keep(series_every=7)])
     whole, kept = fine.recorder.motion(), coarse.recorder.motion()
     marks = np.arange(0.0, 0.01, 7e-4)
     assert kept["time"][:-1] == pytest.approx(marks) and kept["time"][-1] == whole["time"][-1] == pytest.approx(0.01)
@@ -79,7 +80,7 @@ def test_motions_do_not_depend_on_their_batch() -> None:
     def run(order: list[int], slots: int) -> list[tuple[bytes, object]]:
         found = {}
         runs = run_setups([setups[i] for i in order], keeps=[keeps[i] for i in order], slots=slots)
-        for place, run in runs:
+        for place, run in chain.from_iterable(runs):
             found[order[place]] = (motion_bytes(run.recorder.motion()), outcome(run))
         return [found[i] for i in range(len(setups))]
 
@@ -93,8 +94,8 @@ def test_a_fixed_plane_has_no_places_in_the_room_beside_one_that_tilts() -> None
     """Frames of a walk in a fixed plane are those of the walk alone, whatever ran with it."""
     setups = [brief_setup(1, plane=plane) for plane in ("tilting", "fixed")]
     keeps = [Keep(series_every=1, frame_every=1)] * 2
-    motions = {place: run.recorder.motion() for place, run in run_setups(setups, keeps=keeps)}
-    ((_, alone),) = run_setups(setups[1:], keeps=keeps[1:])
+    motions = {place: run.recorder.motion() for over in run_setups(setups, keeps=keeps) for place, run in over}
+    (((_, alone),),) = run_setups(setups[1:], keeps=keeps[1:])
     assert len(motions[0]["frame_origin"]) == len(motions[0]["frame_time"]) > 3
     assert motion_bytes(motions[1]) == motion_bytes(alone.recorder.motion())
 
@@ -102,7 +103,7 @@ def test_a_fixed_plane_has_no_places_in_the_room_beside_one_that_tilts() -> None
 def test_long_motions_are_drained_between_launches() -> None:
     """A series longer than the device's record has a row at every mark, in order and without a gap."""
     setup = brief_setup(1, record_interval=1e-6, walk_limit=0.04)  # a sample after each step
-    ((_, run),) = run_setups([setup], keeps=[Keep(series_every=1, frame_every=10)])
+    (((_, run),),) = run_setups([setup], keeps=[Keep(series_every=1, frame_every=10)])
     time = run.recorder.motion()["time"]
     assert run.outcome().steps_accepted > 3 * CAPACITY_SAMPLES
     np.testing.assert_allclose(time, np.arange(40_001) * 1e-6, rtol=1e-12)
@@ -120,12 +121,12 @@ def test_only_chosen_samples_are_kept(kept: Path) -> None:
     assert len(last.frame_time) == pytest.approx(20, abs=1) and first.sprocket_center is None
     assert last.setup.scene.links == 44
     for message, at in (
-        (r"walk 6 is not there; give one of the samples 0, 3", {"links": 44, "frequency": 5, "sample": 1}),
-        (r"frequency: 6 is not on the axis; give one of 5\.0, 15\.0", {"links": 44, "frequency": 6}),
-        (r"frequency: missing; give one of 5\.0, 15\.0", {"links": 44}),
-        (r"link: no axis of block main; did you mean links", {"link": 44}),
-        (r"sample: there is no sample 5; give 0 to 4", {"links": 44, "frequency": 5, "sample": 5}),
-        (r"sample: there is no sample True", {"links": 44, "frequency": 5, "sample": True}),
+        (r"walk 6 is not there; use one of the samples 0, 3", {"links": 44, "frequency": 5, "sample": 1}),
+        (r"frequency: 6 is not on the axis; use one of 5\.0, 15\.0", {"links": 44, "frequency": 6}),
+        (r"frequency: missing; use one of 5\.0, 15\.0", {"links": 44}),
+        (r"link: not an axis of block main; did you mean links", {"link": 44}),
+        (r"sample: expected 0 to 4, got 5", {"links": 44, "frequency": 5, "sample": 5}),
+        (r"sample: expected 0 to 4, got True", {"links": 44, "frequency": 5, "sample": True}),
     ):
         with pytest.raises(InputError, match=message):
             result.series(**at)

@@ -21,9 +21,7 @@ def test_a_sweep_that_memory_cannot_hold_makes_no_folder(command: Command, monke
     monkeypatch.setattr("warpchain.run.sweep_run.free_memory", lambda: 1e5)
     answer = command("sweep", "figure6", "-o", "sweep")
     assert answer.status == 2 and not Path("sweep").exists() and answer.err.count("\n") == 1
-    assert (
-        answer.err.startswith("error: samples: ") and "GB of memory, and 0.0001 GB are free; give fewer" in answer.err
-    )
+    assert answer.err.startswith("error: samples: ") and "GB of memory, and 0.0001 GB are free; use fewer" in answer.err
 
 
 def test_memory_that_runs_out_is_one_line(command: Command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -36,7 +34,7 @@ def test_memory_that_runs_out_is_one_line(command: Command, monkeypatch: pytest.
     monkeypatch.setattr(sweep_result, "read_rows", fail)
     answer = command("info", "sweep")
     assert answer.status == 1
-    assert answer.err == "error: out of memory (Unable to allocate 11 TiB); give less at once, or free memory\n"
+    assert answer.err == "error: out of memory (Unable to allocate 11 TiB); compute less at once, or free memory\n"
 
 
 def test_an_error_of_the_system_gets_path_and_remedy(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:

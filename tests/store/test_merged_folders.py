@@ -22,12 +22,12 @@ from warpchain.run.sweep_run import sweep
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (content(), "has walks that a folder before it has; give each part"),
-        (content(samples=5), "is not the sweep of a, with the same seed and samples"),
-        (content(seed=8), "is not the sweep of"),
-        (content(grid={"links": [60, 90], "frequency": [5, 12]}), "is not the sweep of"),
-        (content(options={"tolerance": 1e-5}), "is not the sweep of"),
-        (blocks({"grid": {"links": [60, 90]}}, {"grid": {"frequency": [5, 10]}}), "is not the sweep of"),
+        (content(), "repeats walks of an earlier folder; pass each part"),
+        (content(samples=5), "expected a part of the sweep in a, got another sweep"),
+        (content(seed=8), "expected a part of the sweep in"),
+        (content(grid={"links": [60, 90], "frequency": [5, 12]}), "expected a part of the sweep in"),
+        (content(options={"tolerance": 1e-5}), "expected a part of the sweep in"),
+        (blocks({"grid": {"links": [60, 90]}}, {"grid": {"frequency": [5, 10]}}), "expected a part of the sweep in"),
     ],
 )
 def test_folders_that_do_not_fit_are_refused(
@@ -64,7 +64,7 @@ def test_parts_of_one_grid_are_the_whole(command: Command) -> None:
     with pytest.warns(InputWarning, match=r"two\.h5: 12 of 36 walks are missing"):
         merge(["part-1", "part-2"], "two.h5")
     assert command("merge", "part-1", "all.h5", "twice.h5").status == 2
-    with pytest.raises(InputError, match=r"holds part 1/3 of its sweep, not 2/3; give --part 1/3"):
+    with pytest.raises(InputError, match=r"holds part 1/3 of its sweep, not 2/3; use --part 1/3"):
         sweep("tiny.yaml", "part-1", seed=11, samples=9, part="2/3")
 
 

@@ -37,7 +37,7 @@ def test_a_sweep_with_null_on_an_axis_runs_from_yaml_and_from_python(name: str, 
     assert result.axes[name].tolist() == other.axes[name].tolist() == AXES[name]
     np.testing.assert_array_equal(result.energy_error, other.energy_error)
     sweep = load_sweep("a/sweep.yaml")
-    setups = [sweep.planned(index).setup for index in result.index[0, :, 0].tolist()]
+    setups = [sweep.walk(index).setup for index in result.index[0, :, 0].tolist()]
     assert [getattr(setup.scene, name, getattr(setup.options, name, "")) for setup in setups] == AXES[name]
     assert sweep.digest() == result.provenance["digest"] == other.provenance["digest"]
     assert "null" in command("sweep", "a/sweep.yaml", "-o", "a").out

@@ -91,7 +91,7 @@ def test_a_lost_manifest_is_rebuilt_of_the_shards(tmp_path: Path, harm: Callable
     harm(folder / "sweep.h5")
     with pytest.raises(DamagedFileError, match=r"run the sweep in this folder again; all shards are kept$"):
         load(folder)
-    with pytest.warns(InputWarning, match=f"^{folder / 'sweep.h5'}: was lost or damaged; written anew"):
+    with pytest.warns(InputWarning, match=f"^{folder / 'sweep.h5'}: was missing or damaged; it was written again"):
         with SweepFolder.open(folder, SWEEP, shard_size=SHARD_SIZE) as store:
             assert store.missing() == []
     assert content(folder) == expected == content(tmp_path / "whole")
@@ -108,13 +108,13 @@ def test_a_manifest_is_rebuilt_for_the_sweep_of_the_shards_only(tmp_path: Path) 
     for sweep, part, problem in (
         (other, (1, 2), "the shards are of another sweep; use that sweep"),
         (fewer, (1, 2), "the shards are of another sweep; use that sweep, with as many samples"),
-        (ONE_BLOCK, (1, 1), "the shards are of one part of the sweep; give --part 1/2"),
-        (ONE_BLOCK, (2, 2), "the shards are of one part of the sweep; give --part 1/2"),
+        (ONE_BLOCK, (1, 1), "the shards are of one part of the sweep; use --part 1/2"),
+        (ONE_BLOCK, (2, 2), "the shards are of one part of the sweep; use --part 1/2"),
     ):
         with pytest.raises(InputError, match=problem):
             SweepFolder.open(folder, sweep, shard_size=SHARD_SIZE, part=part)
         assert content(folder) == before
-    with pytest.warns(InputWarning, match="written anew"):
+    with pytest.warns(InputWarning, match="written again"):
         run(folder, more, part=(1, 2))
     assert read_manifest(folder).part == (1, 2) and load(folder).summary()["missing"] == 40
     assert "samples: 40" in (folder / "sweep.yaml").read_text()

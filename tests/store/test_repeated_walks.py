@@ -13,7 +13,7 @@ from tests.support.command_line import Command
 from warpchain import InputError, SweepResult, WalkResult
 from warpchain.inputs.validation import InputWarning
 from warpchain.results.sweep_result import merge
-from warpchain.walks.rows import STORED_COLUMNS, fill_row, missing_rows, row_type
+from warpchain.walks.rows import STORED_COLUMNS, fill_outcomes, missing_rows, row_type
 
 SWEEP: dict[str, Any] = {
     "links": 12,
@@ -22,7 +22,7 @@ SWEEP: dict[str, Any] = {
     "preset": "soft",
     "method": "dp5",
     "clearance": 1e-3,
-    "walk_until": 0.05,
+    "stop_time": 0.05,
 }
 
 
@@ -37,8 +37,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def assert_same_numbers(walk: WalkResult, result: SweepResult, place: tuple[int, ...]) -> None:
     """A walk has all numbers of a row, to the bit."""
-    (row,) = missing_rows(row_type(()), np.zeros(1, row_type(())))
-    fill_row(row, walk, {})
+    row = missing_rows(row_type(()), np.zeros(1, row_type(())))
+    fill_outcomes(row, [0], vars(walk))
     for name in ("status", *STORED_COLUMNS):
         assert row[name].tobytes() == result.columns[name][place].astype(row[name].dtype).tobytes(), name
 
@@ -77,11 +77,11 @@ def test_a_walk_of_a_sweep_from_the_command_line(command: Command, folder: Path)
 @pytest.mark.parametrize(
     ("line", "problem"),
     [
-        ("walk --like DIR", "--like: DIR has many walks; give --index"),
-        ("walk --like DIR --index 9", "index: the sweep has no walk 9"),
-        ("walk --like DIR --index one", "index: Input should be a valid integer; given 'one'"),
-        ("walk --index 3", "--index: names a walk of a sweep, but --like is missing"),
-        ("animate DIR", "the folder of a sweep, not of a saved walk; give a saved walk"),
+        ("walk --like DIR", "--like: DIR has many walks; add --index"),
+        ("walk --like DIR --index 9", "index: expected a number in the column index"),
+        ("walk --like DIR --index one", "index: expected an integer, got 'one'"),
+        ("walk --index 3", "--index: --like is missing"),
+        ("animate DIR", "expected a saved walk, got the folder of a sweep; use a saved walk"),
     ],
 )
 def test_a_walk_that_is_not_named_is_refused(command: Command, folder: Path, line: str, problem: str) -> None:
@@ -97,10 +97,10 @@ def test_numbers_that_say_no_walk_are_refused(folder: Path) -> None:
         result.walk(0, frequency=3.0)
     with pytest.raises(InputError, match="sample: given together with index"):
         result.walk(0, sample=1)
-    with pytest.raises(InputError, match="index: Input should be a valid integer; given True"):
+    with pytest.raises(InputError, match="index: expected an integer, got True"):
         result.walk(True)
     for several in ([3.0, 4.0], np.array([3.0, 4.0]), [3.0]):
-        with pytest.raises(InputError, match=r"^frequency: .* is not on the axis; give one of "):
+        with pytest.raises(InputError, match=r"^frequency: .* is not on the axis; use one of "):
             result.walk(frequency=several)
 
 

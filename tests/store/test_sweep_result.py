@@ -121,7 +121,7 @@ def test_a_sweep_is_no_saved_walk(tmp_path: Path, single: Path) -> None:
     with pytest.warns(InputWarning, match="20 of .* walks are missing"):
         merge(single, tmp_path / "merged.h5")
     for path in (single, tmp_path / "merged.h5"):
-        with pytest.raises(InputError, match=r"give a saved walk; `walk --like SWEEP --index I` saves one"):
+        with pytest.raises(InputError, match=r"use a saved walk; `walk --like SWEEP --index I` saves one"):
             load_walk(path)
 
 
@@ -130,7 +130,7 @@ def test_no_sweep_no_result(tmp_path: Path, single: Path) -> None:
     for nothing, problem in ((tmp_path, "no sweep in this folder"), (tmp_path / "none", "is not there")):
         with pytest.raises(InputError, match=f"{nothing}: {problem}"):
             load(nothing)
-    with pytest.raises(InputError, match=r"sweep\.yaml: not an HDF5 file; give a folder of a sweep"):
+    with pytest.raises(InputError, match=r"sweep\.yaml: not an HDF5 file; use the folder of a sweep"):
         load(single / "sweep.yaml")
     run(tmp_path)
     path = tmp_path / "shards/000001.h5"
@@ -193,6 +193,6 @@ def test_a_merged_file_replaces_another_only(folder: Path, single: Path, tmp_pat
     for name, content in others.items():
         (tmp_path / name).write_bytes(content)
     for name in others:
-        with pytest.raises(OSError, match=rf"{name}: is there and is no merged sweep; give another name$"):
+        with pytest.raises(OSError, match=rf"{name}: already exists and is not a merged sweep; use another name$"):
             merge(folder, tmp_path / name)
     assert {name: (tmp_path / name).read_bytes() for name in others} == others

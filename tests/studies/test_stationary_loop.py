@@ -75,7 +75,7 @@ def test_figures_have_theory_and_kinks(tmp_path: Path) -> None:
     assert [len(axes.lines) - len(plain.lines) for axes, plain in pairs] == [2, 2, 2]
     frames = {"series": True, "frames": {"samples": [0], "before": 0.2}}
     grid = {"links": [40], "frequency": [12.0, 14.0]}
-    settings = {"preset": "soft", "scene": {"start": "spinning", "further_hold": 0.5, "walk_limit": 0.05}}
+    settings = {"preset": "soft", "scene": {"start": "spinning", "extra_hold": 0.5, "walk_limit": 0.05}}
     result = warpchain.sweep(grid=grid, samples=1, record=frames, out=tmp_path / "kinks", progress=False, **settings)
     assert [line.get_xdata().tolist() for line in run.draw_kinks(result).axes[1].lines] == [[12.0, 14.0]]
 

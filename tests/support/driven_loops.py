@@ -15,7 +15,7 @@ from warpchain.engine.batch import Batch
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
 from warpchain.status import Status
-from warpchain.walks.walk_phases import WalkRun
+from warpchain.walks.walk_phases import WalkRun, go_on
 
 SHAPE = (layout.HEIGHT, layout.WIDTH, layout.CENTER_X, layout.CENTER_Y)
 """Columns of a sample that say where a loop is."""
@@ -42,12 +42,13 @@ def released_loop(preset: str = "soft", **settings: Any) -> Loop:
     batch = Batch(1, setup.scene.links, setup.options)
     run = WalkRun(batch.worlds[0], setup)
     found: Loop | None = None
-    for features in run.phases():
-        if run.progress().phase == "walk":
-            break
-        batch.run([0], features)
+    go_on([run])
+    while not run.is_released:
+        assert run.features is not None, "it was not released"
+        batch.run([0], run.features)
         found = Loop(setup, batch.worlds[0].position, batch.worlds[0].velocity)
-    assert found is not None and run.progress().phase == "walk", "it was not released"
+        go_on([run])
+    assert found is not None
     return found
 
 

@@ -13,7 +13,7 @@ from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
 from warpchain.store.shards import stamp, write_shard
 from warpchain.sweeps.plan import PlannedWalk, load_sweep
-from warpchain.walks.rows import KEYS, Rows, missing_rows, quantity_of
+from warpchain.walks.rows import ROW_KEYS, Rows, missing_rows, quantity_of
 
 Outcome = Callable[[PlannedWalk], "float | Status | None"]
 """What a walk gives: its distance [m], how it failed, or None if it has not been run yet."""
@@ -75,11 +75,11 @@ def fill_row(walk: PlannedWalk, outcome: "float | Status", rows: Rows, **own: fl
     failed = isinstance(outcome, Status)
     rows["status"] = outcome if failed else Status.AT_REST
     for name in rows.dtype.names or ():
-        if (quantity := quantity_of(name)) in walk.drawn:
-            rows[name] = walk.drawn[quantity]
+        if (quantity := quantity_of(name)) in walk.draws:
+            rows[name] = walk.draws[quantity]
         elif name.startswith("penetration_") or name == "greatest_opening":
             rows[name] = 7e-6
-        elif name not in (*(KEYS.names or ()), "status", "dx"):
+        elif name not in (*(ROW_KEYS.names or ()), "status", "dx"):
             rows[name] = 7
     rows["dx"] = math.nan if failed else outcome
     rows["energy_residual"] = 14e-4  # of 14 J
@@ -99,7 +99,7 @@ def make_sweep(
     """
     sweep = load_sweep(content)
     indices = sweep.indices.tolist()
-    walks = {index: replace(sweep.planned(index), index=number) for number, index in enumerate(indices)}
+    walks = {index: replace(sweep.walk(index), index=number) for number, index in enumerate(indices)}
     outcomes = {index: outcome(walk) for index, walk in walks.items()}
     with SweepFolder.open(folder, sweep, shard_size=1 if None in outcomes.values() else len(walks)) as store:
         for shard in store.missing():

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from warpchain.chain.resolution import resolve
 from warpchain.chain.setup import Setup
-from warpchain.inputs.validation import by_section
+from warpchain.inputs.fields import by_section
 
 
 def setup_walk(preset: str, settings: Mapping[str, object], seed: int | None = None) -> Setup:

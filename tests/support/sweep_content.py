@@ -34,4 +34,4 @@ def blocks(*given: Mapping[str, Any], **changes: Any) -> dict[str, Any]:
 
 def drawn(sweep: Sweep, walks: int) -> np.ndarray:
     """What the first walks drew, cell by cell, shape (walks, drawn quantities)."""
-    return np.array([list(sweep.planned(index).drawn.values()) for index in sweep.indices[:walks].tolist()])
+    return np.array([list(sweep.walk(index).draws.values()) for index in sweep.indices[:walks].tolist()])

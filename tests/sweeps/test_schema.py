@@ -8,7 +8,7 @@ from jsonschema import Draft7Validator
 
 from tests.support.sweep_content import blocks, content
 from tests.test_fuzz import SWEEPS
-from warpchain.inputs.validation import NAME_OF_SYMBOL, SECTION_OF
+from warpchain.inputs.fields import NAME_OF_SYMBOL, SECTION_OF
 from warpchain.inputs.yaml_files import read_yaml
 from warpchain.sweeps.plan import load_sweep
 from warpchain.sweeps.sweep_file import sweep_schema

@@ -23,7 +23,7 @@ def test_sweeps_of_the_repository(path: Path) -> None:
     sweep = load_sweep(path)
     assert sweep.name == path.stem and sweep.walk_count == sum(math.prod(block.shape) for block in sweep.blocks) > 0
     for index in sweep.indices[[0, -1]].tolist():
-        assert sweep.planned(index).index == index
+        assert sweep.walk(index).index == index
 
 
 def test_shipped_sweeps_have_bare_names() -> None:

@@ -26,7 +26,7 @@ def planned(sampler: str, seed: int, samples: int = 64, **keys: Any) -> Sweep:
 
 def fractions(sweep: Sweep) -> np.ndarray:
     """What each walk drew, as fractions of the ranges, (walks, 4)."""
-    draws = [sweep.planned(index).drawn for index in sweep.indices.tolist()]
+    draws = [sweep.walk(index).draws for index in sweep.indices.tolist()]
     return np.array([[(draw[name] - low) / (high - low) for name, (low, high) in DRAWN.items()] for draw in draws])
 
 
@@ -64,7 +64,7 @@ def test_one_randomisation_has_no_error_and_says_why(sampler: str) -> None:
     """Where all walks depend on one another a mean has no error, and the statistics say what gives one."""
     cells = found(planned(sampler, 1, randomisations=1), even)
     assert np.isfinite(cells.mean) and np.isfinite(cells.sd) and np.isnan(cells.standard_error)
-    assert "randomisations: 8 and more samples give one" in cells.why_no_error
+    assert "use randomisations: 8 and more samples" in cells.why_no_error
     assert found(planned(sampler, 1), even).why_no_error == ""
     one = found(planned(sampler, 1, samples=1), even)
     assert np.isnan(one.standard_error) and bool(one.why_no_error) == (sampler == "saltelli")
@@ -102,7 +102,7 @@ def test_errors_hold_where_walks_fail() -> None:
     ("keys", "problem"),
     [
         ({"sampler": "random", "randomisations": 8}, r"^sweep\.randomisations: random samples are independent anyway"),
-        ({"sampler": "sobol", "randomisations": 6}, r"^sweep\.randomisations: 6 is not a power of 2, as sobol needs"),
+        ({"sampler": "sobol", "randomisations": 6}, r"^sweep\.randomisations: expected a power of 2 for sobol, got 6"),
         ({"sampler": "sobol", "randomisations": 0}, r"^sweep\.randomisations: "),
     ],
 )

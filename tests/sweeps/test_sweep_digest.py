@@ -48,18 +48,18 @@ def test_digest_ignores_what_does_not_matter(kind: str) -> None:
 def test_a_method_by_need_is_that_of_the_device(options: dict[str, Any], expected: tuple[str, str]) -> None:
     """The same file on another device has the method that its word means there, with the settings given."""
     planned = load_sweep(content(options=options))
-    here, there = (sweep.planned(0).setup.options for sweep in (planned, on_device(planned, "cuda:1")))
+    here, there = (sweep.walk(0).setup.options for sweep in (planned, on_device(planned, "cuda:1")))
     assert (here.method, there.method) == expected
     assert there.device == "cuda:1"
     assert there.tolerance == options.get("tolerance", here.tolerance)
     again = load_sweep(on_device(planned, "cuda:1").canonical())
-    assert again.planned(0).setup.options == there
+    assert again.walk(0).setup.options == there
 
 
 def test_a_device_is_refused_beside_devices_on_an_axis() -> None:
     """One of them would be passed over."""
     planned = load_sweep(content(grid={"device": ["cuda:0", "cuda:1"]}, options={}))
-    with pytest.raises(InputError, match="device: cpu is given, but the sweep's grid goes over devices; leave one"):
+    with pytest.raises(InputError, match="device: cpu is not possible with device as an axis of the grid; remove one"):
         on_device(planned, "cpu")
 
 
@@ -69,7 +69,7 @@ def test_a_stored_sweep_keeps_its_method_unless_it_is_given_a_word_again() -> No
     stored = planned.canonical()
     assert load_sweep(stored).digest() == planned.digest()
     with pytest.raises(
-        InputError, match=r"^sweep\.blocks\[0\]\.options\.method: 'hybrid' runs on a CPU only; give explicit"
+        InputError, match=r"^sweep\.blocks\[0\]\.options\.method: 'hybrid' runs only on a CPU; use explicit"
     ):
         on_device(load_sweep(stored), "cuda")
     for block in stored["blocks"]:
@@ -112,7 +112,7 @@ def test_a_new_field_with_a_default_changes_no_digest() -> None:
     planned = load_sweep(content())
     older = planned.canonical()
     for block in older["blocks"]:
-        del block["scene"]["walk_until"], block["options"]["soften_area"], block["parameters"]["half_width"]
+        del block["scene"]["stop_time"], block["options"]["soften_area"], block["parameters"]["half_width"]
     assert load_sweep(older).digest() == planned.digest()
-    text = json.dumps(load_sweep(content(scene={"walk_until": 1.0})).canonical())
+    text = json.dumps(load_sweep(content(scene={"stop_time": 1.0})).canonical())
     assert load_sweep(json.loads(text)).digest() != planned.digest()

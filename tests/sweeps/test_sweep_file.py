@@ -27,18 +27,18 @@ def test_values_and_layout() -> None:
     assert block.drawn == (*TABLE_1, "phase", "clearance")
     places = itertools.product(range(3), range(2), range(2))
     for index, (sample, links, frequency) in enumerate(places):
-        walk = sweep.planned(index)
+        walk = sweep.walk(index)
         setup = walk.setup
         assert (walk.index, walk.block, walk.cell, walk.sample) == (index, 0, (links, frequency), sample)
         assert (setup.scene.links, setup.scene.frequency) == ((60, 90)[links], (5.0, 10.0)[frequency])
         assert (setup.preset, setup.scene.start, setup.options.method) == ("soft", "spinning", "dp5")
         assert (setup.parameters.gravity, setup.parameters.joint_stiffness) == (9.0, 1e7)
-        assert tuple(walk.drawn) == block.drawn
-        for name, value in walk.drawn.items():
+        assert tuple(walk.draws) == block.drawn
+        for name, value in walk.draws.items():
             assert getattr(setup.parameters if name in TABLE_1 else setup.scene, name) == value
     for beyond in (-1, 12, 10**9):
         with pytest.raises(IndexError):
-            sweep.planned(beyond)
+            sweep.walk(beyond)
 
 
 def test_blocks_inherit_and_override() -> None:
@@ -59,7 +59,7 @@ def test_blocks_inherit_and_override() -> None:
     assert [(block.name, block.first_cell) for block in sweep.blocks] == [("b0", 0), ("b1", 1), ("b2", 3)]
     assert [block.sampler for block in sweep.blocks] == ["random", "latin_hypercube", "random"]
     assert sweep.walk_count == 13
-    first, second, paper, soft = (sweep.planned(index).setup for index in (0, 2, 3, 4))
+    first, second, paper, soft = (sweep.walk(index).setup for index in (0, 2, 3, 4))
     for setup, *expected in (
         (first, "soft", 60, "rest", 15, 1e-7, "hybrid"),
         (second, "paper", 90, "ellipse", 20, 1e-5, "bs32"),
@@ -164,6 +164,6 @@ def test_values_are_judged_in_their_cells() -> None:
             parameters={"circle_radius": 0.008},
         )
     )
-    setup = sweep.planned(0).setup
+    setup = sweep.walk(0).setup
     assert (setup.options.smallest_step, setup.parameters.circle_radius) == (1e-4, 0.008)
     assert load_sweep(sweep.canonical()).digest() == sweep.digest()

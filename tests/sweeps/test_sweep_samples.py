@@ -27,12 +27,12 @@ def test_walks_depend_on_their_index_only(sampler: str) -> None:
     """A planned walk is the same whatever was planned before it, and all walks differ."""
     given = content(sampler=sampler, samples=4)
     sweep = load_sweep(given)
-    walks = [sweep.planned(index) for index in sweep.indices.tolist()]
+    walks = [sweep.walk(index) for index in sweep.indices.tolist()]
     order = np.random.default_rng(1).permutation(sweep.indices).tolist()
     design_points.cache_clear()
     other = load_sweep(given)
-    assert {index: other.planned(index) for index in order} == {walk.index: walk for walk in walks}
-    assert len({tuple(walk.drawn.values()) for walk in walks}) == len(walks)
+    assert {index: other.walk(index) for index in order} == {walk.index: walk for walk in walks}
+    assert len({tuple(walk.draws.values()) for walk in walks}) == len(walks)
 
 
 def test_an_index_stays_when_samples_are_added() -> None:
@@ -42,7 +42,7 @@ def test_an_index_stays_when_samples_are_added() -> None:
     many = load_sweep(blocks({"grid": grid, "samples": 5}, {"samples": 8}, {"sampler": "saltelli", "samples": 4}))
     for index in few.indices.tolist():
         one, other = (
-            (walk.block, walk.cell, walk.sample, walk.setup.scene) for walk in (few.planned(index), many.planned(index))
+            (walk.block, walk.cell, walk.sample, walk.setup.scene) for walk in (few.walk(index), many.walk(index))
         )
         assert one == other
     assert len(set(many.indices.tolist())) == many.walk_count
@@ -54,28 +54,28 @@ def test_first_sample_is_that_of_a_single_walk() -> None:
     for seed in (0, 7, 2**127):
         parts = {"scene": {"links": 90, "frequency": 12.0}, "parameters": {"floor_friction": 0.1}}
         sweep = load_sweep(content(seed=seed, **parts, grid={"tolerance": [1e-3, 1e-7]}))
-        assert sweep.planned(0).setup == setup_walk("soft", settings | {"tolerance": 1e-3}, seed)
+        assert sweep.walk(0).setup == setup_walk("soft", settings | {"tolerance": 1e-3}, seed)
         base = resolve("soft", **parts, options={"tolerance": 1e-7})
         laws = base.placed({name: law for name, law in TABLE.items() if name != "floor_friction"})
         sample = base.with_drawn(draw(laws, random_generator(seed, 1, 2)))
-        assert sweep.planned(sweep.indices[5]).setup == sample
+        assert sweep.walk(sweep.indices[5]).setup == sample
 
 
 def test_large_sweeps_cost_nothing() -> None:
     """A sweep of 10⁷ walks is loaded and its walks are planned in little time and memory, wherever they are."""
-    load_sweep(content()).planned(0)
+    load_sweep(content()).walk(0)
     tracemalloc.start()
     try:
         sweep = load_sweep(content(samples=2**17, grid={"frequency": {"from": 1, "to": 100, "step": 1}}))
         assert sweep.walk_count == 100 * 2**17
         for index in (0, 10**6, sweep.walk_count - 1):
-            assert sweep.planned(index).sample == index // 100
+            assert sweep.walk(index).sample == index // 100
         assert tracemalloc.get_traced_memory()[1] < 2e6
     finally:
         tracemalloc.stop()
     began = time.process_time()
     for index in range(0, sweep.walk_count, sweep.walk_count // 200):
-        sweep.planned(index)
+        sweep.walk(index)
     assert (time.process_time() - began) / 200 < 1e-3
 
 
@@ -96,7 +96,7 @@ def test_what_is_independent_differs_along_such_axes(sampler: str) -> None:
     """All but the independent quantities are as without them; these differ in all cells and samples."""
     given = content(sampler=sampler, samples=4, same_samples_along=["links", "frequency"])
     tied, own = load_sweep(given), load_sweep(given | {"independent": ["clearance", "mu_fc"]})
-    names = list(own.planned(0).drawn)
+    names = list(own.walk(0).draws)
     alone = [names.index(name) for name in ("floor_friction", "clearance")]
     before, after = drawn(tied, tied.walk_count), drawn(own, own.walk_count)
     shared = [k for k in range(len(names)) if k not in alone]
@@ -111,9 +111,9 @@ def test_what_is_independent_differs_along_such_axes(sampler: str) -> None:
 @pytest.mark.parametrize(
     ("names", "problem"),
     [
-        (["frequency"], "sweep.independent: 'frequency' is not drawn; give one of clearance"),
-        (["clearence"], "sweep.independent: 'clearence' is not drawn; did you mean clearance?"),
-        ("clearance", "sweep.independent: Input should be a valid list"),
+        (["frequency"], "sweep.independent: 'frequency' is not sampled; use one of clearance"),
+        (["clearence"], "sweep.independent: 'clearence' is not sampled; did you mean clearance?"),
+        ("clearance", "sweep.independent: expected a list"),
     ],
 )
 def test_only_drawn_quantities_are_independent(names: Any, problem: str) -> None:
@@ -132,12 +132,12 @@ def test_values_on_an_axis_are_exact_unless_scatter_is_asked_for(name: str, othe
     value = Parameters.quantities()[name].value
     given = content(samples=20, grid={name: [1.1 * value, 1.2 * value]})
     exact = load_sweep(given | {"distributions": others})
-    found = [getattr(exact.planned(index).setup.parameters, name) for index in exact.indices[:40].tolist()]
+    found = [getattr(exact.walk(index).setup.parameters, name) for index in exact.indices[:40].tolist()]
     assert found == [1.1 * value] * 20 + [1.2 * value] * 20
     assert list(exact.blocks[0].drawn) == [*(other for other in TABLE_1 if other != name), "phase", "clearance"]
     scattered = load_sweep(given | {"distributions": {**others, name: "table"}})
     assert scattered.blocks[0].drawn == (*TABLE_1, "phase", "clearance") and scattered.digest() != exact.digest()
-    values = {getattr(scattered.planned(index).setup.parameters, name) for index in scattered.indices[:40].tolist()}
+    values = {getattr(scattered.walk(index).setup.parameters, name) for index in scattered.indices[:40].tolist()}
     assert len(values) == 40
 
 
@@ -160,8 +160,8 @@ def test_values_on_an_axis_are_exact_unless_scatter_is_asked_for(name: str, othe
 def test_what_is_drawn(changes: dict[str, Any], names: list[str]) -> None:
     """Table 1, phase and clearance unless said otherwise; an axis and a set phase stay, a set parameter is a mean."""
     sweep = load_sweep(content(**changes))
-    assert list(sweep.blocks[0].drawn) == names == list(sweep.planned(0).drawn)
-    setup = sweep.planned(0).setup
+    assert list(sweep.blocks[0].drawn) == names == list(sweep.walk(0).draws)
+    setup = sweep.walk(0).setup
     assert "phase" in names or setup.scene.phase == changes.get("scene", {}).get("phase", 0.0)
     expected = changes.get("parameters", {}).get("mu_fc", 0.27)
     assert "floor_friction" in names or setup.parameters.floor_friction == expected
@@ -226,7 +226,7 @@ def test_every_planned_walk_is_possible(sampler: str) -> None:
             same_samples_along=["links"],
         )
     )
-    walks = [sweep.planned(index) for index in sweep.indices.tolist()]
+    walks = [sweep.walk(index) for index in sweep.indices.tolist()]
     for walk in walks:
         walk.setup.checked()
     per_sample = 4 if sampler == "saltelli" else 1
@@ -241,12 +241,10 @@ def test_every_planned_walk_is_possible(sampler: str) -> None:
 def test_samples_that_are_never_possible_are_refused() -> None:
     """One line names what is drawn, whether one quantity alone or all of them together are never physical."""
     never = Uniform(2.0, 3.0, (0.0, 1.0))
-    with pytest.raises(InputError, match=r"^scene\.phase: 1000 draws of .*2\.0, 3\.0.* were all out of bounds"):
+    with pytest.raises(InputError, match=r"^scene\.phase: 1000 samples of .*2\.0, 3\.0.* were all out of bounds"):
         draw({"gravity": Uniform(0.0, 1.0, (0.0, 1.0)), "phase": never}, np.random.default_rng(0))
     too_large = {"all": "fixed", "sprocket_radius": {"uniform": [0.061, 0.07]}}
-    problem = (
-        r"^sweep\.distributions: 1000 samples made no possible walk; the last: scene\.links: 32 links do not reach"
-    )
+    problem = r"^sweep\.distributions: none of 1000 samples makes a possible walk; the last: scene\.links: 32 links "
     for sampler in ("random", "sobol"):
         with pytest.raises(InputError, match=problem):
             load_sweep(content(grid=None, scene={"links": 32}, samples=4, sampler=sampler, distributions=too_large))

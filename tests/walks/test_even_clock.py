@@ -4,7 +4,7 @@ import numpy as np
 
 import warpchain
 
-ELLIPSE = {"links": 36, "frequency": 20.0, "start": "ellipse", "preset": "soft", "method": "dp5", "walk_until": 0.4}
+ELLIPSE = {"links": 36, "frequency": 20.0, "start": "ellipse", "preset": "soft", "method": "dp5", "stop_time": 0.4}
 
 
 def test_a_walk_has_its_series_at_every_millisecond() -> None:

@@ -73,9 +73,7 @@ def test_a_walk_down_a_steep_slope_ends_by_its_distance():
 def test_a_loop_wider_than_the_hanging_chain_starts_outside_of_walls():
     """Between walls that the hanging chain clears the spinning one is raised until no circle is in one."""
     walls = [[-1, 0.2], [-0.068, 0.2], [-0.068, 0], [0.068, 0], [0.068, 0.2], [1, 0.2]]
-    walk = warpchain.walk(
-        links=40, preset="soft", clearance_of="hanging", clearance=0.003, floor=walls, walk_until=1e-3
-    )
+    walk = warpchain.walk(links=40, preset="soft", clearance_of="hanging", clearance=0.003, floor=walls, stop_time=1e-3)
     x, y = walk.frame_joints[0].T
     assert x.min() < -0.068 and y[np.abs(x) > 0.068].min() > 0.2
 
@@ -95,7 +93,7 @@ def test_the_release_is_at_its_clearance_from_the_profile():
 def test_a_spike_below_the_side_of_a_link_is_cleared_as_well(x: float) -> None:
     """The nearest place of a link, between its circles, too, is at the clearance, to 3 % of a link's length."""
     spike = [[-1, -0.3], [x - 1e-3, -0.3], [x, 0], [x + 1e-3, -0.3], [1, -0.3]]
-    scene = {"start": "ellipse", "clearance": 2e-3, "floor": spike, "walk_until": 1e-4}
+    scene = {"start": "ellipse", "clearance": 2e-3, "floor": spike, "stop_time": 1e-4}
     joints = warpchain.walk(links=24, preset="soft", method="explicit", **scene).frame_joints[0]
     places = np.concatenate(
         [joints + share * (np.roll(joints, -1, axis=0) - joints) for share in np.linspace(0, 1, 99)]

@@ -27,7 +27,7 @@ def test_progress_has_each_frame_once(more: dict[str, Any]) -> None:
     times = np.concatenate([each.frame_time for each in told])
     joints = np.concatenate([each.frame_joints for each in told if len(each.frame_time)])
     assert len(times) > 50 and times.tobytes() == walk.frame_time.tobytes()
-    wanted = walk.frame_joints if walk.joints_in_room is None else walk.joints_in_room
+    wanted = walk.frame_joints if walk.joints_lab is None else walk.joints_lab
     np.testing.assert_array_equal(joints, wanted)
     first = next(each for each in told if len(each.frame_time))
     np.testing.assert_equal(first.sprocket_height, walk.sprocket_height)

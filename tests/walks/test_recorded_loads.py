@@ -20,7 +20,7 @@ FINE = 5e-5  # s
 @cache
 def flight(**settings: Any) -> WalkResult:
     """A flight whose loads are recorded."""
-    return warpchain.walk(**FLIGHT | settings, record_loads=True, frame_interval=FINE)
+    return warpchain.walk(**FLIGHT | settings, record_joint_forces=True, frame_interval=FINE)
 
 
 def test_forces_and_gravity_accelerate_each_link() -> None:
@@ -77,7 +77,7 @@ def test_moments_are_those_of_turning_joints() -> None:
 def test_they_change_no_bit_of_the_walk(start: str) -> None:
     """With loads in fine frames or without frames the walk is the same; before the release frames come with samples."""
     given: dict[str, Any] = {"preset": "soft", "links": 40, "start": start, "walk_limit": 0.06, "method": "explicit"}
-    loaded = warpchain.walk(**given, record_loads=True, record_before=0.05, frame_interval=2e-4)
+    loaded = warpchain.walk(**given, record_joint_forces=True, record_before=0.05, frame_interval=2e-4)
     plain = warpchain.walk(**given, frame_interval=None)
     assert len(loaded.frame_time) > 250 and loaded.impulses["floor"] > 0
     frames = ("frame_time", "frame_joints", "frame_forces", "frame_moments")
@@ -101,11 +101,11 @@ def test_planes_come_with_fine_frames() -> None:
 def test_standard_is_explicit_where_loads_are_recorded() -> None:
     """Rigid joints have no forces: standard changes, hybrid and setups of hybrid walks are refused."""
     brief = FLIGHT | {"walk_limit": 1e-3}
-    assert warpchain.walk(**brief, record_loads=True).setup.options.method == "os32"
+    assert warpchain.walk(**brief, record_joint_forces=True).setup.options.method == "os32"
     rigid = warpchain.walk(**brief)
     assert rigid.setup.options.method == "hybrid" and rigid.frame_forces.shape == (0, 24, 2)
     assert rigid.frame_moments.shape == (0, 24)
-    refusal = r"options\.method: 'hybrid' has rigid joints, without forces; give explicit"
+    refusal = r"options\.method: 'hybrid' has rigid joints, without forces; use explicit"
     for settings in ({"method": "hybrid"}, {"setup": rigid.setup}):
         with pytest.raises(InputError, match=refusal):
-            warpchain.walk(**settings, record_loads=True)
+            warpchain.walk(**settings, record_joint_forces=True)

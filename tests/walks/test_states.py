@@ -17,7 +17,7 @@ from warpchain.walks.walk_numbers import MOTION, NUMBERS
 
 SPUN = {"links": 36, "frequency": 15.0, "start": "spinning"}
 ELLIPSE = {"links": 36, "frequency": 20.0, "start": "ellipse", "preset": "soft", "method": "dp5"}
-BRIEF = {"links": 12, "frequency": 3.0, "start": "ellipse", "preset": "soft", "clearance": 1e-3, "walk_until": 0.03}
+BRIEF = {"links": 12, "frequency": 3.0, "start": "ellipse", "preset": "soft", "clearance": 1e-3, "stop_time": 0.03}
 WALKS: dict[str, tuple[dict[str, Any], float]] = {
     "explicit": (ELLIPSE, 0.6),
     "at the release": (ELLIPSE, 0.0),
@@ -105,7 +105,7 @@ def test_a_state_goes_on_with_other_values(fall: WalkResult) -> None:
     """Other parameters, options, limits and floors hold from the state on, and the ledger of the new walk closes."""
     state = fall.state(0.3)
     planned, slippery, finer, other = (
-        warpchain.walk(start=state, walk_until=0.4, **given)
+        warpchain.walk(start=state, stop_time=0.4, **given)
         for given in ({}, {"floor_friction": 0.01}, {"tolerance": 1e-8}, {"method": "os32"})
     )
     assert planned.status.label == "finished" and planned.walk_time == 0.4
@@ -160,7 +160,7 @@ def test_the_clock_of_a_state_is_that_of_its_walk() -> None:
     """Any other time is refused; a measured state has time 0."""
     state = State.of_joints(RING)
     for time in (-1.0, 1.0, math.nan, "a"):
-        with pytest.raises(InputError, match=r"^time: .* is not that of its walk; give 0$"):
+        with pytest.raises(InputError, match=r"^time: expected the time of its walk, 0 s, got .*"):
             replace(state, time=time)
 
 
@@ -194,7 +194,7 @@ def test_a_chain_on_an_outline_falls_to_rest() -> None:
     [
         (RING * 1000, "joints: the loop is not closed, or lengths are not in m"),
         (outline(11, LENGTH), "joints: 11 is odd"),
-        (RING[:, :1], r"joints: its shape is \(12, 1\)"),
+        (RING[:, :1], r"joints: expected shape .*, got \(12, 1\)"),
         (RING * np.nan, "joints: holds a number that is not finite"),
         ("ring", "joints: not an array"),
     ],
@@ -220,7 +220,7 @@ def test_what_comes_before_a_state_is_refused(fall: WalkResult, settings: dict[s
     with pytest.raises(InputError, match=problem):
         warpchain.walk(start=fall.state(0.2), **settings)
     for time in (-0.1, math.nan, "soon"):
-        with pytest.raises(InputError, match=r"^t: .*; give"):
+        with pytest.raises(InputError, match=r"^t: .*; use"):
             fall.state(time)
 
 

@@ -10,7 +10,7 @@ from tests.support.command_line import Command
 from warpchain import Status
 
 SHORT = {"links": 40, "start": "ellipse", "frame_interval": None}
-FIRST_MOMENTS = {**SHORT, "preset": "soft", "method": "reference", "walk_until": 0.02}
+FIRST_MOMENTS = {**SHORT, "preset": "soft", "method": "reference", "stop_time": 0.02}
 SLIDING = {**SHORT, "slope": 20.0, "mu_fc": 0.1, "walk_limit": 1.0}
 WHIRLING = {"start": "spinning", "charm_mass": 0.02, "frame_interval": None}
 

@@ -1,5 +1,6 @@
 """Walks of chains whose links are unlike: two kinds as values of each link, charms, stiff joints, gradients."""
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import warpchain
 from tests.support.presets import SOFT
 from tests.support.setups import setup_walk
 from warpchain import Status
-from warpchain.chain.link_values import alternating
+from warpchain.chain.link_values import LinkValues, alternating, link_values, mean_value
 from warpchain.pictures.chain import link_outlines
 from warpchain.pictures.places import circle_radii
 
@@ -107,7 +108,7 @@ def test_rules_change_what_they_say() -> None:
     charm = values_of(charm_link=7, charm_mass=0.02, charm_inertia=1e-6)
     assert charm.mass[7] == usual.mass[7] + 0.02 and charm.inertia[7] == usual.inertia[7] + 1e-6
     assert np.array_equal(np.delete(charm.mass, 7), np.delete(usual.mass, 7))
-    stiff = values_of(stiff_joint=3, stiff_joint_factor=10.0)
+    stiff = values_of(stiff_joint=3, joint_friction_factor=10.0)
     assert np.flatnonzero(stiff.viscous_friction != usual.viscous_friction).tolist() == [3]
     assert stiff.coulomb_friction[3] == 10 * SOFT.coulomb_friction
     graded = values_of(mass_gradient=0.5)
@@ -118,6 +119,34 @@ def test_rules_change_what_they_say() -> None:
     both = values_of(link_masses=[1e-3] * 60, charm_link=59, charm_mass=1.0)
     assert both.mass.tolist() == [1e-3] * 59 + [1.001]
     assert not any(values.alternates for values in (charm, stiff, graded, narrow, both)) and usual.alternates
+
+
+def test_chains_of_many_walks_are_those_of_each_alone() -> None:
+    """Values of links and what follows from them, of chains with all kinds of rules, are to the bit those of one."""
+    rules: list[dict[str, Any]] = [
+        {},
+        {"charm_link": 7, "charm_mass": 0.02, "charm_inertia": 1e-6, "charm_radius": 2e-3},
+        {"stiff_joint": 3, "joint_friction_factor": 10.0},
+        {"mass_gradient": 0.3},
+        {"link_masses": [1e-3, 2e-3, 4e-3] * 20, "link_radii": [2e-3, 5e-3] * 30},
+        {"inner_mass": 3.7001e-3, "outer_inertia": 5e-8},
+    ]
+    setups = [setup_walk("soft", {"links": 60, **each}) for each in rules]
+    lengths = np.array([setup.parameters.link_length for setup in setups])
+    together = link_values([setup.scene for setup in setups], [setup.parameters for setup in setups])
+    loads = together.greatest_load(lengths)
+    for place, setup in enumerate(setups):
+        alone = setup.link_values
+        assert all(np.array_equal(row[place], own) for row, own in zip(*map(_rows, (together, alone)), strict=True))
+        assert together.total_mass[place] == alone.total_mass == math.fsum(alone.mass[::2] + alone.mass[1::2])
+        assert together.mean_mass[place] == alone.mean_mass == mean_value(alone.mass)
+        assert together.alternates[place] == alone.alternates == (place in (0, 5))
+        assert loads[place] == alone.greatest_load(setup.parameters.link_length)
+    assert np.isinf(loads[0]) != np.isinf(loads[5])
+
+
+def _rows(values: LinkValues) -> list[Any]:
+    return [*vars(values).values()]
 
 
 def test_an_odd_number_of_links_of_one_kind_walks() -> None:

@@ -35,9 +35,9 @@ from warpchain.run.sweep_run import sweep
 from warpchain.status import Status
 from warpchain.version import package_versions
 
-State = tuple[Array, Array]
-"""Position (n, 3) and velocity (n, 3) of a chain."""
 Row = dict[str, Any]
+Motion = tuple[Array, Array]
+"""Position x, y [m], θ [rad] of each link and their rates, (n, 3) each."""
 Report = Callable[[str], None]
 """Called with a line of progress."""
 
@@ -67,7 +67,7 @@ def step_costs(device: str, links: Sequence[int], report: Report) -> list[Row]:
     """
     methods = [name for name in method_names() if not (on_gpu(device) and find_method(name).has_rigid_flight)]
     starts, chains = {n: flying(n, device) for n in links}, CHAINS_ON_GPU if on_gpu(device) else 1
-    flights: dict[tuple[int, str], list[tuple[State, float, int, int]]] = {}
+    flights: dict[tuple[int, str], list[tuple[Motion, float, int, int]]] = {}
     for turn, n, method in itertools.product(range(ROUNDS), links, methods):
         report(f"round {turn + 1} of {ROUNDS}: {n} links, {method}; the first compiles kernels")
         flights.setdefault((n, method), []).append(fly(starts[n], method, chains, device))
@@ -88,7 +88,7 @@ def step_costs(device: str, links: Sequence[int], report: Report) -> list[Row]:
     return rows
 
 
-def flying(links: int, device: str = "cpu") -> State:
+def flying(links: int, device: str = "cpu") -> Motion:
     """A circulating ellipse above the floor, whose joints have come to bear their loads."""
     position, velocity = lay_chain(ellipse(1.5), links, PARAMETERS.link_length, speed=5.0)
     position[:, 1] += 0.1 - position[:, 1].min()
@@ -96,7 +96,7 @@ def flying(links: int, device: str = "cpu") -> State:
     return ended.position[-1], ended.velocity[-1]
 
 
-def fly(start: State, method: str, chains: int, device: str) -> tuple[State, float, int, int]:
+def fly(start: Motion, method: str, chains: int, device: str) -> tuple[Motion, float, int, int]:
     """Carry identical chains of a batch through the air; a `RuntimeError` says that one did not come to the end.
 
     The state of a chain after `COMPARED_TIME`; from then on wall time [s], accepted and rejected steps of a chain.
@@ -127,7 +127,7 @@ def _cost(chains: int, seconds: float, flown: float, accepted: float, rejected: 
     return {"microseconds": 1e6 * seconds / (attempts * chains)} | rates
 
 
-def _errors(end: State, aim: State) -> Row:
+def _errors(end: Motion, aim: Motion) -> Row:
     """What `step_costs` says of the end of a flight."""
     place, rate = (float(np.hypot(*(one - other)[:, :2].T).max()) for one, other in zip(end, aim, strict=True))
     return {"position_error": place, "velocity_error": rate}
@@ -136,7 +136,8 @@ def _errors(end: State, aim: State) -> Row:
 def walk_rate(device: str, report: Report) -> Row:
     """Method, tolerance, walks, those at rest, wall time [s] and walks a second of a sweep, kernels loaded before.
 
-    On a CPU all processors take part. Errors as of :func:`warpchain.sweep`.
+    `waited` is the share of that time in which the host waited for a GPU, and had nothing else to do. On a CPU all
+    processors take part. Errors as of :func:`warpchain.sweep`.
     """
     options, walks = Options.model_validate({"device": device}), WALKS["gpu" if on_gpu(device) else "cpu"]
     seen: list[SweepProgress] = []
@@ -146,6 +147,7 @@ def walk_rate(device: str, report: Report) -> Row:
     return {
         **{"method": options.method, "tolerance": options.tolerance, "walks": walks},
         **{"at_rest": result.summary()["at_rest"], "seconds": seen[-1].seconds, "walks_per_second": seen[-1].rate},
+        "waited": seen[-1].waited / seen[-1].seconds,
     }
 
 
@@ -194,7 +196,7 @@ def acceleration(position: Array, velocity: Array, parameters: Parameters) -> Ar
 
 def fly_by_scipy(
     position: Array, velocity: Array, duration: float, parameters: Parameters, tolerance: float
-) -> tuple[State, float, float]:
+) -> tuple[Motion, float, float]:
     """Integrate a chain in flight by SciPy's DOP853, at a tolerance that is absolute (SI units) and relative.
 
     Position and velocity after the duration [s], wall time [s], and attempted steps, accepted or not.

@@ -5,6 +5,7 @@ of `Floor`, a line of `floor_from`.
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -122,16 +123,31 @@ class Floor:
 
 
 class Flat(Floor):
-    """The floor y = 0."""
+    """The floor y = 0, for which kernels need no faces."""
 
     def __init__(self, laws: ArrayLike) -> None:
         """Begin a floor with these coefficients, (1, 2)."""
-        super().__init__(slope_points(0.0), laws)
-        self.body = "floor"
+        self.points, self.laws, self.body = _LEVEL, np.array(laws, np.float64), "floor"
 
-    def raised_by(self, circles: Array, radius: Array, clearance: float) -> float:
+    def faces(self) -> Array:
         """See `Floor`."""
-        return clearance - float((circles[:, 1] - radius).min())
+        return np.empty((0, layout.FACE_VALUES))
+
+    def heights(self, x: Any) -> Any:
+        """See `Floor`."""
+        return np.zeros(np.shape(x))
+
+
+def raised_by(floors: Sequence[Floor], circles: Array, radius: Array, clearance: Array) -> Array:
+    """How far each of w chains of n links must be raised to its clearance from its floor [m], (w,).
+
+    Given are circles, (w, 2 n, 2), radii, (w, 2 n), and clearances, (w,), as for `Floor.raised_by`.
+    """
+    raised: Array = clearance - (circles[..., 1] - radius).min(-1)  # from the level y = 0
+    for place, floor in enumerate(floors):
+        if not isinstance(floor, Flat):
+            raised[place] = floor.raised_by(circles[place], radius[place], float(clearance[place]))
+    return raised
 
 
 def floor_from(given: Any, slope: float, law: tuple[float, float]) -> Floor:
@@ -147,7 +163,14 @@ def slope_points(degrees: float) -> Array:
     return np.array([[0.0, 0.0], [math.cos(angle), -math.sin(angle)]])
 
 
-def circles_of(position: Array, link_length: float) -> Array:
-    """Centres of the circles of links (n, 3), (2 n, 2): the left ones, then the right ones."""
-    arms = link_length / 2 * np.stack([np.cos(position[:, 2]), np.sin(position[:, 2])], axis=1)
-    return np.concatenate([position[:, :2] - arms, position[:, :2] + arms])
+_LEVEL: Final = slope_points(0.0)
+
+
+def circles_of(position: Array, link_length: ArrayLike) -> Array:
+    """Centres of the circles of links (…, n, 3), (…, 2 n, 2): the left ones, then the right ones.
+
+    Each chain has a length of its links [m], (…).
+    """
+    half, angle = np.asarray(link_length)[..., np.newaxis, np.newaxis] / 2, position[..., 2]
+    arms = half * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    return np.concatenate([position[..., :2] - arms, position[..., :2] + arms], axis=-2)

@@ -4,6 +4,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final, Self
 
+FRAME_INTERVAL: Final = 2e-3
+"""Time [s] between two frames, unless it is said otherwise."""
+
 
 @dataclass(frozen=True)
 class Keep:

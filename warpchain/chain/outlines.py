@@ -19,7 +19,7 @@ def fitted(joints: Array, rates: Array, length: float) -> tuple[Array, Array]:
     if abs(apart[worst] - length) > WIDEST_MISFIT * length:
         raise InputError(
             f"joints: the loop is not closed, or lengths are not in m: joints {(worst - 1) % n} and {worst} are "
-            f"{apart[worst]:.3g} m apart, and links are {length:g} m long; give every joint, in order"
+            f"{apart[worst]:.3g} m apart, and links are {length:g} m long; pass every joint, in order"
         )
     places = joints.copy()
     for _ in range(50):
@@ -28,7 +28,7 @@ def fitted(joints: Array, rates: Array, length: float) -> tuple[Array, Array]:
         if np.abs(misfit).max() <= 1e-13 * length**2:
             return places, rates - _pull(span, np.sum(span * (rates - np.roll(rates, 1, axis=0)), axis=1))
         places -= _pull(span, misfit)
-    raise InputError(f"joints: no closed chain of {n} links of {length:g} m lies near them; measure them anew")
+    raise InputError(f"joints: found no closed chain of {n} links of {length:g} m near them; measure them again")
 
 
 def _pull(span: Array, change: Array) -> Array:

@@ -10,20 +10,17 @@ from typing import Final
 from warpchain.chain.setup import Setup, State
 from warpchain.inputs.distributions import TABLE, Seed, draw, random_generator
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.parameters import preset as parameter_preset
 from warpchain.inputs.scene import OF_LINKS, Scene
 from warpchain.inputs.unit_slips import check_units
-from warpchain.inputs.validation import InputError, Section, checked, validated
+from warpchain.inputs.validation import InputError, checked, validated
 
 Values = Mapping[str, object]
-SECTIONS: Final[Mapping[str, type[Section]]] = {"scene": Scene, "options": Options, "parameters": Parameters}
-"""Sections of a user's values, and the models that hold their fields."""
 MAY_BE_NONE: Final = ("links", "frequency", "start", "method", "tolerance")
 """Keywords of a walk whose None is the default."""
 OF_THE_WALK: Final = (
-    *("walk_limit", "walk_until", "distance_limit", "floor", "slope"),
-    *("charm_mass", "charm_inertia", "charm_radius", "charm_link", "stiff_joint", "stiff_joint_factor"),
+    *("walk_limit", "stop_time", "distance_limit", "floor", "slope"),
+    *("charm_mass", "charm_inertia", "charm_radius", "charm_link", "stiff_joint", "joint_friction_factor"),
     *("mass_gradient", *OF_LINKS),
 )
 """Fields of the scene that matter after the release, and may change there."""
@@ -51,7 +48,7 @@ def resolve(
 def continued(state: State, sections: Mapping[str, Values]) -> Setup:
     """The setup of a walk from a state, with other values of what comes behind the release; else an `InputError`."""
     if early := [name for name in sections["scene"] if name not in OF_THE_WALK]:
-        raise InputError(f"{', '.join(early)}: given together with a state, whose chain is released; leave it out")
+        raise InputError(f"{', '.join(early)}: not possible with a state, whose chain is already released; remove it")
     before, given = state.setup, sections["options"]
     options = validated(Options, {**before.options.beside(given), **given}, "options")
     scene = validated(Scene, {**vars(before.scene), **sections["scene"]}, "scene")
@@ -59,7 +56,7 @@ def continued(state: State, sections: Mapping[str, Values]) -> Setup:
     setup = Setup(before.preset, parameters, scene, options, state).checked("start")
     for name in OF_THE_WALK[:2]:
         if (end := getattr(scene, name)) is not None and end < state.time:
-            raise InputError(f"{name}: {end:g} s is before the state at {state.time:g} s; give a later time")
+            raise InputError(f"{name}: {end:g} s is before the state at {state.time:g} s; use a later time")
     if not options.unusual_values:
         check_units({name: getattr(parameters, name) for name in sections["parameters"]}, "parameters")
         check_units(sections["scene"], "scene")

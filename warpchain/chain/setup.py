@@ -18,11 +18,12 @@ from warpchain.chain.start_shapes import links_between
 from warpchain.inputs.arrays import Array, checked_array
 from warpchain.inputs.compound_fields import FARTHEST
 from warpchain.inputs.distributions import Distribution, Gaussian
+from warpchain.inputs.fields import SECTION_OF
 from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL, Options
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import Scene, check_links_on_gpu
 from warpchain.inputs.unit_slips import check_units
-from warpchain.inputs.validation import SECTION_OF, InputError, InputWarning, shown, validated
+from warpchain.inputs.validation import InputError, InputWarning, shown, validated, with_numbers
 from warpchain.kernels.methods.method import find_method
 
 DEFAULT_PRESET: Final = "paper"
@@ -63,7 +64,8 @@ class Setup:
     @cached_property
     def link_values(self) -> LinkValues:
         """What each link and joint of the chain has of its own."""
-        return link_values(self.scene, self.parameters)
+        own = link_values([self.scene], [self.parameters])
+        return LinkValues(*(values[0] for values in vars(own).values()))
 
     @cached_property
     def floor(self) -> Floor:
@@ -134,7 +136,7 @@ class Setup:
     @property
     def fingerprint(self) -> NDArray[np.uint8]:
         """What tells setups apart that would carry one state on in different ways, as bytes; its limits do not."""
-        limits = {"walk_limit", "walk_until", "distance_limit"}
+        limits = {"walk_limit", "stop_time", "distance_limit"}
         parts = [self.parameters.model_dump_json(), self.options.model_dump_json(exclude_defaults=True)]
         parts.append(self.scene.model_dump_json(exclude=limits, exclude_defaults=True))
         return np.frombuffer(hashlib.sha256("\n".join(parts).encode()).digest(), dtype=np.uint8)
@@ -144,9 +146,9 @@ class Setup:
         sections: dict[str, dict[str, float]] = {"parameters": {}, "scene": {}}
         for name, value in drawn.items():
             sections[SECTION_OF[name]][name] = value
-        parameters = validated(Parameters, {**vars(self.parameters), **sections["parameters"]}, "parameters")
-        scene = validated(Scene, {**vars(self.scene), **sections["scene"]}, "scene")
-        return replace(self, parameters=parameters, scene=scene).checked(asks_units=False)
+        parameters = with_numbers(self.parameters, sections["parameters"], "parameters")
+        scene = with_numbers(self.scene, sections["scene"], "scene")
+        return Setup(self.preset, parameters, scene, self.options, self.start).checked(asks_units=False)
 
     def placed(self, distributions: Mapping[str, Distribution]) -> dict[str, Distribution]:
         """The distributions with means and bounds for this chain.
@@ -176,7 +178,7 @@ class Setup:
         scene, options = self.scene, self.options
         if scene.plane == "tilting" and find_method(options.method).has_rigid_flight:
             raise InputError(
-                f"options.method: {shown(options.method)} keeps planes fixed; give explicit, or plane: fixed"
+                f"options.method: {shown(options.method)} cannot tilt the plane; use explicit, or plane: fixed"
             )
         if self.start is None and asks_units and not options.unusual_values:
             check_units(vars(self.parameters), "parameters")
@@ -194,11 +196,13 @@ class Setup:
             radii = self.link_values.radius
             if not radii.max() < (half := parameters.link_length / 2):
                 field = "charm_radius" if scene.charm_radius == radii.max() else f"link_radii[{radii.argmax()}]"
-                raise InputError(f"scene.{field}: {radii.max()} is not below half a link, {half}; give less")
+                raise InputError(f"scene.{field}: expected less than half a link, {half}, got {radii.max()}; use less")
         inner, outer = parameters.inner_mass, parameters.outer_mass
         is_one_kind = (inner, parameters.inner_inertia) == (outer, parameters.outer_inertia)
         if scene.links % 2 and not is_one_kind and (scene.link_masses is None or scene.link_inertias is None):
-            raise InputError(f"{path}: {scene.links} is odd; give an even number, or link_masses and link_inertias")
+            raise InputError(
+                f"{path}: expected an even number, got {scene.links}; use one, or set link_masses and link_inertias"
+            )
 
     def _check_drive(self) -> None:
         """Check that the chain can hang on its sprocket, leave it, and bear the loads there."""
@@ -206,29 +210,31 @@ class Setup:
         radius = parameters.sprocket_radius
         if self.contact_radius <= 0:
             raise InputError(
-                f"parameters.sprocket_radius: {radius} is too small for sprocket_radius_is: pitch; give more"
+                f"parameters.sprocket_radius: {radius} is too small for sprocket_radius_is: pitch; use more"
             )
         highest = scene.clearance + scene.links * parameters.link_length / 2  # of the sprocket's lowest point
         if scene.release and scene.is_level and (lowest := min(row[2] for row in scene.release)) < -highest:
-            raise InputError(f"scene.release: y = {lowest:g} m is through the floor; give {-highest:g} m or more")
+            raise InputError(
+                f"scene.release: expected y of at least {-highest:g} m, got {lowest:g} m; raise the sprocket"
+            )
         if self.joint_radius < LEAST_SPROCKET * parameters.link_length:
             raise InputError(
-                f"parameters.sprocket_radius: {radius} is nothing beside a link; give more, or start: ellipse"
+                f"parameters.sprocket_radius: {radius} is negligible compared with a link; use more, or start: ellipse"
             )
         if scene.load_factor is not None:
             greatest = self.link_values.greatest_load(parameters.link_length)
             if scene.load_factor > greatest:
-                problem = f"{scene.load_factor:g} is too much for links of so little rotary inertia"
-                raise InputError(f"scene.load_factor: {problem}; give at most {greatest:.6g}, or null")
+                problem = f"{scene.load_factor:g} is too much for links with such a small moment of inertia"
+                raise InputError(f"scene.load_factor: {problem}; use at most {greatest:.6g}, or null")
         if scene.links < (fewest := self.fewest_links):
             raise InputError(
-                f"scene.links: {scene.links} links do not reach round the sprocket; give at least {fewest}"
+                f"scene.links: {scene.links} links do not reach around the sprocket; use at least {fewest}"
             )
         interval = self.options.record_interval
         if interval > LONGEST_DRIVE_INTERVAL and scene.load_factor != 1:
             raise InputError(
                 f"options.record_interval: loads on the sprocket change at each, and {interval} s is too long for "
-                f"that; give at most {LONGEST_DRIVE_INTERVAL} s, or scene.load_factor: 1"
+                f"that; use at most {LONGEST_DRIVE_INTERVAL} s, or scene.load_factor: 1"
             )
 
 
@@ -277,19 +283,21 @@ class State:
             object.__setattr__(self, name, checked_array(getattr(self, name), name, *shape))
         for name in ("position", "origin") if self.origin is not None else ("position",):
             if (far := float(np.abs(getattr(self, name)[..., :2]).max())) > FARTHEST:
-                raise InputError(f"{name}: a place {far:.6g} m from the origin; expected at most {FARTHEST:g} m, in m")
+                raise InputError(
+                    f"{name}: expected at most {FARTHEST:g} m from the origin, got {far:.6g} m; check the unit"
+                )
         if self.axes is not None and not np.allclose(self.axes @ self.axes.T, np.eye(2), atol=1e-9):
-            raise InputError("axes: not two directions at right angles; give unit vectors")
+            raise InputError("axes: expected two perpendicular unit vectors; correct them")
         clock = float(self.memory.get("state/time", 0.0))
         if self.time != clock:
-            raise InputError(f"time: {self.time!r} s is not that of its walk; give {clock:g}")
+            raise InputError(f"time: expected the time of its walk, {clock:g} s, got {self.time!r}; use the former")
         left, right = np.split(circles_of(self.position, self.parameters.link_length), 2)
         opening = np.linalg.norm(np.roll(left, -1, axis=0) - right, axis=1)
         if (widest := float(opening.max())) > WIDEST_OPENING * self.parameters.link_length:
             link = int(opening.argmax())
             raise InputError(
                 f"position: the loop is not closed: the ends of links {link} and {(link + 1) % self.links} are "
-                f"{widest:.3g} m apart, and links are {self.parameters.link_length:g} m long; give links that join"
+                f"{widest:.3g} m apart, and links are {self.parameters.link_length:g} m long; let links meet"
             )
 
     def __repr__(self) -> str:

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.compound_fields import Motion
+from warpchain.inputs.compound_fields import SprocketMotion
 from warpchain.kernels import layout
 
 BEYOND: Final = 1e30
 """Time [s] of the rows for kernels behind the last."""
 
 
-def _knots(motion: Motion) -> tuple[Array, Array, Array]:
+def _knots(motion: SprocketMotion) -> tuple[Array, Array, Array]:
     """Times since the release [s], (k,), places x, y [m], (k, 2), and speeds [m/s], (k, 2), of release and rows."""
     from scipy.interpolate import PchipInterpolator
 
@@ -26,7 +26,7 @@ def _knots(motion: Motion) -> tuple[Array, Array, Array]:
     return times[:, 0], places, speeds
 
 
-def sprocket_places(motion: Motion | None, times: ArrayLike) -> Array:
+def sprocket_places(motion: SprocketMotion | None, times: ArrayLike) -> Array:
     """Places x, y of the sprocket relative to that at the release [m], (t, 2), at times since then [s], (t,).
 
     They are NaN where it has vanished; without a motion it vanishes at once.
@@ -39,7 +39,7 @@ def sprocket_places(motion: Motion | None, times: ArrayLike) -> Array:
     return np.where(np.reshape(times, (-1, 1)) < motion[-1][0], there, np.nan)
 
 
-def motion_rows(motion: Motion, frequency: float, height: float) -> Array:
+def motion_rows(motion: SprocketMotion, frequency: float, height: float) -> Array:
     """The rows of `Drive.motion`, given frequency [Hz] and height of the sprocket's centre [m] at the release."""
     times, places, speeds = _knots(motion)
     rows = np.zeros((layout.MOTION_ROWS, layout.MOTION_VALUES))

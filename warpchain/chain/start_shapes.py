@@ -29,14 +29,15 @@ class Curve:
 
     `points` maps s, (w, m), and sizes, (w,), to P [m], ∂P/∂s, and ∂P/∂size at fixed s, (2, w, m) each; `period` sizes
     to the periods of s, and `period_growth` is their derivative; `first_size` maps lengths of chains [m] to sizes for
-    Newton's method to start from. `is_arc_length` says whether s is a length along the curve.
+    Newton's method to start from. `pace` maps s and sizes to |∂P/∂s|, (w, m), where s is an angle, of period 2π; if s
+    is a length along the curve, it is None.
     """
 
     points: Callable[[Array, Array], tuple[Array, Array, Array]]
     period: Callable[[Array], Array]
     period_growth: float
     first_size: Callable[[Array], Array]
-    is_arc_length: bool
+    pace: Callable[[Array, Array], Array] | None = None
 
 
 def stadium(radius: ArrayLike) -> Curve:
@@ -69,7 +70,6 @@ def stadium(radius: ArrayLike) -> Curve:
         period=lambda size: 4 * quarter[:, 0] + 2 * size,
         period_growth=2.0,
         first_size=lambda length: np.maximum((length - 4 * quarter[:, 0]) / 2, 0.0),
-        is_arc_length=True,
     )
 
 
@@ -87,12 +87,18 @@ def ellipse(aspect: ArrayLike) -> Curve:
         along = np.stack([wide * cosine, -high * sine])
         return scale * unit, scale * along, unit
 
+    def pace(s: Array, size: Array) -> Array:
+        scale = size[:, np.newaxis]
+        across, up = scale * (wide * np.cos(s)), scale * (high * np.sin(s))
+        paces: Array = np.sqrt(across * across + up * up)
+        return paces
+
     return Curve(
         points=points,
         period=lambda size: np.full_like(size, 2 * np.pi),
         period_growth=0.0,
         first_size=lambda length: length / np.array([_circumference(each) for each in aspects.tolist()]),
-        is_arc_length=False,
+        pace=pace,
     )
 
 
@@ -137,8 +143,8 @@ def lay_chains(
     length, start = link_length[:, np.newaxis], phase[:, np.newaxis]
     size = curve.first_size(links * link_length)
     s = curve.period(size)[:, np.newaxis] * (start + np.arange(links) / links)
-    if not curve.is_arc_length:
-        s = _evenly_spaced(curve, s, size)
+    if curve.pace is not None:
+        s = _evenly_spaced(curve.pace, s, size)
     worst, is_done = np.full(len(size), np.inf), np.zeros(len(size), dtype=bool)
     for _ in range(MOST_ITERATIONS):
         period = curve.period(size)
@@ -154,10 +160,10 @@ def lay_chains(
         to_size[:, -1] += to_following[:, -1] * (1 + phase) * curve.period_growth
         last, worst = worst, np.abs(residual).max(-1)
         is_done |= (last < MISFIT * link_length**2) & (worst > last / 2)  # rounding is reached
-        change = _solve_loop(to_here, to_following, to_size, -residual)
-        is_done |= ~np.isfinite(change).all(-1)
         if is_done.all():
             break
+        change = _solve_loop(to_here, to_following, to_size, -residual)
+        is_done |= ~np.isfinite(change).all(-1)
         change[is_done] = 0.0
         s[:, 1:] += change[:, :-1]
         size = np.maximum(size + change[:, -1], 0.0)
@@ -175,11 +181,11 @@ def lay_chains(
     return *links_between(np.moveaxis(joints, 0, -1), np.moveaxis(joint_rate, 0, -1)), fits
 
 
-def _evenly_spaced(curve: Curve, s: Array, size: Array) -> Array:
+def _evenly_spaced(pace: Callable[[Array, Array], Array], s: Array, size: Array) -> Array:
     """Places s, (w, n), of joints that divide each curve into arcs of about equal length from its first s on."""
-    fine = s[:, :1] + np.linspace(0.0, curve.period(size), 1024, axis=-1)
-    pace = np.sqrt(np.sum(curve.points(fine, size)[1] ** 2, axis=0))
-    steps = (pace[:, 1:] + pace[:, :-1]) / 2 * np.diff(fine)
+    fine = s[:, :1] + np.linspace(0.0, 2 * np.pi, 1024)
+    paces = pace(fine, size)
+    steps = (paces[:, 1:] + paces[:, :-1]) / 2 * (fine[:, 1:] - fine[:, :-1])
     arc = np.concatenate([np.zeros((len(size), 1)), steps.cumsum(-1)], axis=1)
     n = s.shape[1]
     return np.stack([np.interp(way[-1] * np.arange(n) / n, way, at) for way, at in zip(arc, fine, strict=True)])

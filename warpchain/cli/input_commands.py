@@ -1,4 +1,4 @@
-"""The commands about what a user may give, and what a method takes: parameters, schema, bench."""
+"""The commands `parameters` and `schema`, which list possible inputs, and `bench`, which measures speed."""
 
 import json
 from pathlib import Path
@@ -28,21 +28,24 @@ WALKS: Final = {
     "at rest": "{[at_rest]:,}",
     "s": "{[seconds]:.1f}",
     "walks/s": "{[walks_per_second]:.3g}",
+    "waits for GPU": "{[waited]:.0%}",
 }
 """Heading of each column of a table → its text, filled in from a row."""
 
 
 def parameters(
     names: Annotated[list[str] | None, argument("[NAME]...", _NAMES)] = None,
-    preset: Annotated[str, option("NAME", "Whose values: paper, Table 1 of the paper, or soft.")] = "paper",
+    preset: Annotated[
+        str, option("NAME", "Preset whose values are shown: paper (Table 1 of the paper) or soft.")
+    ] = "paper",
 ) -> None:
-    """List what can be set: parameters, scene and options, with symbols, units, values, bounds and meanings."""
-    from warpchain.chain.resolution import SECTIONS
+    """List all parameters, scene fields and options, with symbols, units, values, bounds and meanings."""
     from warpchain.cli.output import print_table
+    from warpchain.inputs.fields import FIELDS, SECTION_OF, SECTIONS, SYMBOL_OF, dotted_name
     from warpchain.inputs.options import Options
     from warpchain.inputs.parameters import preset as parameter_preset
     from warpchain.inputs.scene import Scene
-    from warpchain.inputs.validation import FIELDS, SECTION_OF, SYMBOL_OF, dotted_name, field_limits, field_unit, shown
+    from warpchain.inputs.validation import field_limits, field_unit, shown
     from warpchain.pictures.labels import value_text
 
     wanted = {name if name in SECTIONS else dotted_name(name, shown(name)) for name in names or SECTIONS}
@@ -66,11 +69,11 @@ def parameters(
 
 
 def schema(
-    path: Annotated[Path | None, output("FILE", "Write it to this file instead of standard output.")] = None,
+    path: Annotated[Path | None, output("FILE", "Write the schema to this file instead of standard output.")] = None,
 ) -> None:
     """Print a JSON schema of sweep files, for editors.
 
-    An editor with a YAML language server finds it by the first line of a sweep file:
+    An editor with a YAML language server finds the schema by the first line of a sweep file:
     # yaml-language-server: $schema=FILE
     """
     from warpchain.files import write_whole
@@ -92,12 +95,12 @@ def bench(
     ] = None,
     as_json: Annotated[bool, JSON] = False,
 ) -> None:
-    """Measure steps and errors of each method, and walks a second.
+    """Measure the time and the error of a step of each method, and walks per second.
 
-    A step is an attempted one of one chain in flight, of 4000 side by side on a GPU, at Table 1's values and the
-    method's default tolerance. Errors are the greatest of a link's position and velocity after a millisecond, against
-    SciPy's DOP853 at 1e-10 on a model in NumPy. Walks are those of 60 links at 15 Hz with the default method, kernels
-    loaded before.
+    Steps are attempted steps of one chain in free flight (4000 chains on a GPU), with Table 1's values and the
+    method's default tolerance. Errors are the largest errors of a link's position and velocity after 1 ms, compared
+    with SciPy's DOP853 at 1e-10 on a NumPy model. Walks have 60 links at 15 Hz, the default method and a warm kernel
+    cache; beside their rate stands the share of the time in which the host waited for a GPU.
     """
     from warpchain.bench.measurements import machine, step_costs, walk_rate
     from warpchain.cli.output import print_table
@@ -111,7 +114,7 @@ def bench(
     for count in lengths:
         check_links_on_gpu(count, where, "bench.links")
         if count % 2:
-            raise InputError(f"bench.links: {count} is odd; inner and outer links alternate: give an even number")
+            raise InputError(f"bench.links: expected an even number, got {count}; inner and outer links alternate")
     about = machine(where)
     with changing_line() as show:
         steps, walks = step_costs(where, lengths, show), walk_rate(where, show)

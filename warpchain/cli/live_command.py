@@ -11,8 +11,8 @@ import typer
 from warpchain.cli.interrupts import INTERRUPTED
 from warpchain.cli.words import argument, option, output
 
-_WHAT: Final = "Folder of a sweep whose cells are shown, or an address of the page, whose set-up is opened again."
-_EXPORT: Final = "Write index.html to this folder, a page of some 40 walks that needs neither a server nor Python."
+_WHAT: Final = "Folder of a sweep whose cells are shown, or a saved address of the page, which restores its settings."
+_EXPORT: Final = "Write index.html with some 40 precomputed walks to this folder; it needs neither a server nor Python."
 
 
 def live(
@@ -21,9 +21,9 @@ def live(
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")] = True,
     export: Annotated[Path | None, output("DIR", _EXPORT, "--export")] = None,
 ) -> None:
-    """Serve a page with sliders on which a chain walks, to this machine only, until Ctrl-C.
+    """Serve an interactive page to this machine only, until Ctrl-C: sliders change the walk of a chain.
 
-    The page shows the walk while it is computed, samples, pushed links, and the lines that make the same walk.
+    The page shows the walk while it is computed, random samples, pushed links, and the code that repeats the walk.
     """
     from warpchain.inputs.validation import InputError, printable
 
@@ -31,7 +31,7 @@ def live(
         from warpchain.live_page.export import export_page
 
         if what is not None:
-            raise InputError("--export: given together with a folder or an address; leave one out")
+            raise InputError("--export: not possible with a folder or an address; remove one")
         print(printable(str(export_page(export))))
         return
     from warpchain.live_page.server import LiveServer

@@ -62,7 +62,10 @@ def _refuse_for(error: Exception) -> None:
     elif isinstance(error, OSError):
         problems, status = [described(error)], FAILED if error.errno in DISK_FAILURES else REFUSED
     elif isinstance(error, MemoryError):
-        problems, status = [f"out of memory ({error or 'no size is known'}); give less at once, or free memory"], FAILED
+        problems, status = (
+            [f"out of memory ({error or 'no size is known'}); compute less at once, or free memory"],
+            FAILED,
+        )
     elif isinstance(error, InputError):
         problems, status = [*error.args], FAILED if isinstance(error, DamagedFileError) else REFUSED
     elif isinstance(error, LostWorkersError):

@@ -8,12 +8,14 @@ import sys
 import tempfile
 from collections.abc import Container, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, get_args
+from typing import TYPE_CHECKING, Final
 
 from warpchain.engine.tallies import LOST
 from warpchain.files import checked_output, make_folder, naming, remove_output
+from warpchain.hdf5_files import SWEEP_FILE, WALK_FILE
+from warpchain.inputs.figure_kinds import KINDS, FigureWord
 from warpchain.inputs.validation import InputError, json_value, one_line, printable
-from warpchain.pictures.labels import COUNTS, SPREADS, Kind, cell_notes, cell_table
+from warpchain.pictures.labels import COUNTS, SPREADS, cell_notes, cell_table
 from warpchain.results.walk_result import WalkResult, load_walk
 from warpchain.status import Status
 from warpchain.walks.landmarks import FAULTS
@@ -21,8 +23,7 @@ from warpchain.walks.landmarks import FAULTS
 if TYPE_CHECKING:
     from warpchain.results.sweep_result import SweepResult
 
-RECORD: Final = "walk.h5"
-_PICTURES: Final = (*(f"{kind}.png" for kind in get_args(Kind)), "walk.gif")
+_PICTURES: Final = (*(f"{kind}.png" for kind in KINDS), "walk.gif")
 """What `plot` and `animate` write beside the record unless told otherwise."""
 _MOST_CELLS: Final = 1000
 """Most cells of a sweep that a table lists; one of 100,000 would take minutes to lay out."""
@@ -118,14 +119,12 @@ def _walk_rows(result: WalkResult) -> Iterator[tuple[str, str]]:
     yield "greatest joint opening", f"{1e3 * result.greatest_opening:.3g} mm"
     depths = (f"{kind} {1e3 * depth:.3g} mm" for kind, depth in result.greatest_penetration.items())
     yield "greatest penetration", ", ".join(depths)
-    released = energy["kinetic_at_release"] + energy["potential_at_release"]
-    if not math.isnan(released):  # else the chain never got so far
-        yield "energy at release", f"{released:.5f} J, kinetic {energy['kinetic_at_release']:.5f} J"
+    if not math.isnan(result.energy_at_release):  # else the chain never got so far
+        yield "energy at release", f"{result.energy_at_release:.5f} J, kinetic {energy['kinetic_at_release']:.5f} J"
         for cause in LOST:
             if energy[cause] or cause not in ("softening", "joint_switch"):
                 yield f"  lost to {cause.replace('_', ' ')}", f"{energy[cause]:.5f} J"
-        left = energy["kinetic_at_end"] + energy["potential_at_end"]
-        yield "energy at the end", f"{left:.5f} J, kinetic {energy['kinetic_at_end']:.5f} J"
+        yield "energy at the end", f"{result.energy_at_end:.5f} J, kinetic {energy['kinetic_at_end']:.5f} J"
         yield "unaccounted for", f"{energy['residual']:.1e} J"
     for warning in result.warnings():
         yield "warning", warning
@@ -136,7 +135,7 @@ def saved(path: Path, wanted: str) -> "WalkResult | SweepResult":
     from warpchain.hdf5_files import kind_of_hdf5
     from warpchain.results.sweep_result import MERGED, load
 
-    record = path / RECORD if os.path.isfile(path / RECORD) else path
+    record = path / WALK_FILE if os.path.isfile(path / WALK_FILE) else path
     is_sweep = record.is_dir() or (record.suffix != ".h5" and not record.exists())
     return load(record) if is_sweep or kind_of_hdf5(record, wanted) == MERGED.kind else load_walk(record)
 
@@ -153,10 +152,10 @@ def try_walk_folder(folder: Path) -> None:
                 nearest = nearest.parent
         with tempfile.TemporaryDirectory(prefix=".warpchain-", dir=nearest):
             pass
-    if (folder / "sweep.h5").exists():
-        raise InputError(f"{folder}: holds a sweep; give another folder")
+    if (folder / SWEEP_FILE).exists():
+        raise InputError(f"{folder}: already holds a sweep; use another folder")
     if folder.is_dir():
-        for name in (RECORD, *_PICTURES):
+        for name in (WALK_FILE, *_PICTURES):
             checked_output(folder / name)
 
 
@@ -166,15 +165,15 @@ def write_walk(result: WalkResult, folder: Path) -> Iterator[Path]:
     Figures and film of an earlier walk, which do not belong to this record, are deleted.
     """
     make_folder(folder)
-    result.save(folder / RECORD)
-    yield folder / RECORD
+    result.save(folder / WALK_FILE)
+    yield folder / WALK_FILE
     for name in _PICTURES:
         remove_output(folder / name)
     yield from draw_figures(result, folder, ["film_strip"])
 
 
 def draw_figures(
-    walk: WalkResult, folder: Path, kinds: Iterable[Kind], suffix: str = "png", width: float | None = None
+    walk: WalkResult, folder: Path, kinds: Iterable[FigureWord], suffix: str = "png", width: float | None = None
 ) -> Iterator[Path]:
     """Draw figures, of a width [inches] if it is given, into a folder, in files of a suffix; yield the path of each.
 

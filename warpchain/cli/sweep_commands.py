@@ -11,13 +11,18 @@ import typer
 
 from warpchain.cli.walk_commands import FAILED
 from warpchain.cli.words import JSON, argument, option, output, output_path
+from warpchain.inputs.figure_kinds import KINDS, FigureWord
 
 if TYPE_CHECKING:
     from warpchain.results.sweep_result import SweepResult
 
-_FILE: Final = "The sweep, or the bare name of one that comes with warpchain, such as figure6."
-_FILES: Final = "Sweeps, or bare names of those that come with warpchain. Default: all that come with it."
-_DEVICE: Final = "cpu, cuda (the first GPU) or cuda:N, instead of what the sweep says."
+_FILE: Final = "Sweep file, or the bare name of a sweep that comes with warpchain, e.g. figure6."
+_FILES: Final = "Sweep files, or bare names of sweeps that come with warpchain. Default: all of the latter."
+_KIND: Final = (
+    f"The only figure of a walk to draw. {'; '.join(f'{word}: {kind.described}' for word, kind in KINDS.items())}. "
+    "Default: all that the walk has data for."
+)
+_DEVICE: Final = "cpu, cuda (the first GPU) or cuda:N, instead of the device in the sweep file."
 
 AsJson = Annotated[bool, JSON]
 
@@ -25,36 +30,40 @@ AsJson = Annotated[bool, JSON]
 def sweep(
     context: typer.Context,
     source: Annotated[Path | None, argument("FILE.yaml", _FILE)] = None,
-    folder: Annotated[Path | None, output("DIR", "Folder of the results; a killed sweep goes on in it.")] = None,
-    device: Annotated[str | None, option("NAME", _DEVICE)] = None,
-    workers: Annotated[int | None, option("N", "Shards in work at once. Default: processors.", min=1)] = None,
-    gpus: Annotated[
-        int | None, option("N", "Run on the first N GPUs of this machine, a process for each.", min=1)
+    folder: Annotated[
+        Path | None, output("DIR", "Results folder. If it already holds part of this sweep, the sweep resumes.")
     ] = None,
-    part: Annotated[str | None, option("K/N", "Run only the K-th of N parts; merge puts them together.")] = None,
+    device: Annotated[str | None, option("NAME", _DEVICE)] = None,
+    workers: Annotated[int | None, option("N", "Number of shards computed at once. Default: CPU cores.", min=1)] = None,
+    gpus: Annotated[
+        int | None, option("N", "Run on the first N GPUs of this machine, with one process each.", min=1)
+    ] = None,
+    part: Annotated[str | None, option("K/N", "Run only the K-th of N parts; `merge` joins them.")] = None,
     seed: Annotated[int | None, option("S", "Seed instead of the file's.", min=0)] = None,
     samples: Annotated[int | None, option("N", "Samples of each cell instead of the file's.", min=1)] = None,
-    fresh: Annotated[bool, typer.Option("--fresh", help="Discard what another sweep left in the folder.")] = False,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Delete the results of another sweep in the folder.")] = False,
     new: Annotated[
         Path | None,
-        option("FILE.yaml", "Write a small sweep file that explains its keys; run nothing.", parser=output_path),
+        option(
+            "FILE.yaml", "Write a small sweep file whose comments explain its keys; run nothing.", parser=output_path
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Run a sweep, or what is left of it: many walks over a grid."""
+    """Run a sweep, many walks over a grid of values; rerun the command to resume it."""
     from warpchain.inputs.validation import InputError, printable
     from warpchain.sweeps.sweep_file import write_new_sweep
 
     if new is not None:
         if any(value is not None and value is not False for name, value in context.params.items() if name != "new"):
-            raise InputError("--new: given together with other arguments; leave them out")
+            raise InputError("--new: not possible with other arguments; remove them")
         write_new_sweep(new)
         print(printable(str(new)))
         return
     if source is None:
-        raise InputError("FILE.yaml: missing; give a sweep file, or --new FILE.yaml to have one written")
+        raise InputError("FILE.yaml: missing; pass a sweep file, or write one with --new FILE.yaml")
     if folder is None:
-        raise InputError("--output: missing; give a folder for the results with -o DIR")
+        raise InputError("--output: missing; set a folder for the results with -o DIR")
     if device is not None and device.startswith("cuda") and gpus is None:
         from warpchain.engine.devices import start_early
 
@@ -68,13 +77,13 @@ def sweep(
         from warpchain.engine.devices import gpu_count
 
         if workers is not None:
-            raise InputError("--workers: given together with --gpus; leave one out")
+            raise InputError("--workers: not possible with --gpus; remove one")
         if device not in (None, "cuda"):
-            raise InputError(f"--device: {device} is given together with --gpus; give cuda, or leave one out")
+            raise InputError(f"--device: {device} is not possible with --gpus; use cuda, or remove one")
         device = "cuda"
         if gpus > (there := gpu_count()):
-            remedy = f"give at most {there}" if there else "leave it out to run on the CPU"
-            raise InputError(f"--gpus: {gpus} wanted, but this machine has {there}; {remedy}")
+            remedy = f"use at most {there}" if there else "remove it to run on the CPU"
+            raise InputError(f"--gpus: expected at most {there}, the GPUs of this machine, got {gpus}; {remedy}")
     try:
         with contextlib.nullcontext() if gpus is None else gpu_workers(gpus) as executor:
             result = run(
@@ -89,7 +98,7 @@ def sweep(
                 samples=samples,
             )
     except KeyboardInterrupt:
-        print(f"the same command{', without --fresh,' if fresh else ''} goes on with the sweep", file=sys.stderr)
+        print(f"rerun the same command{', without --fresh,' if fresh else ''} to resume the sweep", file=sys.stderr)
         raise
     print_sweep(result, folder, as_json)
     counts = result.summary()
@@ -143,10 +152,7 @@ def plot(
     quantity: Annotated[
         str | None, option("NAME", "Column of a sweep to draw: dx, walk_time, bounces, hold_time ... Default: dx.")
     ] = None,
-    kind: Annotated[
-        Literal["film_strip", "height_and_speed", "loop", "energy", "tilt"] | None,
-        typer.Option(help="Only figure of a walk to draw. Default: all that it has something for."),
-    ] = None,
+    kind: Annotated[FigureWord | None, typer.Option(help=_KIND)] = None,
     width: Annotated[
         str | None,
         option("WIDTH", "Width on paper, such as 85mm for a column: texts have 6 pt at least. Default: as suits."),
@@ -157,14 +163,14 @@ def plot(
 ) -> None:
     """Draw all figures of a sweep or of a saved walk.
 
-    Of a sweep: the distance as in the paper's Figure 6, maps, lines over any axes, sensitivity. Of a walk: film_strip,
-    height_and_speed, loop, energy and, if the plane tilts, tilt; a line says what is left out and why.
+    For a sweep these are the distance as in the paper's Figure 6, maps, lines over any axes, and sensitivity. For a
+    walk there is a file for each --kind that it has. A line names each figure that cannot be drawn, and why.
     """
     from warpchain.cli.output import draw_figures, saved
     from warpchain.files import make_folder
     from warpchain.inputs.validation import InputError, printable
-    from warpchain.pictures.labels import kinds_of
     from warpchain.pictures.style import on_paper
+    from warpchain.pictures.walk_figures import kinds_of
     from warpchain.reports.sweep_figures import figures
     from warpchain.results.walk_result import WalkResult
 
@@ -175,13 +181,13 @@ def plot(
 
         found: WalkResult | SweepResult = load(paths)
     else:
-        found = saved(path, "give the folder of a sweep, a merged file, or the file of a saved walk")
+        found = saved(path, "use the folder of a sweep, a merged file, or the file of a saved walk")
     folder = folder or (path.parent if path.is_file() else path)
     is_walk = isinstance(found, WalkResult)
     if is_walk and quantity is not None:
-        raise InputError("--quantity: a saved walk has no columns; leave it out, or give the folder of a sweep")
+        raise InputError("--quantity: not possible for a saved walk; remove it, or use the folder of a sweep")
     if not is_walk and kind is not None:
-        raise InputError("--kind: a sweep has none; leave it out, or give the file of a saved walk")
+        raise InputError("--kind: not possible for a sweep; remove it, or use the file of a saved walk")
     count = 0
     with on_paper(paper) as inches:
         if isinstance(found, WalkResult):
@@ -192,7 +198,7 @@ def plot(
             if not pictures:
                 name = path if quantity is None else f"--quantity: {quantity}"
                 problem = "no walk at rest has a value, or no axis has several"
-                raise InputError(f"{name}: {problem}; give another --quantity")
+                raise InputError(f"{name}: {problem}; use another --quantity")
             drawn = (picture.save(folder, format) for picture in pictures)
         make_folder(folder)
         for count, drawing in enumerate(drawn, 1):  # noqa: B007
@@ -214,23 +220,26 @@ def _millimetres(text: str) -> float:
 def report(
     directory: Annotated[Path, argument("DIR", "Folder of a sweep.")],
     path: Annotated[
-        Path | None, output("FILE.html", "The page, which replaces an older one only. Default: DIR/report.html.")
+        Path | None,
+        output("FILE.html", "HTML file to write; it may replace an older report only. Default: DIR/report.html."),
     ] = None,
     walk: Annotated[
         int | None,
-        option("INDEX", "Show this walk in motion: its frames if the sweep kept them, or else run again.", min=0),
+        option(
+            "INDEX", "Animate this walk, from its recorded frames if there are any; otherwise it is run again.", min=0
+        ),
     ] = None,
-    device: Annotated[str | None, option("NAME", f"Where the walk is run again: {_DEVICE}")] = None,
+    device: Annotated[str | None, option("NAME", f"Device on which the walk is run again: {_DEVICE}")] = None,
 ) -> None:
-    """Write one HTML page with all of a sweep, and a walk in motion.
+    """Write the report of a sweep as one HTML page, optionally with an animated walk.
 
-    It has figures, tables, parameters, provenance and failed walks, and loads nothing else.
+    The page has figures, tables, parameters, provenance and failed walks, and needs no other files.
     """
     from warpchain.inputs.validation import InputError, printable
     from warpchain.reports.sweep_page import write_report
 
     if device is not None and walk is None:
-        raise InputError("--device: no walk is run for this page; add --walk INDEX, or leave it out")
+        raise InputError("--device: this page runs no walk; add --walk INDEX, or remove it")
     path = path or (directory.parent if directory.is_file() else directory) / "report.html"
     write_report(directory, path, animation_of=walk, device=device)
     print(printable(str(path)))

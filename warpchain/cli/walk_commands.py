@@ -8,6 +8,7 @@ from typing import Annotated, Any, Final
 
 import typer
 
+from warpchain.chain.keep import FRAME_INTERVAL
 from warpchain.cli.words import JSON, argument, option, output
 from warpchain.inputs.methods import METHODS
 from warpchain.inputs.starts import STARTS
@@ -18,42 +19,47 @@ FAILED: Final = 1
 _STARTS: Final = f"{'; '.join(f'{word}: {start.described}' for word, start in STARTS.items())}. Default: rest."
 _PRESETS: Final = "Parameters to start from. paper: Table 1 of the paper; soft: softer joints. Default: paper."
 _METHODS: Final = (
-    "standard: hybrid at 3e-3, joints softened on the sprocket and in the pile, on a GPU the next; explicit: os32 at "
-    "3e-3, softened likewise; reference: rkf78 at 1e-6, as in the paper; or an integrator, "
-    f"{'; '.join(f'{name}: {title}' for name, title in METHODS.items())}. Default: standard."
+    "A solver profile: standard (hybrid on a CPU), explicit (os32, also on a GPU) or reference (rkf78, as in the "
+    f"paper); or an integrator, {'; '.join(f'{name}: {title}' for name, title in METHODS.items())}. Default: standard."
 )
 _TOLERANCE: Final = (
-    "Error allowed in a step, in SI units and relative alike. Default: that of the word, 1e-6 for an integrator, 1e-4 "
-    "for hybrid."
+    "Maximum error of a step, absolute in SI units and relative. Default: that of the profile; 1e-6 for an integrator, "
+    "1e-4 for hybrid."
 )
 _SET: Final = (
-    "Any other value by its name or symbol, in SI units, as clearance=0.005 or mu_fc=0.3; may be repeated. "
-    "`warpchain parameters` lists them."
+    "Set any other value by its name or symbol, in SI units, e.g. clearance=0.005 or mu_fc=0.3; may be repeated. "
+    "`warpchain parameters` lists all names."
 )
-_SEED: Final = "Draw what is not given at random, one sample for each whole number. Without it: means, phase 0."
-_CONFIG: Final = "Read preset, scene, options and parameters from a file; what the command line gives counts more."
+_SEED: Final = (
+    "Sample every parameter that you do not set from its distribution; each integer seed gives one sample. "
+    "Default: mean values and phase 0."
+)
+_CONFIG: Final = "Read preset, scene, options and parameters from a YAML file; command-line options take precedence."
 _LIKE: Final = (
-    "Take setup and seed of a saved walk, its file or folder, or with --index of a walk of a sweep: its folder or a "
-    "merged file. That repeats it to the bit; other options change single values. Not with --config, --preset, --seed."
+    "Repeat a saved walk (its file or folder) or, with --index, a walk of a sweep (its folder or a merged file), "
+    "bit for bit. Other options change single values; --config, --preset and --seed are not possible."
 )
-_INDEX: Final = "Number of the walk in the sweep that --like names, as in the column index of its results."
+_INDEX: Final = "Number of the walk in the sweep of --like, from the column index of its results."
 _OUTPUT: Final = (
-    "Write walk.h5 and film_strip.png to this folder; pictures of an earlier walk there are deleted. `warpchain plot` "
-    "draws the others, `warpchain animate` a film."
+    "Write walk.h5 and film_strip.png to this folder; figures of an earlier walk there are deleted. `warpchain plot` "
+    "draws the other figures, `warpchain animate` an animation."
 )
-_FILM: Final = "The file to write; its name ends in .gif, .mp4 or .html. Default: walk.gif beside the walk."
-_FRAMES: Final = "Simulated time between two pictures of the chain, in s; needs a folder. Default: 0.002."
+_FILM: Final = "File to write; its name ends in .gif, .mp4 or .html. Default: walk.gif beside the walk."
+_LOADED_FRAMES: Final = 1e-4
+"""Time [s] between two frames with joint forces, unless another is given."""
+_FRAMES: Final = f"Simulated time between two frames, in s; needs a folder. Default: {FRAME_INTERVAL:g}."
 _LOADS: Final = (
-    "Record forces and moments of the joints with each picture, by default every 0.0001 s; needs a folder. standard "
-    "then is explicit: rigid joints have no forces. 60 links take 24 MB a second."
+    f"Record the forces and moments of the joints with each frame, by default every {_LOADED_FRAMES:g} s; needs a "
+    "folder. standard then means explicit, because rigid joints have no forces. 60 links take 24 MB per simulated "
+    "second."
 )
 
 _Text = str | None
 
 
 def walk(
-    links: Annotated[_Text, option("N", "Number of links of the loop, even unless all are alike. Default: 60.")] = None,
-    frequency: Annotated[_Text, option("HZ", "Turns of the sprocket per second, in Hz. Default: 15.")] = None,
+    links: Annotated[_Text, option("N", "Number of links; even if inner and outer links differ. Default: 60.")] = None,
+    frequency: Annotated[_Text, option("HZ", "Frequency of the sprocket, in Hz. Default: 15.")] = None,
     start: Annotated[_Text, option("NAME", _STARTS)] = None,
     preset: Annotated[_Text, option("NAME", _PRESETS)] = None,
     method: Annotated[_Text, option("NAME", _METHODS)] = None,
@@ -66,14 +72,15 @@ def walk(
     index: Annotated[_Text, option("I", _INDEX)] = None,
     folder: Annotated[Path | None, output("DIR", _OUTPUT)] = None,
     frame_interval: Annotated[_Text, option("SECONDS", _FRAMES)] = None,
-    record_loads: Annotated[bool, typer.Option("--record-loads", help=_LOADS)] = False,
+    record_joint_forces: Annotated[bool, typer.Option("--record-joint-forces", help=_LOADS)] = False,
     as_json: Annotated[bool, JSON] = False,
 ) -> None:
     """Spin up one chain, drop it, and follow it until it rests."""
-    from warpchain.chain.resolution import SECTIONS, continued, resolve
+    from warpchain.chain.resolution import continued, resolve
     from warpchain.chain.setup import DEFAULT_PRESET
     from warpchain.cli.output import print_walk, saved, try_walk_folder, write_walk
     from warpchain.inputs.distributions import Seed
+    from warpchain.inputs.fields import SECTIONS
     from warpchain.inputs.validation import InputError, checked, printable
     from warpchain.inputs.yaml_files import parse_yaml
     from warpchain.results.one_walk import run_walk
@@ -90,14 +97,14 @@ def walk(
     if like is not None:
         for name, value in (("--config", config), ("--preset", preset), ("--seed", seed)):
             if value is not None:
-                raise InputError(f"{name}: given together with --like, and a saved walk has its own; leave one out")
-        found = saved(like, "give a saved walk, or the folder or merged file of a sweep and --index")
+                raise InputError(f"{name}: not possible with --like, which sets it; remove one")
+        found = saved(like, "use a saved walk, or the folder or merged file of a sweep with --index")
         if isinstance(found, WalkResult):
             if index is not None:
-                raise InputError(f"--index: given, but {like} is a single walk; leave it out")
+                raise InputError(f"--index: not possible for {like}, a single walk; remove it")
             base, number = found.setup, found.seed
         elif index is None:
-            raise InputError(f"--like: {like} has many walks; give --index, the number of one, as well")
+            raise InputError(f"--like: {like} has many walks; add --index, the number of one")
         else:
             block, place = found.located(parse_yaml(index, "--index"))
             base, number = block.setup_at(place), block.origin.seed
@@ -109,18 +116,18 @@ def walk(
         file_preset, own = read_walk_file(config)
         preset = preset or file_preset
         if preset is None:
-            raise InputError("preset: missing; name the parameters to start from, such as preset: paper")
+            raise InputError("preset: missing; set the parameters to start from, e.g. preset: paper")
     elif index is not None:
-        raise InputError("--index: names a walk of a sweep, but --like is missing; give --like DIR, the sweep")
+        raise InputError("--index: --like is missing; add --like DIR, the sweep that has this walk")
     if like is not None and base.start is not None:
         setup = continued(base.start, given)
     else:
         sections = {name: {**own.get(name, {}), **values} for name, values in given.items()}
-        setup = resolve(preset or DEFAULT_PRESET, **sections, seed=number, loads=record_loads)
-    if folder is None and (frame_interval is not None or record_loads):
-        name = "--record-loads" if frame_interval is None else "--frame-interval"
-        raise InputError(f"{name}: there is no folder to write to; add -o DIR")
-    usual = None if folder is None else 1e-4 if record_loads else 2e-3
+        setup = resolve(preset or DEFAULT_PRESET, **sections, seed=number, loads=record_joint_forces)
+    if folder is None and (frame_interval is not None or record_joint_forces):
+        name = "--record-joint-forces" if frame_interval is None else "--frame-interval"
+        raise InputError(f"{name}: has no folder to write to; add -o DIR")
+    usual = None if folder is None else _LOADED_FRAMES if record_joint_forces else FRAME_INTERVAL
     interval = usual if frame_interval is None else parse_yaml(frame_interval, "frame_interval")
     if folder is not None:
         try_walk_folder(folder)
@@ -129,7 +136,7 @@ def walk(
             setup,
             seed=number,
             frame_interval=interval,
-            record_loads=record_loads,
+            record_joint_forces=record_joint_forces,
             on_progress=lambda progress: show(walk_progress_text(progress), progress.phase == "compile"),
         )
     paths: list[Path] = []
@@ -154,12 +161,12 @@ def animate(
     fps: Annotated[float, option("NUMBER", "Pictures per second; in HTML the browser decides. Default: 30.")] = 30.0,
     slow: Annotated[float, option("NUMBER", "Playing time per simulated time. Default: 4.")] = 4.0,
 ) -> None:
-    """Write a film of a saved walk: GIF, MP4 or HTML with a player."""
-    from warpchain.cli.output import RECORD
+    """Write an animation of a saved walk: GIF, MP4 or HTML with a player."""
+    from warpchain.hdf5_files import WALK_FILE
     from warpchain.inputs.validation import InputError, printable
     from warpchain.results.walk_result import load_walk
 
-    record = walk / RECORD if walk.is_dir() else walk
+    record = walk / WALK_FILE if walk.is_dir() else walk
     result, path = load_walk(walk), path or record.with_suffix(".gif")
     try:
         result.animate(path, fps=fps, slow=slow)
@@ -170,20 +177,21 @@ def animate(
 
 def _given_values(named: Mapping[str, str | None], assignments: Sequence[str]) -> dict[str, dict[str, object]]:
     """Values of the command line by section; named options and `NAME=VALUE` are on a par."""
-    from warpchain.inputs.validation import SECTION_OF, InputError, by_section, dotted_name, shown
+    from warpchain.inputs.fields import SECTION_OF, by_section, dotted_name
+    from warpchain.inputs.validation import InputError, shown
     from warpchain.inputs.yaml_files import parse_yaml
 
     pairs = [(name, text) for name, text in named.items() if text is not None]
     for assignment in assignments:
         written, equals, text = assignment.partition("=")
         if not equals:
-            raise InputError(f"--set: {shown(assignment)} gives no value; write NAME=VALUE, as in clearance=0.005")
+            raise InputError(f"--set: expected NAME=VALUE, got {shown(assignment)}; write e.g. clearance=0.005")
         written = written.strip()
         pairs.append((dotted_name(written, f"--set {shown(written)}"), text))
     values: dict[str, object] = {}
     for name, text in pairs:
         path = f"{SECTION_OF[name]}.{name}"
         if name in values:
-            raise InputError(f"{path}: given twice on the command line; give it once")
+            raise InputError(f"{path}: given twice on the command line; remove one")
         values[name] = parse_yaml(text, path)
     return by_section(values)

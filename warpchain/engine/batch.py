@@ -152,7 +152,9 @@ class Batch:
         self.start({features: worlds}, attempts)
         self.finish()
 
-    def start(self, groups: Mapping[Features, Sequence[int]], attempts: int | None = None) -> None:
+    def start(
+        self, groups: Mapping[Features, Sequence[int] | NDArray[np.integer[Any]]], attempts: int | None = None
+    ) -> None:
         """Begin to carry on groups of worlds, each with its own features, by at most this many attempts, or `ATTEMPTS`.
 
         A kernel that is not loaded yet is loaded, and compiled if need be, which takes seconds.
@@ -166,7 +168,7 @@ class Batch:
                 numbers = wp.array(np.asarray(worlds, dtype=np.int32), dtype=wp.int32, device=self.device.warp)
                 wp.launch(kernel, dim=len(worlds), inputs=[numbers, *arrays], device=self.device.warp)
             return
-        order = [world for worlds in groups.values() for world in worlds]
+        order = np.concatenate([*groups.values()])
         self._host["worlds"][: len(order)] = order
         self._stream.wait_stream(self._gpu.filling)
         self._numbers.upload()

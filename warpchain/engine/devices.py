@@ -134,7 +134,7 @@ def _started(device: str) -> Device:
     name = "cuda:0" if device == "cuda" else device
     known = [found.alias for found in wp.get_devices()]
     if name not in known:
-        raise InputError(f"options.device: there is no {device} on this machine; give one of {', '.join(known)}")
+        raise InputError(f"options.device: {device} is not available on this machine; use one of {', '.join(known)}")
     found = wp.get_device(name)
     return Gpu(found) if found.is_cuda else Device(found)
 

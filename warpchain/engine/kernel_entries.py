@@ -75,7 +75,7 @@ def step_module(features: Features, threads: int, registers: int | None) -> wp.M
 
             kernel = make_advance_block(features, threads, registers)
         if digest_of_sources() != SOURCES:
-            raise RuntimeError("source files of kernels changed while this process ran; start it anew")
+            raise RuntimeError("source files of kernels changed while this process ran; restart it")
         wp.set_module_options({"block_dim": threads, "strip_hash": True}, kernel.module)
         kernel.module.name = kernel_entry(features, threads, registers).module.name
         return kernel.module

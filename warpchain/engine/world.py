@@ -6,15 +6,16 @@ Phases of walks, recorders, experiments with given chains and `bench` work on wo
 
 import hashlib
 import math
+import operator
 from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from warpchain.chain.floor import Floor
-from warpchain.chain.link_values import LinkValues, alternating
+from warpchain.chain.link_values import LinkValues, alternating, link_values
 from warpchain.chain.setup import Setup
 from warpchain.engine.tallies import COUNTS, EXTREMES, LOSSES
 from warpchain.inputs.arrays import Array
@@ -33,6 +34,8 @@ CACHES: Final = ("scratch", "lists")
 """What follows from the state but for rounding, and fits a chain of the same constants and options only."""
 _LAYOUT: Final = "layout"
 """Name in a snapshot of the digest of rows and fields that it has."""
+_PARAMETERS: Final = tuple(Parameters.model_fields)
+_VALUES: Final = operator.attrgetter(*_PARAMETERS)
 FIRST_STEP = 1e-7  # s; it may grow fivefold per step
 
 
@@ -81,43 +84,54 @@ class World:
         self, at: int | Sequence[int], host: Mapping[str, NDArray[Any]], caches: Mapping[str, wp.array]
     ) -> None:
         """See worlds by their numbers in the arrays of a batch, those on the host and those that stay on the device."""
-        self._at: Any = at
+        self._at: Any = at if isinstance(at, int) else np.asarray(at, dtype=np.intp)
         self._host, self._caches = host, caches
         self.records = host["record/samples"].shape[1] > 0 or host["record/frames"].shape[1] > 0
         """Whether samples or frames are kept."""
         self._longest = host["state/links"].shape[2]
+
+    @classmethod
+    def together(cls, worlds: Sequence["World"]) -> "World":
+        """Several worlds of one batch as one."""
+        return cls([world._at for world in worlds], worlds[0]._host, worlds[0]._caches)
 
     @property
     def links(self) -> int:
         """Number of links n, of several worlds the greatest."""
         return int(np.max(self._host["model/chains"]["link_count"][self._at]))
 
-    def set_up(self, setup: Setup) -> None:
-        """Set chain and floor, which stay the same through a walk."""
-        self.set_chain(setup.parameters, setup.scene.links, setup.link_values, setup.contact_radius)
-        self.set_floor(setup.floor)
+    def set_up(self, setups: Sequence[Setup]) -> None:
+        """Set the chains of several worlds, which have equal numbers of links, and their floors: constants of walks."""
+        own = link_values([setup.scene for setup in setups], [setup.parameters for setup in setups])
+        values = dict(zip(_PARAMETERS, np.array([_VALUES(setup.parameters) for setup in setups]).T, strict=True))
+        values["sprocket_radius"] = np.array([setup.contact_radius for setup in setups])
+        self._set_chain(values, setups[0].scene.links, own)
+        for world, setup in zip(np.atleast_1d(self._at), setups, strict=True):
+            if not setup.scene.is_level:
+                World(int(world), self._host, self._caches).set_floor(setup.floor)
 
     def set_chain(
         self, parameters: Parameters, links: int, own: LinkValues | None = None, sprocket: float | None = None
     ) -> None:
         """Set the chain and the radius of its sprocket [m], by default its parameter; by default, links alternate."""
-        own, half, chains = (
-            own or alternating(parameters, links),
-            parameters.link_length / 2,
-            self._host["model/chains"],
-        )
-        values = vars(parameters) | {
+        values = vars(parameters) | ({} if sprocket is None else {"sprocket_radius": sprocket})
+        self._set_chain(values, links, own or alternating(parameters, links))
+
+    def _set_chain(self, parameters: dict[str, Any], links: int, own: LinkValues) -> None:
+        """Set chains: values of parameters by name, numbers or arrays over the worlds, and what links have."""
+        half = parameters["link_length"] / 2
+        values = parameters | {
             "link_count": links,
             "half_length": half,
             "inverse_square": 1 / (half * half),
             "mass": own.total_mass,
-            "circle_radius": own.radius.max(),
-            "inverse_smoothing": 1 / parameters.friction_smoothing,
-            "sprocket_radius": parameters.sprocket_radius if sprocket is None else sprocket,
+            "circle_radius": own.radius.max(-1),
+            "inverse_smoothing": 1 / parameters["friction_smoothing"],
         }
+        chains = self._host["model/chains"]
         for name in chains.dtype.names or ():
             chains[name][self._at] = values.get(name, 0)
-        self._host["model/links"][self._at, :, :links] = tuple(vars(own).values())  # in the order of the layout
+        self._host["model/links"][self._at, :, :links] = np.stack([*vars(own).values()], axis=-2)  # as in the layout
 
     def set_floor(self, floor: Floor) -> None:
         """Set the floor, after the chain, for whose size the floor's cells are made."""
@@ -131,11 +145,11 @@ class World:
         position: Array,
         velocity: Array,
         *,
-        stop_time: float,
+        stop_time: ArrayLike,
         stop_status: Status,
-        attempts_before: int = 0,
-        softness: float = 0.0,
-        has_frame_marks: bool = False,
+        attempts_before: ArrayLike = 0,
+        softness: ArrayLike = 0.0,
+        has_frame_marks: ArrayLike = False,
     ) -> None:
         """Set the state of the chain and start its clock at zero; its statistics and watches start anew.
 
@@ -143,18 +157,18 @@ class World:
         the stop status. Attempts of earlier phases count towards the option `step_limit`. Softness is that of joints,
         see :mod:`warpchain.kernels.events.softening`. Frames are taken with samples, or at `frame_interval`.
         """
-        marks = 0 if has_frame_marks else -1
+        marks = np.where(has_frame_marks, 0, -1)
         self.set_state(**_BEGINNING, next_frame=marks, softness=softness, attempts_before=attempts_before)
         self._host["record/sample_count"][self._at] = self._host["record/frame_count"][self._at] = 0
         self.place(position, velocity)
         self.resume(stop_time, stop_status)
 
-    def set_state(self, **values: float | Array) -> None:
+    def set_state(self, **values: ArrayLike) -> None:
         """Set fields of :class:`State`."""
         for name, value in values.items():
             self._host[f"state/{name}"][self._at] = value
 
-    def set_drive(self, **values: float | Array) -> None:
+    def set_drive(self, **values: ArrayLike) -> None:
         """Set fields of :class:`Drive`."""
         for name, value in values.items():
             self._host[f"drive/{name}"][self._at] = value
@@ -165,7 +179,7 @@ class World:
         self._host["state/links"][self._at, :, : rows.shape[-1]] = rows
         self.set_state(is_fresh=1)
 
-    def resume(self, stop_time: float, stop_status: Status) -> None:
+    def resume(self, stop_time: ArrayLike, stop_status: Status) -> None:
         """Let a chain that has stopped run on to a later time, as if it had not stopped there."""
         self.set_state(stop_time=stop_time, stop_status=int(stop_status), status=int(Status.RUNNING))
 
@@ -201,6 +215,20 @@ class World:
         """Time [s] since loading."""
         return float(self._host["state/time"][self._at])
 
+    def state(self, name: str) -> NDArray[Any]:
+        """A field of :class:`State`."""
+        return np.array(self._host[f"state/{name}"][self._at])
+
+    def constant(self, name: str) -> NDArray[Any]:
+        """A field of :class:`Chain`."""
+        return np.array(self._host["model/chains"][name][self._at])
+
+    @property
+    def link_values(self) -> LinkValues:
+        """What each link and joint has of its own."""
+        rows = self._host["model/links"][self._at, :, : self.links]
+        return LinkValues(*np.moveaxis(rows, -2, 0))
+
     @property
     def counts(self) -> dict[str, int]:
         """Counters since loading."""
@@ -226,16 +254,16 @@ class World:
         """The chain's latest sample: (SAMPLE_COLUMNS,), that of the final state if its run has ended."""
         return np.array(self._host["state/last_sample"][self._at])
 
-    def watched(self, row: int) -> float:
+    def watched(self, row: int) -> Any:
         """An entry of :attr:`State.watch` that is −1 until it is set, and then not negative; NaN while it is not."""
-        entry = float(self._host["state/watch"][self._at, row])
-        return entry if entry >= 0 else math.nan
+        entry = self._host["state/watch"][self._at, row]
+        return np.where(entry >= 0, entry, math.nan)[()]
 
     @property
-    def unloaded_at(self) -> float:
+    def unloaded_at(self) -> Any:
         """Time [s] since loading from which a held loop has been under its own loads; NaN if it was not watched."""
         since = self.watched(layout.UNLOADED_SINCE) + float(LOADING_TIME)
-        return self.watched(layout.LOADED_SINCE) if math.isnan(since) else since
+        return np.where(np.isnan(since), self.watched(layout.LOADED_SINCE), since)[()]
 
     def drain(self) -> Recorded:
         """Take what launches have recorded since it was last taken."""
@@ -264,7 +292,7 @@ class World:
         An `InputError` says that a warpchain with other rows or fields kept it.
         """
         if not np.array_equal(snapshot[_LAYOUT], _layout_digest()):
-            raise InputError("start: a warpchain with other kernels kept this state; take it anew from its walk")
+            raise InputError("start: this state was made with other kernels; take it again from its walk")
         for name, values in snapshot.items():
             if name.startswith(KEPT):
                 self._host[name][self._at] = values

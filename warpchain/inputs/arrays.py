@@ -21,10 +21,10 @@ def checked_array(given: object, path: str, *shape: int | str) -> Array:
             raise TypeError
         array = np.array(given, dtype=np.float64)
     except (TypeError, ValueError):
-        raise InputError(f"{path}: not an array of numbers; give one of shape {wanted}") from None
+        raise InputError(f"{path}: expected an array of numbers; use one of shape {wanted}") from None
     sizes = zip(array.shape, shape, strict=False)
     if array.ndim != len(shape) or any(size != each for size, each in sizes if isinstance(each, int)):
-        raise InputError(f"{path}: its shape is {array.shape}; give {wanted}")
+        raise InputError(f"{path}: expected shape {wanted}, got {array.shape}; reshape it")
     if not np.isfinite(array).all():
-        raise InputError(f"{path}: holds a number that is not finite; give finite numbers")
+        raise InputError(f"{path}: expected finite numbers, got NaN or infinity; correct or remove them")
     return array

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Stri
 from warpchain.inputs.parameters import FRACTION, FRICTION
 from warpchain.inputs.validation import shown
 
-Motion = tuple[tuple[float, float, float, float], ...]
+SprocketMotion = tuple[tuple[float, float, float, float], ...]
 
 MOST_POINTS: Final = 256
 """Most points of a profile; each takes time where a chain is near it."""
@@ -27,18 +27,20 @@ LARGEST: Final = 1e4
 def _without_overhang(points: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
     """The points of a profile, if they make a floor."""
     if len(points) < 2:
-        raise ValueError("a profile has 2 points at least; give more, such as [[0, 0], [1, 0], [1, -0.1], [2, -0.1]]")
+        raise ValueError("expected at least 2 points; use e.g. [[0, 0], [1, 0], [1, -0.1], [2, -0.1]]")
     if len(points[-1]) > 2:
-        raise ValueError(f"point {len(points) - 1} begins no line that could have e and μ; give x and y")
+        raise ValueError("the last point starts no segment, so it has no e and μ; use [x, y]")
     for number, ((x, y, *_), (next_x, next_y, *_)) in enumerate(itertools.pairwise(points), start=1):
         if next_x < x:
-            raise ValueError(f"point {number} lies behind the one before it; let x rise from point to point")
+            raise ValueError(f"point {number} lies behind the point before it; let x increase from point to point")
         if math.hypot(next_x - x, next_y - y) < SHORTEST:
-            raise ValueError(f"point {number} is less than {SHORTEST} m from the one before it; leave one out")
+            raise ValueError(f"point {number} is less than {SHORTEST} m from the point before it; remove one")
         if next_x == x and number in (1, len(points) - 1):
-            raise ValueError("the first and the last face go on without end; let x rise along them")
+            raise ValueError(
+                "the first and last segments are infinite, so they cannot be vertical; let x increase along them"
+            )
         if number > 1 and points[number - 2][0] == next_x:
-            raise ValueError(f"point {number} is the third above one another; leave the middle one out")
+            raise ValueError(f"point {number} is the third on one vertical line; remove the middle one")
     return points
 
 
@@ -56,7 +58,7 @@ Points = Annotated[tuple[_Point, ...], Strict(False), Field(max_length=MOST_POIN
 
 def _known_word(word: str) -> str:
     if word != "flat":
-        raise ValueError(f"{shown(word)} is no floor; give flat, or points such as [[0, 0], [1, 0.1]]")
+        raise ValueError(f"expected flat or points, got {shown(word)}; use e.g. [[0, 0], [1, 0.1]]")
     return word
 
 
@@ -67,12 +69,14 @@ FloorField = Annotated[
 """What the field `floor` of a scene may be."""
 
 
-def _in_order(rows: Motion) -> Motion:
+def _in_order(rows: SprocketMotion) -> SprocketMotion:
     if not rows:
-        raise ValueError("no rows; give at least one, such as [[0.1, 0, -0.02, 0]], or null")
+        raise ValueError("expected at least one row, e.g. [[0.1, 0, -0.02, 0]], got none; add one, or use null")
     for number, (before, after) in enumerate(itertools.pairwise([(0.0,), *rows])):
         if not after[0] > before[0]:
-            raise ValueError(f"row {number}: {after[0]:g} s is not after {before[0]:g} s; let times rise from above 0")
+            raise ValueError(
+                f"row {number}: expected a time after {before[0]:g} s, got {after[0]:g} s; let positive times increase"
+            )
     return rows
 
 

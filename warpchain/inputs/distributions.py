@@ -16,9 +16,10 @@ from typing import Annotated, Final
 import numpy as np
 from pydantic import Field
 
+from warpchain.inputs.fields import FIELDS, SECTION_OF
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene
-from warpchain.inputs.validation import FIELDS, SECTION_OF, InputError, Whole, field_bounds
+from warpchain.inputs.validation import InputError, Whole, field_bounds
 
 DRAW_LIMIT: Final = 1000
 """Draws of one quantity before giving up; a mean inside the bounds needs two on average at worst."""
@@ -143,7 +144,9 @@ def draw(distributions: Mapping[str, Distribution], rng: np.random.Generator) ->
                 break
         else:
             path, law = f"{SECTION_OF[name]}.{name}", distribution.canonical()
-            raise InputError(f"{path}: {DRAW_LIMIT} draws of {law} were all out of bounds; give a mean inside them")
+            raise InputError(
+                f"{path}: {DRAW_LIMIT} samples of {law} were all out of bounds; use a mean within the bounds"
+            )
     return drawn
 
 

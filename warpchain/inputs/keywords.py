@@ -15,10 +15,10 @@ from typing import Annotated, Any, Final, Literal, TypeVar, Union, get_args, get
 from pydantic import BaseModel
 
 from warpchain.inputs.arrays import Array
+from warpchain.inputs.fields import NAME_OF_SYMBOL, SECTION_OF
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene
-from warpchain.inputs.validation import NAME_OF_SYMBOL, SECTION_OF
 
 Keywords = Mapping[str, tuple[str, Any]]
 """Name → type and default."""

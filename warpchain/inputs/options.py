@@ -35,14 +35,14 @@ def _known_method(method: str) -> str:
     """The word or integrator, if there is one of this name."""
     known = (*METHODS_BY_NEED, *method_names())
     if method not in known:
-        raise ValueError(f"{shown(method)} is unknown; {suggestion(method, known)}")
+        raise ValueError(f"unknown method {shown(method)}; {suggestion(method, known)}")
     return method
 
 
 def _supported_device(device: str) -> str:
     """The device, if it is written as one."""
     if not re.fullmatch(rf"cpu|cuda(:\d{{1,3}})?|{FIBERS}", device):
-        raise ValueError(f"{shown(device)} is no device; give cpu, cuda or cuda:N")
+        raise ValueError(f"expected cpu, cuda or cuda:N, got {shown(device)}; use one of them")
     return device
 
 
@@ -154,19 +154,16 @@ class Options(Section):
         all_values = {**defaults, **{name: value for name, value in values.items() if name != "method"}}
         return {"precision": "mixed" if _tightest(all_values) >= LEAST_MIXED_BY_DEFAULT else "double", **all_values}
 
-    @model_validator(mode="after")
-    def _goes_together(self) -> Self:
+    def check_together(self) -> None:
+        """See `Section`."""
         if on_gpu(self.device) and find_method(self.method).has_rigid_flight:
-            raise InputError(f"method: {shown(self.method)} runs on a CPU only; give explicit, or device: cpu")
+            raise InputError(f"method: {shown(self.method)} runs only on a CPU; use explicit, or device: cpu")
         tightest = _tightest({"tolerance": self.tolerance, "soft_tolerance": self.soft_tolerance})
         if self.precision == "mixed" and tightest < LEAST_MIXED:
-            problem = f"mixed does not follow a tolerance of {tightest:g}"
+            problem = f"mixed cannot meet a tolerance of {tightest:g}"
             raise InputError(f"precision: {problem}; use double, or a tolerance of at least {LEAST_MIXED:g}")
         if self.smallest_step >= self.contact_step:
-            raise InputError(f"smallest_step: {self.smallest_step} s is not below contact_step; give less")
+            raise InputError(f"smallest_step: expected less than contact_step, got {self.smallest_step} s; use less")
         if self.soften_drive and self.record_interval > LONGEST_DRIVE_INTERVAL:
             problem = f"joints stiffen at each record_interval, and {self.record_interval} s is too long for that"
-            raise InputError(
-                f"soften_drive: {problem}; give at most {LONGEST_DRIVE_INTERVAL} s, or soften_drive: false"
-            )
-        return self
+            raise InputError(f"soften_drive: {problem}; use at most {LONGEST_DRIVE_INTERVAL} s, or soften_drive: false")

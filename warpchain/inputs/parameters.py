@@ -10,8 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal, Self
 
-from pydantic import model_validator
-
 from warpchain.inputs.validation import InputError, Section, by_name, number_field, shown, validated
 
 Source = Literal["measured", "looked up", "adjusted", "chosen here"]
@@ -112,11 +110,12 @@ class Parameters(Section):
     half_width: float = _row("h", "m", 4e-3, 0.0, WIDTH, "half width of a link (tilting plane only)", "chosen here")
     """Not in the paper: a half-inch chain is about 8 mm wide over its pins."""
 
-    @model_validator(mode="after")
-    def _circles_apart(self) -> Self:
+    def check_together(self) -> None:
+        """See `Section`."""
         if not self.circle_radius < (half := self.link_length / 2):
-            raise InputError(f"circle_radius: {self.circle_radius} is not below half a link, {half}; give less")
-        return self
+            raise InputError(
+                f"circle_radius: expected less than half a link, {half}, got {self.circle_radius}; use less"
+            )
 
     @classmethod
     def quantities(cls) -> dict[str, Quantity]:
@@ -156,5 +155,5 @@ def preset(name: str) -> Parameters:
         InputError: the name is unknown; the message lists the known ones.
     """
     if not isinstance(name, str) or name not in PRESETS:
-        raise InputError(f"preset: {shown(name)} is unknown; presets are {', '.join(PRESETS)}")
+        raise InputError(f"preset: unknown preset {shown(name)}; use one of {', '.join(PRESETS)}")
     return PRESETS[name]

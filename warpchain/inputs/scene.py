@@ -1,9 +1,9 @@
 """The fields of a scene: the chain's length, how it is spun and released, the floor, and when a walk ends."""
 
 import math
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Final, Literal
 
-from pydantic import Field, Strict, model_validator
+from pydantic import Field, Strict
 
 from warpchain.inputs.compound_fields import FloorField, Rows
 from warpchain.inputs.options import on_gpu
@@ -67,7 +67,7 @@ class Scene(Section):
     period or, if the loads were never scaled, the time that slow waves need to cross the loop"""
     steady_tolerance: float = number_field(0.01, "1", gt=0, le=1)
     """largest relative change of the loop's height, width and horizontal position that counts as steady"""
-    further_hold: float = number_field(0.0, "s", ge=0, le=LONGEST)
+    extra_hold: float = number_field(0.0, "s", ge=0, le=LONGEST)
     """time for which a steady loop is held longer before its release"""
     hold_limit: float = number_field(30.0, "s", gt=0, le=LONGEST)
     """longest hold at full frequency; a loop that is not steady by then ends the walk as not_steady"""
@@ -83,7 +83,7 @@ class Scene(Section):
     """inclination of the infinite floor; positive slopes descend in the walking direction"""
     distance_limit: float | None = number_field(None, "m", gt=0, le=HIGHEST)
     """distance along the floor from x = 0 at which a walk ends as distance_limit; null: no limit"""
-    walk_until: float | None = number_field(None, "s", gt=0, le=LONGEST)
+    stop_time: float | None = number_field(None, "s", gt=0, le=LONGEST)
     """time after the release at which a walk that is not at rest ends, as planned, as finished and without Δx; null:
     no such time"""
     plane: Literal["fixed", "tilting"] = "fixed"
@@ -109,7 +109,7 @@ class Scene(Section):
     """radius of the contact circles of charm_link; null: unchanged"""
     stiff_joint: Whole = number_field(0, "1", ge=0, le=MOST_LINKS - 1)
     """index of the link at whose end the joint with changed friction is"""
-    stiff_joint_factor: float = number_field(1.0, "1", ge=0, le=1e6)
+    joint_friction_factor: float = number_field(1.0, "1", ge=0, le=1e6)
     """factor applied to the viscous and Coulomb friction of stiff_joint; its stiffness does not change"""
     mass_gradient: float = number_field(0.0, "1", gt=-1, lt=1)
     """relative change of mass and inertia along the chain, linear from 1 − this to 1 + this times their own values"""
@@ -134,29 +134,32 @@ class Scene(Section):
         """Whether the floor is y = 0."""
         return self.floor == "flat" and self.slope == 0
 
-    @model_validator(mode="after")
-    def _goes_together(self) -> Self:
+    def check_together(self) -> None:
+        """See `Section`."""
         for name in ("charm_link", "stiff_joint"):
             if (given := getattr(self, name)) >= self.links:
-                raise InputError(f"{name}: {given} is not among {self.links} links; give 0 to {self.links - 1}")
+                raise InputError(
+                    f"{name}: expected 0 to {self.links - 1}, the links of the chain, got {given}; use one of them"
+                )
         for name in OF_LINKS:
             values = getattr(self, name)
             if values is not None and len(values) != self.links:
-                raise InputError(f"{name}: {len(values)} numbers for {self.links} links; give one for each")
+                raise InputError(
+                    f"{name}: expected {self.links} numbers, one per link, got {len(values)}; change either"
+                )
             if values is not None and name.startswith("link") and min(values) == 0:
-                raise InputError(f"{name}[{values.index(0)}]: 0 is too little; give more")
+                raise InputError(f"{name}[{values.index(0)}]: expected more than 0, got 0; use more")
         if self.slope != 0 and self.floor != "flat":
-            raise InputError(f"slope: {self.slope} of a floor that is a profile; give slope: 0, or floor: flat")
+            raise InputError("slope: not possible with a profile; use slope: 0, or floor: flat")
         if self.plane == "tilting" and not self.is_level:
-            raise InputError("plane: 'tilting' needs a flat floor; give plane: fixed, or floor: flat and slope: 0")
+            raise InputError("plane: 'tilting' needs a flat floor; use plane: fixed, or floor: flat and slope: 0")
         if self.plane == "fixed" and (name := next((name for name in TAP if getattr(self, name) != 0), "")):
-            raise InputError(f"{name}: moves the plane of the chain, which is fixed; give plane: tilting, or 0")
+            raise InputError(f"{name}: moves the plane of the chain, which is fixed; use plane: tilting, or 0")
         if self.release is not None and (not self.is_on_sprocket or self.plane == "tilting"):
             word = "plane: tilting" if self.is_on_sprocket else f"start: {self.start}"
-            raise InputError(f"release: a motion of the sprocket, which {word} does not go with; leave one out")
+            raise InputError(f"release: a motion of the sprocket is not possible with {word}; remove one")
         if self.clearance_of == "hanging" and self.start != "rest":
-            raise InputError(f"clearance_of: 'hanging' needs start: rest, not {self.start}; give that, or 'spinning'")
-        return self
+            raise InputError(f"clearance_of: 'hanging' needs start: rest, got {self.start}; use rest, or 'spinning'")
 
 
 COMPOUND: Final = tuple(name for name, field in Scene.model_fields.items() if _COMPOUND in field.metadata)
@@ -166,4 +169,6 @@ COMPOUND: Final = tuple(name for name, field in Scene.model_fields.items() if _C
 def check_links_on_gpu(links: int, device: str, field: str) -> None:
     """Check that a device can carry a chain of this many links; else an `InputError` that begins with `field`."""
     if on_gpu(device) and links > MOST_LINKS_ON_GPU:
-        raise InputError(f"{field}: {links} are too many for a GPU; give {MOST_LINKS_ON_GPU} or less, or device: cpu")
+        raise InputError(
+            f"{field}: expected at most {MOST_LINKS_ON_GPU} on a GPU, got {links}; use fewer, or device: cpu"
+        )

@@ -58,5 +58,5 @@ def _question(value: float, usual: float, unit: str) -> str:
     far = {name: abs(math.log(value * factor / usual)) for name, factor in _UNITS[unit].items()}
     name = min(far, key=lambda each: far[each])
     if far[name] > math.log(_NEAR):
-        return f"give it in {unit}, or"
+        return f"use {unit}, or"
     return f"did you mean {short(value * _UNITS[unit][name])} ({short(value)} {name})? Else"

@@ -11,10 +11,10 @@ import reprlib
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Set, ValuesView
 from pathlib import Path
-from typing import Annotated, Any, Final, TypeVar
+from typing import Annotated, Any, Final, Self, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 from pydantic.fields import FieldInfo
 from pydantic_core import to_jsonable_python
 
@@ -104,13 +104,18 @@ def field_bounds(field: FieldInfo) -> tuple[float, float]:
     return least, limits["le"] if "le" in limits else math.nextafter(limits.get("lt", math.inf), -math.inf)
 
 
-FIELDS: Final[dict[str, FieldInfo]] = {}
-"""Name of each field of parameters, scene and options → the field; no name is in two sections."""
-SECTION_OF: Final[dict[str, str]] = {}
-"""Name of each field → its section."""
-SYMBOL_OF: Final[dict[str, str]] = {}
-"""Name → the paper's symbol, in ASCII; no symbol is the name of a field."""
-NAME_OF_SYMBOL: Final[dict[str, str]] = {}
+_FIELDS: Final[dict[str, FieldInfo]] = {}
+_SECTION_OF: Final[dict[str, str]] = {}
+_SYMBOL_OF: Final[dict[str, str]] = {}
+_NAME_OF_SYMBOL: Final[dict[str, str]] = {}
+"""What refusals know of the sections that are imported; `warpchain.inputs.fields` has all."""
+NEW_NAMES: Final = {
+    "further_hold": "extra_hold",
+    "record_loads": "record_joint_forces",
+    "stiff_joint_factor": "joint_friction_factor",
+    "walk_until": "stop_time",
+}
+"""Names that values had in development versions → the names that replace them; the old ones are refused."""
 
 _SPELLINGS: Final = str.maketrans(
     {"ℓ": "ell", "β": "beta", "μ": "mu", "\N{MICRO SIGN}": "mu", "ν": "nu", "τ": "tau", "ω": "omega"}
@@ -131,16 +136,24 @@ class Section(BaseModel):
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
         """Tell the names of the fields; those without a description have the text that stands below them."""
         for name, field in cls.model_fields.items():
-            FIELDS[name], SECTION_OF[name] = field, cls.__name__.lower()
+            _FIELDS[name], _SECTION_OF[name] = field, cls.__name__.lower()
             field.description = " ".join((field.description or "").split())
             if isinstance(field.json_schema_extra, dict) and "symbol" in field.json_schema_extra:
-                SYMBOL_OF[name] = spelled(str(field.json_schema_extra["symbol"]))
-                NAME_OF_SYMBOL[SYMBOL_OF[name]] = name
+                _SYMBOL_OF[name] = spelled(str(field.json_schema_extra["symbol"]))
+                _NAME_OF_SYMBOL[_SYMBOL_OF[name]] = name
+
+    def check_together(self) -> None:
+        """Raise an `InputError` if fields contradict one another."""
+
+    @model_validator(mode="after")
+    def _goes_together(self) -> Self:
+        self.check_together()
+        return self
 
 
 def full_name(written: Any) -> Any:
     """Name of the field that is written as its name or symbol, `mu_fc` or μ_fc; anything else stays as it is."""
-    return NAME_OF_SYMBOL.get(spelled(written), written) if isinstance(written, str) else written
+    return _NAME_OF_SYMBOL.get(spelled(written), written) if isinstance(written, str) else written
 
 
 T = TypeVar("T")
@@ -152,41 +165,25 @@ def by_name(values: Mapping[Any, T], path: str = "") -> dict[Any, T]:
     for written, value in values.items():
         name = full_name(written)
         if name in named:
-            raise InputError(f"{path_of(path, name)}: given twice, also as {shown(SYMBOL_OF[name])}; leave one out")
+            raise InputError(f"{path_of(path, name)}: given twice, also as {shown(_SYMBOL_OF[name])}; remove one")
         named[name] = value
     return named
 
 
 def suggested_name(written: object, keys: Iterable[str] = ()) -> str:
     """The remedy for an unknown name of a field, or for one of these keys, or for a field in a wrong place."""
-    if written in SECTION_OF:
-        return f"give it in {SECTION_OF[str(written)]}"
+    if written in _SECTION_OF:
+        return f"move it to {_SECTION_OF[str(written)]}"
     stem = f"{spelled(written)}_" if isinstance(written, str) else ""
-    if family := [symbol for symbol in NAME_OF_SYMBOL if stem and symbol.startswith(stem)]:  # mu: of which pair?
+    if family := [symbol for symbol in _NAME_OF_SYMBOL if stem and symbol.startswith(stem)]:  # mu: of which pair?
         return f"did you mean {' or '.join(filter(None, (', '.join(family[:-1]), family[-1])))}?"
-    fields = {name: f"{section}.{name}" for name, section in SECTION_OF.items()}
-    symbols = {symbol: f"{SECTION_OF[name]}.{symbol}" for symbol, name in NAME_OF_SYMBOL.items()}
+    fields = {name: f"{section}.{name}" for name, section in _SECTION_OF.items()}
+    symbols = {symbol: f"{_SECTION_OF[name]}.{symbol}" for symbol, name in _NAME_OF_SYMBOL.items()}
     return suggestion(written, {key: key for key in keys} | fields | symbols)
 
 
-def by_section(settings: Mapping[str, object]) -> dict[str, dict[str, object]]:
-    """Values by name or symbol, sorted into sections, unchecked; an `InputError` if there is no such field."""
-    sections: dict[str, dict[str, object]] = {"scene": {}, "options": {}, "parameters": {}}
-    for name, value in by_name(settings).items():
-        sections[SECTION_OF[dotted_name(name, shown(name))]][name] = value
-    return sections
-
-
-def dotted_name(written: str, path: str) -> str:
-    """Name of the field written as name or symbol, with or without its section; `path` is for the `InputError`."""
-    section, _, last = written.rpartition(".")
-    name: str = full_name(last)
-    if name not in SECTION_OF or section not in ("", SECTION_OF[name]):
-        raise InputError(f"{path}: unknown name; {suggested_name(last)}")
-    return name
-
-
 ModelT = TypeVar("ModelT", bound=BaseModel)
+SectionT = TypeVar("SectionT", bound=Section)
 
 
 def validated(model: type[ModelT], values: Mapping[str, object], path: str) -> ModelT:
@@ -195,7 +192,7 @@ def validated(model: type[ModelT], values: Mapping[str, object], path: str) -> M
     NumPy's numbers are taken as `plain` does. If a value is refused, an `InputError` describes the first and counts
     the others; it begins with `path`, where they were given, such as `scene`.
     """
-    own = all(type(value) in _OWN for value in values.values())  # as in the millions of walks of a sweep
+    own = _OWN.issuperset(map(type, values.values()))
     try:
         return model.model_validate(values if own else plain(values, path))
     except ValidationError as error:
@@ -203,6 +200,21 @@ def validated(model: type[ModelT], values: Mapping[str, object], path: str) -> M
         raise InputError(refusals(error, path)[0] + others) from None
 
 
+def with_numbers(model: SectionT, numbers: Mapping[str, float], path: str) -> SectionT:
+    """A model with other numbers, which every walk of a sweep has, in fields of floats; errors as of `validated`."""
+    changed = model.model_copy(update=numbers)
+    for name, number in numbers.items():
+        least, most = _bounds_of(name)
+        if not least <= number <= most:
+            return validated(type(model), vars(changed), path)
+    try:
+        changed.check_together()
+    except InputError:
+        return validated(type(model), vars(changed), path)
+    return changed
+
+
+_bounds_of = functools.cache(lambda name: field_bounds(_FIELDS[name]))
 _OWN: Final = frozenset((float, int, str, bool, type(None)))
 
 
@@ -221,20 +233,52 @@ def refusals(error: ValidationError, path: str, keys: Iterable[str] = (), unit: 
         if isinstance(cause, InputError):
             lines.append(f"{where}.{cause}".removeprefix("."))
         elif problem["type"] == "extra_forbidden":
-            unknown = "not possible here" if problem["loc"][-1] in SECTION_OF else "unknown name"
+            unknown = "not possible here" if problem["loc"][-1] in _SECTION_OF else "unknown name"
             lines.append(f"{where}: {unknown}; {suggested_name(problem['loc'][-1], keys)}")
         elif problem["type"] == "model_type":
-            lines.append(f"{where}: {shown(problem['input'])} is no mapping; give names with values")
+            lines.append(f"{where}: expected names with values, got {shown(problem['input'])}; use a mapping")
         elif cause is not None or problem["type"] == "missing":
-            lines.append(f"{where}: {cause or 'missing; give a value'}")
+            lines.append(f"{where}: {cause or 'missing; set a value'}")
         else:
-            its_unit = next((field_unit(FIELDS[name]) for name in problem["loc"] if name in FIELDS), unit)
-            in_unit = "" if its_unit == DIMENSIONLESS else f", in {its_unit}"
-            said = problem["msg"].replace("tuple", "list").replace("Tuple", "List").replace(" after validation", "")
-            lines.append(f"{where}: {said}{in_unit}; given {shown(problem['input'])}")
+            its_unit = next((field_unit(_FIELDS[name]) for name in problem["loc"] if name in _FIELDS), unit)
+            got = problem.get("ctx", {}).get("actual_length") or shown(problem["input"])
+            lines.append(f"{where}: expected {_expected(problem, its_unit)}, got {got}")
     if error.error_count() > len(lines):
         lines.append(f"{error.error_count() - len(lines)} more problems; correct these first")
     return lines
+
+
+_BOUNDS: Final = {
+    "greater_than_equal": ("at least", "ge"),
+    "greater_than": ("more than", "gt"),
+    "less_than_equal": ("at most", "le"),
+    "less_than": ("less than", "lt"),
+}
+_LENGTHS: Final = {"too_long": "at most {max_length} values", "too_short": "at least {min_length} values"}
+_KINDS: Final = {
+    "bool_type": "true or false",
+    "dict_type": "a mapping",
+    "finite_number": "a finite number",
+    "float_type": "a number",
+    "int_from_float": "an integer",
+    "int_type": "an integer",
+    "list_type": "a list",
+    "string_type": "text",
+    "tuple_type": "a list",
+}
+"""Types of pydantic's errors → what was expected."""
+
+
+def _expected(problem: Mapping[str, Any], unit: str) -> str:
+    """What one of pydantic's errors expected in place of the value, in the unit of the field."""
+    kind, context = problem["type"], problem.get("ctx", {})
+    if kind in _BOUNDS:
+        words, limit = _BOUNDS[kind]
+        return f"{words} {short(context[limit])}" + (f" {unit}" if unit != DIMENSIONLESS else "")
+    if kind in _LENGTHS:
+        return _LENGTHS[kind].format(**context)
+    text = _KINDS.get(kind) or str(problem["msg"]).removeprefix("Input should be ").replace("an instance of", "a")
+    return text + (f" in {unit}" if unit != DIMENSIONLESS else "")
 
 
 def plain(value: object, path: str = "value") -> Any:
@@ -251,7 +295,7 @@ def plain(value: object, path: str = "value") -> Any:
         nonlocal left
         left -= 1
         if left < 0:
-            raise InputError(f"{path}: more than {MOST_VALUES} values; give fewer")
+            raise InputError(f"{path}: expected at most {MOST_VALUES} values, got more; use fewer")
         if type(value) in _OWN:
             return value
         if hasattr(value, "to_dict") and hasattr(value, "columns"):
@@ -271,7 +315,7 @@ def plain(value: object, path: str = "value") -> Any:
         if not isinstance(value, Mapping | np.ndarray | list | tuple | range):
             return value
         if depth == DEEPEST:
-            raise InputError(f"{path}: more than {DEEPEST} lists or mappings inside of one another; give fewer")
+            raise InputError(f"{path}: expected at most {DEEPEST} nested lists or mappings, got more; use fewer")
         if isinstance(value, Mapping):
             return {key: converted(item, depth + 1, (*keys, key)) for key, item in value.items()}
         return [converted(item, depth + 1, keys) for item in value]
@@ -309,18 +353,20 @@ def checked_path(value: object, path: str) -> Path:
     try:
         return given_path(value)  # type: ignore[arg-type]
     except (OSError, TypeError):
-        raise InputError(f"{path}: {shown(value)} is no path; give one as text") from None
+        raise InputError(f"{path}: expected a path, got {shown(value)}; pass it as text") from None
 
 
 def suggestion(given: object, known: Mapping[str, str] | Iterable[str]) -> str:
     """The remedy for an unknown name: the closest of the known, or as many as find room, shown as a mapping says."""
     names = known if isinstance(known, Mapping) else {name: name for name in known if name != given}
+    if isinstance(given, str) and given in NEW_NAMES:
+        return f"use {NEW_NAMES[given]}, its new name"
     close = difflib.get_close_matches(str(given)[:_LONGEST_VALUE], names, n=1) if isinstance(given, str) else []
     if close:
         return f"did you mean {names[close[0]]}?"
     if not names:
-        return "there are none; leave it out"
-    return f"give one of {textwrap.shorten(', '.join(names.values()), 125, placeholder=' ...')}"
+        return "none is possible; remove it"
+    return f"use one of {textwrap.shorten(', '.join(names.values()), 125, placeholder=' ...')}"
 
 
 def path_of(path: str, key: object) -> str:

@@ -19,17 +19,19 @@ def read_yaml(path: str | os.PathLike[str]) -> object:
     try:
         found = os.stat(path)
         if not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):  # others may never end
-            raise InputError(f"{path}: no regular file; give the path of a readable YAML file")
+            raise InputError(f"{path}: not a regular file; use the path of a readable YAML file")
         with open(path, "rb") as file:
             content = file.read(LARGEST_FILE + 1)
     except OSError as error:
-        raise InputError(f"{path}: {error.strerror}; give the path of a readable YAML file") from None
+        raise InputError(f"{path}: {error.strerror}; use the path of a readable YAML file") from None
     if len(content) > LARGEST_FILE:
-        raise InputError(f"{path}: more than {LARGEST_FILE} bytes; write numbers as ranges, or give several files")
+        raise InputError(
+            f"{path}: expected at most {LARGEST_FILE} bytes, got more; write numbers as ranges, or use several files"
+        )
     try:
         return parse_yaml(content.decode("utf-8"), str(path))
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: {error}; give a text in UTF-8") from None
+        raise InputError(f"{path}: {error}; save it as UTF-8 text") from None
 
 
 def parse_yaml(text: str, path: str) -> Any:
@@ -42,12 +44,12 @@ def parse_yaml(text: str, path: str) -> Any:
     try:
         content = yaml.load(text, Loader=_Loader)
     except _TooManyValuesError:
-        raise InputError(f"{path}: more than {MOST_VALUES} values; give fewer") from None
+        raise InputError(f"{path}: expected at most {MOST_VALUES} values, got more; use fewer") from None
     except yaml.MarkedYAMLError as error:
         line = f", line {error.problem_mark.line + 1}" if error.problem_mark else ""
         raise InputError(f"{path}{line}: {error.problem}; correct the YAML") from None
     except RecursionError:
-        raise InputError(f"{path}: more than {DEEPEST} lists or mappings inside of one another; give fewer") from None
+        raise InputError(f"{path}: expected at most {DEEPEST} nested lists or mappings, got more; use fewer") from None
     except (yaml.YAMLError, ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         # PyYAML's own errors, and those of what it calls for a tag such as !!int before a text that is no number
         raise InputError(f"{path}: {shown(str(error))[1:-1]}; correct the YAML") from None

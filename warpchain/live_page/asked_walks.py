@@ -17,11 +17,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import numpy as np
 from pydantic import Field, Strict
 
-from warpchain.chain.resolution import SECTIONS, resolve
+from warpchain.chain.resolution import resolve
 from warpchain.chain.setup import DEFAULT_PRESET, Setup
 from warpchain.engine.processors import processors
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.validation import InputError, by_section, checked, json_value, shown
+from warpchain.inputs.fields import SECTIONS, by_section
+from warpchain.inputs.validation import InputError, checked, json_value, shown
 from warpchain.live_page.messages import Film, recipes, summary
 from warpchain.pictures.player import player_data
 from warpchain.results.walk_result import WalkResult
@@ -70,16 +71,18 @@ class Walker:
         sections = by_section(settings)
         links = sections["scene"].get("links")
         if isinstance(links, int | float) and links > MOST_LINKS:
-            raise InputError(f"scene.links: {shown(links)} are too many for a live page; give at most {MOST_LINKS}")
+            raise InputError(
+                f"scene.links: expected at most {MOST_LINKS} on a live page, got {shown(links)}; use fewer"
+            )
         if others := sorted(sections["options"].keys() - {"method", "tolerance"}):
-            raise InputError(f"options.{others[0]}: not possible on a live page; leave it out, or use `warpchain walk`")
+            raise InputError(f"options.{others[0]}: not possible on a live page; remove it, or use `warpchain walk`")
         if index is None:
             chosen = DEFAULT_PRESET if preset is None else preset
             return resolve(chosen, **sections, seed=seed, loads=False), seed
         if self.sweep is None:
-            raise InputError(f"index: {shown(index)} of no sweep; start `warpchain live FOLDER`")
+            raise InputError("index: no sweep is open; start `warpchain live FOLDER`")
         if seed is not None or preset is not None:
-            raise InputError("index: names a walk with its own preset and seed; leave preset and seed out")
+            raise InputError("index: the walk has its own preset and seed; remove preset and seed")
         block, place = self.sweep.located(index)
         setup = block.setup_at(place)
         if not settings:
@@ -123,7 +126,7 @@ class Walker:
         def show(progress: Progress) -> None:
             watch(progress)
             if film.size > MOST_NUMBERS:
-                raise InputError("scene.walk_limit: the walk is too long for a live page; give less, such as 10")
+                raise InputError("scene.walk_limit: the walk is too long for a live page; use less, e.g. 10")
             send({"phase": progress.phase, **film.message(progress)})
 
         walk = self.walk(asked, show, {"frame_interval": INTERVAL, "record_before": 0.0})
@@ -135,7 +138,7 @@ class Walker:
         """Run samples of the same seeds for each set-up, and send Δx and path of each as it comes."""
         for name in ("index", "push"):
             if any(name in asked for asked in setups):
-                raise InputError(f"{name}: samples are of walks without one; leave it out")
+                raise InputError(f"{name}: not possible with samples; remove it")
         watch = _watch(is_gone, count * len(setups))
 
         def run(seed: int, side: int) -> dict[str, Any]:
@@ -169,7 +172,7 @@ def _watch(is_gone: IsGone, walks: int = 1) -> Callable[[Progress], None]:
             ends.append(time.monotonic() + walks * MOST_SECONDS)
         if time.monotonic() > ends[0]:
             problem = f"more than {walks * MOST_SECONDS:g} s of computing, too much for a live page"
-            raise InputError(f"scene.walk_limit: {problem}; give less, such as 10, or fewer links")
+            raise InputError(f"scene.walk_limit: {problem}; use less, e.g. 10, or fewer links")
 
     return watch
 
@@ -178,5 +181,5 @@ def change_of_velocity(setup: Setup, link: int, impulse: Sequence[float]) -> Arr
     """Change [m/s] of the velocity x, y of a link's centre by an impulse [N s]; an `InputError` if there is no link."""
     masses = setup.link_values.mass
     if not 0 <= link < len(masses):
-        raise InputError(f"push: link {link} is not in the chain; give 0 to {len(masses) - 1}")
+        raise InputError(f"push: expected a link of 0 to {len(masses) - 1}, got {link}; use one of them")
     return np.asarray(np.array(impulse) / masses[link])

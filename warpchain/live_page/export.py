@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from warpchain.engine.processors import processors
-from warpchain.files import Kind, checked_output, make_folder, write_whole
+from warpchain.files import FileKind, checked_output, make_folder, write_whole
 from warpchain.live_page.asked_walks import Walker
 from warpchain.live_page.messages import recipes, summary
 from warpchain.live_page.page import FIRST, STAIRS, live_page
@@ -27,7 +27,7 @@ _FLOORS: Final[dict[str, dict[str, Any]]] = {"flat": {}, "slope": {"slope": 6}, 
 _INTERVAL: Final = 5e-3
 """Time [s] between two frames."""
 _MARK: Final = b"<!-- warpchain live -->"
-PAGES: Final = Kind("page that warpchain live has written", lambda path: _MARK in path.read_bytes())
+PAGES: Final = FileKind("page that warpchain live has written", lambda path: _MARK in path.read_bytes())
 """All that an export replaces."""
 
 

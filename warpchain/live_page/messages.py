@@ -11,10 +11,10 @@ from typing import Any, Final, cast
 import numpy as np
 import yaml
 
-from warpchain.chain.resolution import SECTIONS
 from warpchain.chain.setup import DEFAULT_PRESET, Setup
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.validation import by_section, json_value
+from warpchain.inputs.fields import SECTIONS, by_section
+from warpchain.inputs.validation import json_value
 from warpchain.pictures.player import player_data
 from warpchain.results.walk_result import WalkResult
 from warpchain.walks.walk_numbers import WalkNumbers as Walk
@@ -52,7 +52,7 @@ class Film:
             center=center,
             frame_time=times,
             frame_joints=joints,
-            joints_in_room=None,
+            joints_lab=None,
             sprocket_center=None if is_bare else np.array([0.0, height]),
             sprocket_radius=math.nan if is_bare else setup.contact_radius,
         )

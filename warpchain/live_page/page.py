@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from warpchain.inputs.fields import FIELDS
 from warpchain.inputs.parameters import preset
 from warpchain.inputs.scene import Scene
-from warpchain.inputs.validation import FIELDS, json_value
+from warpchain.inputs.validation import json_value
 from warpchain.pictures.labels import unit_text
 from warpchain.pictures.player import PLAYER
 

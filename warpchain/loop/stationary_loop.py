@@ -27,7 +27,7 @@ from warpchain.inputs.parameters import Parameters
 if TYPE_CHECKING:
     import xarray
 
-BEFORE: Final = "before_release"
+BEFORE_RELEASE: Final = "before_release"
 """Name of the motion before the release, among the arrays of a walk and in its file."""
 FEWEST_FRAMES: Final = 8
 """Number of frames that an average needs."""
@@ -74,10 +74,10 @@ class BeforeRelease:
 
     def to_xarray(self) -> "xarray.Dataset":
         """The arrays as a data set with named coordinates, units and meanings, as `WalkResult.to_xarray`."""
-        return dataset_of(vars(self), FIELDS)
+        return dataset_of(vars(self), LOOP_FIELDS)
 
 
-FIELDS: Final[dict[str, Stored]] = stored_fields(BeforeRelease)
+LOOP_FIELDS: Final[dict[str, Stored]] = stored_fields(BeforeRelease)
 """Arrays of a `BeforeRelease`: name → unit, meaning and shape."""
 
 
@@ -188,7 +188,7 @@ def average_frames(
     moved = -np.unwrap(turned) * links / (2 * np.pi)  # o(t), until each frame [links]
     rate = float(np.polyfit(before.frame_time, moved, 1)[0])  # links a second
     if moved[-1] - moved[0] < LEAST_WAY:
-        raise ValueError("before_release: the loop does not run clockwise, or hardly moves; give one that runs")
+        raise ValueError("before_release: expected a loop that circulates clockwise; use one that does")
     curve = _Harmonics(joints, moved)
     force = _Harmonics(before.frame_forces, moved).at(0)
     moment = -_Harmonics(before.frame_moments[..., None], moved).at(0)[:, 0]
@@ -274,5 +274,5 @@ def _free_part(s: Array, distance: Array, least: float) -> tuple[float, float]:
     middle, touching = len(s) // 2, np.flatnonzero(distance <= least)
     before, after = touching[touching < middle], touching[touching > middle]
     if distance[middle] <= least or not len(before) or not len(after):
-        raise ValueError("before_release: the loop has no free part below a sprocket; give one that hangs on one")
+        raise ValueError("before_release: expected a loop that hangs on a sprocket; use one that does")
     return float(s[before[-1] + 1]), float(s[after[0] - 1])

@@ -55,7 +55,7 @@ def animate(walk: Walk, path: str | os.PathLike[str], *, fps: float = 30.0, slow
     """
     suffix = Path(path).suffix.lower()
     if suffix not in (".gif", ".mp4", ".html"):
-        raise ValueError(f"{path}: unknown kind of picture; give a name that ends in .gif, .mp4 or .html")
+        raise ValueError(f"{path}: unknown file format; use a name that ends in .gif, .mp4 or .html")
     checked(slow, "slow", _POSITIVE)
     checked(fps, "fps", _GIF_RATE if suffix == ".gif" else _POSITIVE)
     checked_joints(walk)
@@ -134,7 +134,7 @@ class Film:
         """Fit the walk and the floor below it into the picture; a `ValueError` if frames are none or broken."""
         self._walk, self._joints, self._center = walk, checked_joints(walk), center_in_room(walk)
         self._radii = circle_radii(walk)
-        self._tilts = walk.joints_in_room is not None
+        self._tilts = walk.joints_lab is not None
         self._view = Rotation.from_euler("yx", _CORNER, degrees=True).as_matrix() if self._tilts else chain.SIDE
         low, high = walk_box(walk, self._joints)
         if not self._tilts:

@@ -124,7 +124,7 @@ def _all_panels(blocks: "Mapping[str, CellStatistics]", x: str | None) -> tuple[
     axes = {name: [name for name, values in cells.axes.items() if len(values) > 1] for name, cells in blocks.items()}
     if x is not None and not any(x in own for own in axes.values()):
         known = ", ".join(dict.fromkeys(name for own in axes.values() for name in own))
-        raise InputError(f"x: {shown(x)} is no axis of several values; give one of {known}")
+        raise InputError(f"x: {shown(x)} is not an axis with several values; use one of {known}")
     panels: list[Panel] = []
     left_out = 0
     for name, cells in blocks.items():
@@ -135,11 +135,11 @@ def _all_panels(blocks: "Mapping[str, CellStatistics]", x: str | None) -> tuple[
         panels += found[:MOST_PANELS]
         left_out += len(found[MOST_PANELS:])
     if not panels:
-        raise NothingToShow("a figure of a grid takes an axis of several values; give a sweep that has one")
+        raise NothingToShow("expected an axis with several values; use a sweep that has one")
     if not any(np.isfinite(panel.cells.mean).any() for panel in panels):
         if any(panel.cells.absent.any() for panel in panels):
-            raise NothingToShow("no walk has this quantity; give another, such as quantity='walk_time'")
-        raise NothingToShow("no walk has come to rest; let the sweep go on, or see the statuses in summary()")
+            raise NothingToShow("no walk has this quantity; use another, e.g. quantity='walk_time'")
+        raise NothingToShow("no walk has come to rest; resume the sweep, or check the statuses in summary()")
     return [each for each in panels if np.isfinite(each.cells.mean).any() or each.cells.failed.any()], left_out
 
 

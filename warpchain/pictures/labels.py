@@ -1,21 +1,19 @@
-"""Texts on figures and in tables: numbers, units, quantities, cells, walks that are in no mean; kinds and titles."""
+"""Texts on figures and in tables: numbers, units, quantities, cells, walks that are in no mean; titles."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any, Final, Literal, get_args
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.inputs.distributions import TABLE
+from warpchain.inputs.fields import FIELDS, SECTION_OF
 from warpchain.inputs.parameters import PRESETS, Parameters
 from warpchain.inputs.scene import Scene
-from warpchain.inputs.validation import DIMENSIONLESS, FIELDS, SECTION_OF, field_unit, short
+from warpchain.inputs.validation import DIMENSIONLESS, field_unit, short
 from warpchain.walks.cell_statistics import CellStatistics
 from warpchain.walks.walk_numbers import WalkNumbers as Walk
-
-Kind = Literal["film_strip", "height_and_speed", "loop", "energy", "tilt"]
-"""Figures of a walk; `tilt` only of one whose plane tilts."""
 
 _SYMBOLS: Final = {"dx": "Δx", "links": "n", "frequency": "ν"}
 """The paper's symbols of what is not in Table 1."""
@@ -152,12 +150,6 @@ def lost_note(cells: Sequence[Mapping[str, Any]]) -> str:
     walks = sum(counts.values())
     texts = {"failed": "walks failed", "absent": "have none", "missing": "not run yet"}
     return ", ".join(f"{counts[name]} of {walks} {text}" for name, text in texts.items() if counts[name])
-
-
-def kinds_of(walk: Walk) -> tuple[Kind, ...]:
-    """The figures that a walk has, if it was recorded."""
-    kinds: tuple[Kind, ...] = get_args(Kind)
-    return tuple(kind for kind in kinds if kind != "tilt" or walk.joints_in_room is not None)
 
 
 _SELDOM: Final = ("links", "frequency", "walk_limit", "hold_limit")

@@ -16,7 +16,7 @@ def checked_joints(walk: Walk) -> Array:
         never = f"it was not released. {walk.status.sentence}"
         remedy = "run it again with a frame_interval" if len(walk.time) else never
         raise ValueError(f"walk: it has no frames; {remedy}")
-    in_room = walk.joints_in_room
+    in_room = walk.joints_lab
     joints = np.insert(walk.frame_joints, 2, 0.0, axis=2) if in_room is None else np.asarray(in_room)
     if not np.all(np.isfinite(joints)):
         raise ValueError(f"walk: its frames are not all finite numbers. {walk.status.sentence}")
@@ -25,7 +25,7 @@ def checked_joints(walk: Walk) -> Array:
 
 def center_in_room(walk: Walk) -> Array:
     """Centre of mass x, y, z [m], shape (t, 3); z = 0 if the plane is fixed."""
-    return np.column_stack([walk.center, np.zeros(len(walk.time)) if walk.joints_in_room is None else walk.center_z])
+    return np.column_stack([walk.center, np.zeros(len(walk.time)) if walk.joints_lab is None else walk.center_z])
 
 
 def circle_radii(walk: Walk) -> Array:

@@ -51,7 +51,7 @@ def player(walk: Walk, slow: float = 4.0, most: int = 2000) -> str:
 
     A `ValueError` says that the walk has no frames or broken ones.
     """
-    title = html.escape(headline(walk) + ", from the side" * (walk.joints_in_room is not None))
+    title = html.escape(headline(walk) + ", from the side" * (walk.joints_lab is not None))
     content = json.dumps(player_data(walk, most) | {"slow": slow}, separators=(",", ":"), allow_nan=False)
     parts = {"title": title, "player": PLAYER.read_text(encoding="utf-8"), "data": content}
     return re.sub(r"{{(\w+)}}", lambda found: parts[found[1]], _PAGE.read_text(encoding="utf-8"))

@@ -47,11 +47,15 @@ class NothingToShow(InputError):  # noqa: N818 - no error of the program: the sw
 
 
 class Picture(NamedTuple):
-    """A figure with its caption, and a short name, used as the name of a file."""
+    """A figure with its caption, and a short name, used as the name of a file.
+
+    `blocks` are names of those blocks of a sweep that need no figure of the grid beside it.
+    """
 
     name: str
     caption: str
     figure: Figure
+    blocks: frozenset[str] = frozenset()
 
     def save(self, folder: Path, suffix: str = "png") -> Path:
         """Write the figure into a folder, in a file named after it; return its path. Errors as of `save_figure`."""

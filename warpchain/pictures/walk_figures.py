@@ -1,28 +1,25 @@
 """Figures of a walk: film strip, height and speed, as in the paper's Figure 5, energies, loop, angles of a plane.
 
 Figures are made without pyplot: nothing is global, no display is needed, the caller owns what is returned.
-
-Sizes of a film strip on paper are in inches: constrained layout clips labels of axes with a fixed aspect. Its texts are
-plain: formulas would take a third of the time that this figure takes, and every walk has one.
 """
 
-from typing import Any, Final, get_args
+from collections.abc import Callable, Mapping
+from typing import Any, Final
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.patches import Circle
-from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from warpchain.inputs.arrays import Array
+from warpchain.inputs.figure_kinds import KINDS, FigureWord
 from warpchain.inputs.validation import InputError, shown
 from warpchain.loop.stationary_loop import StationaryLoop
-from warpchain.pictures import chain
-from warpchain.pictures.labels import Kind, math_symbol, setting
-from warpchain.pictures.places import center_in_room, checked_joints, circle_radii, stretches, walk_box
+from warpchain.pictures.film_strip import film_strip
+from warpchain.pictures.labels import math_symbol, setting
+from warpchain.pictures.places import stretches
 from warpchain.pictures.style import (
     BLUE,
     DASHES,
@@ -36,11 +33,9 @@ from warpchain.pictures.style import (
     STROKES,
     InlineFigure,
     checked_figure,
-    text_scale,
     tidy,
     wrapped,
 )
-from warpchain.status import Status
 from warpchain.walks.walk_numbers import WalkNumbers as Walk
 
 FALLEN: Final = 45.0
@@ -48,58 +43,50 @@ FALLEN: Final = 45.0
 SIMULATED: Final[dict[str, Any]] = {"color": BLUE, "linewidth": 2.2}
 IN_LINKS: Final = 2.0
 """The tension is shown this many links away from the sprocket: averages near it include links that touch it."""
-_WIDTH: Final = 10.0
-_HIGHEST: Final = 4.6
-_DEEPEST: Final = 8.0
-"""Width of the paper, greatest height of the side view, and of it and the view from above together."""
-_LEFT, _RIGHT, _TOP, _BELOW, _FOOT = 0.9, 0.25, 0.6, 0.85, 0.1
-"""Room for labels: beside the views, for legend and titles above them, below each row, at the foot."""
-_CLOCK: Final = 0.2
-"""Room for the times above the chains."""
-_FLOOR: Final = 0.4
-"""Height of the floor in the side view."""
-_CLOSE_UP_LINKS, _CLOSE_UP_ASPECT = 9, 1.5
-"""Width of a close-up [links], and its width over its height."""
 
 
 def draw(
-    walk: Walk, kind: Kind, *, figure: Figure | None = None, ax: Axes | None = None, width: float | None = None
+    walk: Walk, kind: FigureWord, *, figure: Figure | None = None, ax: Axes | None = None, width: float | None = None
 ) -> Figure:
     """Draw a walk; arguments and errors as of `WalkResult.plot`, but for the width of a new figure [inches]."""
-    if kind not in get_args(Kind):
-        raise ValueError(f"kind: {kind!r} is unknown; give {', '.join(map(repr, get_args(Kind)))}")
-    if kind not in ("film_strip", "loop") and len(walk.time) == 0:
+    if kind not in KINDS:
+        raise ValueError(f"kind: unknown kind {kind!r}; use {', '.join(map(repr, KINDS))}")
+    if KINDS[kind].needs_series and len(walk.time) == 0:
         raise ValueError(f"walk: it has no time series. {walk.status.sentence}")
-    if ax is not None and kind != "energy":
-        raise ValueError(f"ax: {kind} has several axes; give an empty figure=, or a SubFigure of yours")
+    if ax is not None and kind not in _ON_AXES:
+        raise ValueError(f"ax: {kind} has several axes; use figure= with an empty Figure or SubFigure")
     if ax is not None and figure is not None:
-        raise ValueError("ax: given together with figure; leave one out")
+        raise ValueError("ax: not possible with figure; remove one")
     if figure is not None:
         checked_figure(figure)
     if ax is not None and not isinstance(ax, Axes):
         raise InputError(f"ax: expected matplotlib Axes, got {shown(ax)}")
-    if kind == "film_strip":
-        return film_strip(walk, figure, width)
     if ax is not None:
-        _energy(walk, ax)
+        _ON_AXES[kind](walk, ax)
         return ax.figure.figure if isinstance(ax.figure, SubFigure) else ax.figure
-    size = {"loop": (10.0, 6.4), "energy": (6.4, 4.0)}.get(kind, (6.4, 5.0))
-    if width is not None:
-        size = width, size[1] * (0.8 if kind == "loop" and width < NARROW else max(0.62, min(1.2, width / size[0])))
-    figure = InlineFigure(figsize=size, layout="constrained") if figure is None else figure
-    if kind == "energy":
-        _energy(walk, figure.subplots())
-    else:
-        {"height_and_speed": _height_and_speed, "loop": _loop, "tilt": _tilt}[kind](walk, figure)
-    return figure
+    return _DRAWN_BY[kind](walk, figure, width)
 
 
-def _height_and_speed(walk: Walk, figure: Figure) -> None:
+def kinds_of(walk: Walk) -> tuple[FigureWord, ...]:
+    """The figures that a walk has, if it was recorded."""
+    return tuple(word for word, kind in KINDS.items() if not kind.needs_tilt or walk.joints_lab is not None)
+
+
+def _paper(figure: Figure | None, width: float | None, usual: float, height: float) -> Figure:
+    """The figure that is given to draw into, or else a new one of a width, by default its usual size [inches]."""
+    if figure is not None:
+        return figure
+    size = (usual, height) if width is None else (width, height * max(0.62, min(1.2, width / usual)))
+    return InlineFigure(figsize=size, layout="constrained")
+
+
+def _height_and_speed(walk: Walk, figure: Figure | None, width: float | None) -> Figure:
     """Height and horizontal speed of the centre of mass against time since the release, as in Figure 5.
 
     A thin line is the height of a floor that is not flat, below the centre of mass; it is thick and has a label where
     the floor has coefficients of its own.
     """
+    figure = _paper(figure, width, 6.4, 5.0)
     height, speed = figure.subplots(2, 1, sharex=True)
     height.plot(walk.time, walk.center[:, 1], color=BLUE, linewidth=1.4)
     speed.plot(walk.time, walk.center_velocity[:, 0], color=BLUE, linewidth=1.4)
@@ -115,16 +102,23 @@ def _height_and_speed(walk: Walk, figure: Figure) -> None:
             height.plot(walk.time, np.where(is_above, floor, np.nan), color=color, linewidth=3.5, label=label)
             height.legend(frameon=False)
     _finish(walk, height, speed)
+    return figure
 
 
-def _energy(walk: Walk, ax: Axes) -> None:
+def _energy(walk: Walk, figure: Figure | None, width: float | None) -> Figure:
+    """A figure with `_energy_on` its only axes."""
+    figure = _paper(figure, width, 6.4, 4.0)
+    _energy_on(walk, figure.subplots())
+    return figure
+
+
+def _energy_on(walk: Walk, ax: Axes) -> None:
     """Energies of a walk against time, and what was lost by then.
 
     Lost is the energy at the release less that of the moment. The dot at the end is the sum of the ledger's losses,
     which counts each cause by itself: it lies on the line if the integration conserved energy.
     """
-    ledger, whole = walk.energy, walk.kinetic_energy + walk.gravitational_energy + walk.spring_energy
-    released = ledger["kinetic_at_release"] + ledger["potential_at_release"]
+    released, whole = walk.energy_at_release, walk.kinetic_energy + walk.gravitational_energy + walk.spring_energy
     for name, values, color, line in (
         ("kinetic", walk.kinetic_energy, BLUE, "-"),
         ("gravitational", walk.gravitational_energy, GREEN, STROKES[3]),
@@ -132,21 +126,22 @@ def _energy(walk: Walk, ax: Axes) -> None:
         ("lost since the release", released - whole, INK, DASHES),
     ):
         ax.plot(walk.time, values, label=name, color=color, linewidth=1.4, linestyle=line)
-    lost = released - ledger["kinetic_at_end"] - ledger["potential_at_end"] - ledger["residual"]
+    lost = released - walk.energy_at_end - walk.energy["residual"]
     ax.plot(walk.time[-1:], [lost], "o", color=INK, clip_on=False, label="sum of all losses", zorder=4)
     ax.set_ylabel("energy / J")
     ax.legend(frameon=False)
     _finish(walk, ax)
 
 
-def _tilt(walk: Walk, figure: Figure) -> None:
+def _tilt(walk: Walk, figure: Figure | None, width: float | None) -> Figure:
     """Tilt and yaw of the plane, and lateral drift of the centre of mass, against time.
 
     Marked are the moments at which the chain was first tilted by 45°, beyond which it has fallen over, and at which
     its loop collapsed, if they came. A `ValueError` says that the plane of the walk is fixed.
     """
-    if walk.joints_in_room is None:
+    if walk.joints_lab is None:
         raise ValueError("walk: its plane is fixed, so it has no tilt; run it with plane: tilting")
+    figure = _paper(figure, width, 6.4, 5.0)
     angles, drift = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     for limit in (-FALLEN, FALLEN):
         angles.axhline(limit, color=FAINT, linewidth=0.8, linestyle=DOTS)
@@ -165,6 +160,7 @@ def _tilt(walk: Walk, figure: Figure) -> None:
     angles.legend(frameon=False, fontsize="small")
     figure.align_ylabels()
     _finish(walk, angles, drift)
+    return figure
 
 
 def _finish(walk: Walk, *panels: Axes) -> None:
@@ -176,15 +172,16 @@ def _finish(walk: Walk, *panels: Axes) -> None:
     panels[-1].set(xlabel="time since release $t$ / s", xlim=(0.0, float(walk.time[-1]) or None))
 
 
-def _loop(walk: Walk, figure: Figure) -> None:
+def _loop(walk: Walk, figure: Figure | None, width: float | None) -> Figure:
     """The mean loop of a walk before its release, to scale, and its curvature and tension along the arc.
 
     A `ValueError` says that the time before the release was not kept, or is not enough for a mean loop.
     """
     loop = walk.mean_loop()
     kink = loop.kink()
-    width, height = np.ptp(loop.position, axis=0)
-    share = float(np.clip(0.56 * (width + 0.08) / (height + 0.08), 0.23, 0.42))
+    broad, high = np.ptp(loop.position, axis=0)
+    share = float(np.clip(0.56 * (broad + 0.08) / (high + 0.08), 0.23, 0.42))
+    figure = _paper(figure, width, 10.0, 8.0 if width is not None and width < NARROW else 6.4)
     figure.suptitle(wrapped(setting(walk, math_symbol), figure), fontsize="medium", x=0.01, ha="left")
     if figure.get_figwidth() < NARROW:
         left, right = np.asarray(figure.subfigures(2, 1, height_ratios=[2, 3]))
@@ -217,6 +214,7 @@ def _loop(walk: Walk, figure: Figure) -> None:
     pull.set(xlim=(low, high), ylabel="tension $T - \\rho v^2$ / N")
     pull.set_xlabel("arc length $s$ from the lowest point / m")
     pull.set_ylim(bottom=min(0.0, 1.1 * float(loop.effective_tension[inside].min())))
+    return figure
 
 
 def _draw_shape(axes: Axes, loop: StationaryLoop, sprocket_radius: float) -> None:
@@ -253,180 +251,13 @@ def _mark(axes: Axes, x: float, y: float, text: str) -> None:
     axes.annotate(text, (x, y), (8, -4), textcoords="offset points", va="top", color=INK, fontsize="small")
 
 
-def film_strip(walk: Walk, figure: Figure | None = None, width: float | None = None) -> Figure:
-    """The chain along a walk with frames, drawn to scale, and close-ups of up to four moments.
-
-    In the strip the centre of mass moves equally far from each instant to the next. Above each chain stands its time;
-    outer links are darker than inner ones. The close-ups show the first touch of the floor, the first self-contact, the
-    collapse and the end, if they happen. A sprocket that goes on after the release is a circle in the chain's colour;
-    stretches of the floor with coefficients of their own are thick and have labels. A chain whose plane tilts is seen
-    from above instead, to the same scale: z grows downwards. A figure to draw into is empty; by default a new one suits
-    the walk. A `ValueError` says that the walk has no frames or broken ones.
-    """
-    joints = checked_joints(walk)
-    tilts = walk.joints_in_room is not None
-    low, high = walk_box(walk, joints)
-    moments = [] if tilts else _moments(walk)
-    size = high - low
-    broad = max(size[2], 0.15 * size[0]) if tilts else 0.0
-    whole, text = _WIDTH if width is None else width, text_scale()
-    is_narrow = whole < NARROW
-    left, top, below, foot = _LEFT * text, (_TOP + 0.35 * is_narrow) * text, _BELOW * text, (_FOOT + 0.5) * text
-    across = whole - left - _RIGHT * text
-    scale = min(across / size[0], _HIGHEST / size[1], (_DEEPEST - _FLOOR) / (size[1] + broad))
-    in_row = min(max(1, len(moments)), max(1, int(across / (1.7 * text))))
-    close_up_width = min((across + 0.1) / in_row, _WIDTH / 3)
-    rows, close_up_height = -(-len(moments) // in_row), (close_up_width - 0.1) / _CLOSE_UP_ASPECT
-    pitch = close_up_height + 1.05 * text
-    lower = scale * broad if tilts else close_up_height + (rows - 1) * pitch
-    wide, high_up, depth = scale * size[0], scale * size[1] + (_FLOOR + _CLOCK) * text, _FLOOR * text / scale
-    paper = np.array([whole, top + high_up + below + lower + foot])
-    figure = InlineFigure(tuple(paper)) if figure is None else figure
-
-    def panel(left: float, bottom: float, width: float, height: float) -> Axes:
-        return figure.add_axes((left / paper[0], bottom / paper[1], width / paper[0], height / paper[1]))
-
-    middle = left + (across - wide) / 2
-    side = panel(middle, foot + lower + below, wide, high_up)
-    side.set(
-        xlim=(low[0], high[0]), ylim=(low[1] - depth, high[1] + _CLOCK * text / scale), xlabel="x / m", ylabel="y / m"
-    )
-    views = [(setting(walk, math_symbol), side, chain.SIDE)]
-    chain.draw_ground(side, walk, walk.setup.floor.line(low[0], high[0]), low[1] - depth)
-    _draw_distance(side, walk, low[1], 0.5 * depth)
-    if tilts:
-        z = (low[2] + high[2]) / 2 + np.array([0.5, -0.5]) * broad
-        above = panel(middle, foot, wide, scale * broad)
-        above.set(xlim=(low[0], high[0]), ylim=z, xlabel="x / m", ylabel="z / m", facecolor=GROUND)
-        above.yaxis.set_major_locator(MaxNLocator(5))
-        views.append(("from above", above, chain.ABOVE))
-    # viridis without its palest end, which can hardly be seen on white paper
-    colors = colormaps["viridis"](0.9 * walk.frame_time / (walk.frame_time[-1] or 1.0))[:, :3]
-    center = center_in_room(walk)
-    path = np.stack([np.interp(walk.frame_time, walk.time, row) for row in center.T], axis=1)
-    radius = circle_radii(walk)
-    shown = _instants(path, float(np.ptp(joints[0, :, 0])), (4, 6) if is_narrow else (6, 12))
-    for title, axes, view in views:
-        for frame in shown:
-            chain.draw_chain(axes, joints[frame], radius, view, _link_colors(colors[frame]), edge=0.25)
-            chain.draw_sprocket(axes, walk, walk.frame_time[frame], facecolor="none", edgecolor=colors[frame])
-        chain.draw_release(axes, walk, view)
-        axes.plot(*(view @ center.T)[:2], color=INK, linewidth=1.4, linestyle=DOTS, label="centre of mass", zorder=4)
-        tidy(axes)
-        axes.set_title(wrapped(title, figure, 0.8), fontsize="medium", loc="left")
-    for number, (frame, title, spot) in enumerate(moments):
-        row, column = divmod(number, in_row)
-        place = left + column * close_up_width, foot + (rows - 1 - row) * pitch
-        axes = panel(*place, close_up_width - 0.1, close_up_height)
-        half = 0.5 * _CLOSE_UP_LINKS * walk.setup.parameters.link_length
-        line = walk.setup.floor.line(spot[0] - half, spot[0] + half)
-        half_height = half / _CLOSE_UP_ASPECT
-        bottom = max(spot[1] - half_height, line[:, 1].min() - 0.2 * half_height)
-        chain.draw_chain(axes, joints[frame], radius, chain.SIDE, _link_colors(colors[frame]), edge=0.6)
-        chain.draw_sprocket(axes, walk, walk.frame_time[frame], facecolor="none", edgecolor=colors[frame])
-        chain.draw_ground(axes, walk, line, min(bottom, line[:, 1].min()))
-        axes.set(xlim=line[[0, -1], 0], ylim=(bottom, bottom + 2 * half_height), yticks=[], xlabel="x / m")
-        axes.set_xticks(
-            [
-                x
-                for x in MaxNLocator(2 if is_narrow else 4).tick_values(*line[[0, -1], 0])
-                if abs(x - spot[0]) < 0.8 * half
-            ]
-        )
-        axes.tick_params(labelsize=10.0 * text)
-        title = f"{title},{chr(10) if is_narrow else ' '}{walk.frame_time[frame]:.3f} s"
-        axes.set_title(title, fontsize="small" if is_narrow else "medium", loc="left")
-    _write_times(side, walk.frame_time[shown], joints[shown, :, :2], colors[shown], 1.2 * radius.max(), text / scale)
-    style: dict[str, Any] = {"frameon": False, "ncols": 2, "borderaxespad": 0.0, "fontsize": "small"}
-    place = (1 - _RIGHT * text / paper[0], 1 - 0.08 / paper[1])
-    figure.legend(*side.get_legend_handles_labels(), loc="upper right", bbox_to_anchor=place, **style)
-    return figure
-
-
-def _link_colors(color: Array) -> tuple[Array, Array, Array]:
-    """Colours of inner links, of outer links and of edges, shape (3,) each."""
-    return 1 - 0.45 * (1 - color), color, 0.6 * color
-
-
-def _instants(path: Array, width: float, bounds: tuple[int, int]) -> list[int]:
-    """Frames between which the centre of mass moves equally far along its path, the first and last among them.
-
-    Within some bounds they are as many as stay legible with chains of this width [m] in the first frame.
-    """
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-    marks = np.linspace(0.0, way[-1], int(np.clip(1 + way[-1] / (0.6 * width), *bounds)))[1:-1]
-    return sorted({0, *(int(np.argmin(np.abs(way - mark))) for mark in marks), len(way) - 1})
-
-
-def _write_times(axes: Axes, times: Array, joints: Array, colors: Array, gap: float, inch: float) -> None:
-    """Write times [s] above the highest joints of k chains, (k, n, 2), by a gap [m], higher where texts would touch."""
-    taken = np.array([text.get_position() for text in axes.texts]).reshape(-1, 2)
-    for moment, its_joints, color in zip(times, joints, colors, strict=True):
-        place = its_joints[np.argmax(its_joints[:, 1])] + (0.0, gap)
-        room = np.array([0.07 * len(f"{moment:.2f} s") + 0.06, 0.17]) * inch  # of the text, and a gap
-        place[0] = np.clip(place[0], *(np.array(axes.get_xlim()) + room[0] * np.array([0.5, -0.5])))
-        while np.any(np.all(np.abs(taken - place) < room, axis=1)):
-            place[1] += 0.02 * inch
-        taken = np.append(taken, [place], axis=0)
-        halo = [withStroke(linewidth=2.5, foreground="white")]
-        style: dict[str, Any] = {"color": 0.7 * color, "fontsize": "small", "path_effects": halo}
-        axes.text(place[0], place[1], f"{moment:.2f} s", ha="center", va="bottom", zorder=6, **style)
-
-
-def _draw_distance(axes: Axes, walk: Walk, low: float, depth: float) -> None:
-    """The distance walked, if there is one, so far [m] below a slope, or below the lowest place of another floor."""
-    if not np.isfinite(walk.dx):
-        return
-    slope = walk.setup.scene.slope
-    x = walk.center[-1, 0] - np.array([walk.dx * np.cos(np.radians(slope)), 0.0])
-    floor = walk.setup.floor.heights(x)
-    y = (floor if slope != 0 else low) - depth + 0 * x
-    arrow = {"arrowstyle": "<|-|>", "color": INK, "shrinkA": 0, "shrinkB": 0}
-    axes.annotate("", (x[1], y[1]), (x[0], y[0]), arrowprops=arrow, zorder=4)
-    axes.plot([x, x], [floor, y - 0.6 * depth], color=INK, linewidth=0.8, zorder=4)
-    box = {"facecolor": GROUND, "edgecolor": "none", "pad": 2.0}
-    text = f"Δx = {'x / cos α = ' * (slope != 0)}{walk.dx:.3f} m"
-    axes.text(x.mean(), y.mean(), text, rotation=-slope, ha="center", va="center", bbox=box, zorder=6)
-
-
-def _moments(walk: Walk) -> list[tuple[int, str, Array]]:
-    """At most four frames in order of time, no frame twice, with what happens there and where, (2,)."""
-    joints, radius = walk.frame_joints, circle_radii(walk).max()
-    above = walk.setup.floor.distances(joints.reshape(-1, 2)).reshape(joints.shape[:-1])
-    last = len(joints) - 1
-    found: dict[int, tuple[str, Array]] = {}
-    touching = np.flatnonzero(above.min(axis=1) < 1.02 * radius)
-    if touching.size:
-        frame = int(touching[0])
-        found[frame] = "first touch", joints[frame, np.argmin(above[frame])]
-    for title, moment, spot_of in (
-        ("first self-contact", walk.self_contact_at, _meeting),
-        ("collapse", walk.collapsed_at, _sharpest_bend),
-    ):
-        if not np.isnan(moment):
-            frame = min(int(np.searchsorted(walk.frame_time, moment)), last)
-            found[frame] = title, spot_of(joints[frame])
-    middle = np.median(joints[last, :, 0])
-    spot = np.array([middle, walk.setup.floor.heights(middle)])
-    half = _CLOSE_UP_LINKS * walk.setup.parameters.link_length / 2
-    if (np.abs(joints[last] - spot) < half).all(axis=1).sum() < _CLOSE_UP_LINKS / 2:  # it is in the air, or in a pit
-        spot = joints[last, np.argmin(above[last])]
-    found[last] = "rest" if walk.status is Status.AT_REST else "end", spot
-    return [(frame, *found[frame]) for frame in sorted(found)]
-
-
-def _meeting(joints: Array) -> Array:
-    """Where two joints at least 3 links apart are closest, (2,)."""
-    count = len(joints)
-    apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
-    distances = np.linalg.norm(joints[:, None] - joints, axis=-1)
-    distances[np.minimum(apart, count - apart) < 3] = np.inf
-    return np.asarray(joints[[*np.unravel_index(np.argmin(distances), distances.shape)]].mean(axis=0))
-
-
-def _sharpest_bend(joints: Array) -> Array:
-    """The joint at which the chain turns most over three links, (2,)."""
-    step = joints - np.roll(joints, 1, axis=0)
-    direction = np.arctan2(step[:, 1], step[:, 0])
-    turn = np.angle(np.exp(1j * (np.roll(direction, -2) - np.roll(direction, 1))))
-    return np.asarray(joints[np.argmax(np.abs(turn))])
+_DRAWN_BY: Final[Mapping[FigureWord, Callable[[Walk, Figure | None, float | None], Figure]]] = {
+    "film_strip": film_strip,
+    "height_and_speed": _height_and_speed,
+    "loop": _loop,
+    "energy": _energy,
+    "tilt": _tilt,
+}
+"""Each figure of `KINDS` draws into an empty figure, or a new one of its own size, and returns it."""
+_ON_AXES: Final[Mapping[FigureWord, Callable[[Walk, Axes], None]]] = {"energy": _energy_on}
+"""Those with one pair of axes draw into given ones, too."""

@@ -5,7 +5,7 @@ been run yet, is on the figure.
 """
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from typing import Any, Final, NamedTuple
 
@@ -40,8 +40,7 @@ from warpchain.pictures.style import (
 )
 from warpchain.results.block_result import BlockResult
 from warpchain.results.sweep_result import SweepResult
-from warpchain.status import Status
-from warpchain.sweeps.designs import sobol_indices, walks_per_sample
+from warpchain.sweeps.designs import SAMPLERS, sobol_indices
 from warpchain.walks.rows import quantity_of
 
 _LOOKS: Final = {"rest": (RED, "o"), "ellipse": (GREEN, "D"), "spinning": (BLUE, "s")}
@@ -57,16 +56,15 @@ def figures(result: SweepResult, quantity: str = "dx", width: float | None = Non
     several axes. A column other than ``dx`` has just these; an `InputError` says that there is none of that name.
     """
     statistics, shown = result.cell_statistics(quantity), set[str]()
-    for draw in (figure6, sensitivity) if quantity == "dx" else ():
+    for draw in SWEEP_FIGURES if quantity == "dx" else ():
         with suppress(NothingToShow):
             picture = draw(result, width)
-            shown.add(picture.name)
+            shown |= picture.blocks
             yield picture
     groups: dict[frozenset[str], list[str]] = {}
     for name in statistics:
         varied = _varied(result.blocks[name])
-        in_figure6 = "distance" in shown and "frequency" in varied and _is_series(result.blocks[name])
-        if varied and not in_figure6:
+        if varied and name not in shown:
             groups.setdefault(frozenset(varied if len(varied) > 1 else ()), []).append(name)
     for names in groups.values():
         with suppress(NothingToShow):
@@ -108,7 +106,7 @@ def figure6(result: SweepResult, width: float | None = None) -> Picture:
     for block, given in zip(result.blocks.values(), result.sweep["blocks"], strict=True):
         found, own = block.statistics("dx"), dict[str, str]()  # start → label
         for place in np.ndindex(*block.shape[:-1]) if _is_series(block) else ():
-            of_point = {name: sets[0] for name, sets in block.planned.points.items()}  # there is one set at most
+            of_point = {name: sets[0] for name, sets in block.block.points.items()}  # there is one set at most
             values = {**given["scene"], **of_point, **cell_values(block.axes, place)}
             if values["start"] not in own:
                 label, further = STARTS[values["start"]].legend, _OTHERS[max(0, len(looks) - 1)]
@@ -123,7 +121,9 @@ def figure6(result: SweepResult, width: float | None = None) -> Picture:
     rows = np.array([row for series in cells.values() for each in series.values() for row in each]).reshape(-1, 5)
     frequencies = np.unique(rows[:, 0])
     if not np.isfinite(rows[:, 1]).any() or len(cells) == len(frequencies) == 1:
-        raise NothingToShow("Figure 6 has walks at rest over links and frequency; give such a block, or let it go on")
+        raise NothingToShow(
+            "Figure 6 needs walks at rest over links and frequency; use such a block, or finish the sweep"
+        )
     gap = float(np.diff(frequencies).min()) if len(frequencies) > 1 else 1.0
     columns = columns_on(width, {1: 1, 2: 2, 4: 2}.get(len(cells), 3))
     size = width or max(4.2, 3.1 * columns), 1.25 + 2.6 * text_scale() * -(-len(cells) // columns)
@@ -162,7 +162,8 @@ def figure6(result: SweepResult, width: float | None = None) -> Picture:
         columns = columns_on(width, 2)
         figure.legend(handles=handles, loc="outside upper right", ncols=columns, title=title, **LEGEND)
     caption = "Distance walked against the frequency of the sprocket, as in the paper's Figure 6: mean, box of one and "
-    return Picture("distance", caption + "bar of two standard deviations.", figure)
+    blocks = {each.name for each in result.blocks.values() if _is_series(each) and "frequency" in _varied(each)}
+    return Picture("distance", caption + "bar of two standard deviations.", figure, frozenset(blocks))
 
 
 CONFIDENCE: Final = 0.95
@@ -190,29 +191,26 @@ def sensitivities(result: SweepResult) -> list[Sensitivity]:
     The intervals are Student's, from the jackknife over the randomisations, which are independent of one another.
     `NothingToShow`: no block is sampled so, or none has a cell with two complete samples yet.
     """
-    named = [given["name"] for given in result.sweep["blocks"] if given["sampler"] == "saltelli"]
-    if not named:
-        raise NothingToShow("no block is sampled for Sobol indices; give sampler: saltelli")
+    crossed = [block for block in result.blocks.values() if SAMPLERS[block.block.sampler].crosses]
+    if not crossed:
+        raise NothingToShow("no block is sampled for Sobol indices; use sampler: saltelli")
     found = []
-    for name in named:
-        block = result.blocks[name]
+    for block in crossed:
         for place in np.ndindex(*block.shape[:-1]):
-            rested = block.columns["status"][place] == Status.AT_REST
-            walks = np.where(rested, block.columns["dx"][place], np.nan)
-            whole = walks.reshape(-1, walks_per_sample("saltelli", len(block.drawn)))
+            whole = block.values("dx")[place].reshape(-1, SAMPLERS[block.block.sampler].walks(len(block.drawn)))
             is_complete = np.isfinite(whole).all(axis=1)
-            complete, groups = whole[is_complete], block.planned.groups[:: whole.shape[1]][is_complete]
+            complete, groups = whole[is_complete], block.block.groups[:: whole.shape[1]][is_complete]
             samples, indices = len(complete), np.array(sobol_indices(complete))
             if samples < 2 or not np.isfinite(indices).all():
                 continue
             half = _half_interval(complete, groups)
             intervals = np.stack([indices - half, indices + half], axis=-1)
             cell = labels.cell_text(cell_values(block.axes, place))
-            text = ": ".join([*[name] * (len(named) > 1), *[cell] * bool(cell)]) or block.name
+            text = ": ".join([*[block.name] * (len(crossed) > 1), *[cell] * bool(cell)]) or block.name
             lost = len(whole) - samples
             found.append(Sensitivity(text, block.drawn, indices, intervals, samples, lost))
     if not found:
-        raise NothingToShow("no cell has two complete samples for Sobol indices yet; let the sweep go on")
+        raise NothingToShow("no cell has two complete samples for Sobol indices yet; resume the sweep")
     return found
 
 
@@ -273,3 +271,7 @@ def sensitivity(result: SweepResult, width: float | None = None) -> Picture:
         f"Samples: {', '.join(f'{cell.samples}' for cell in cells)}."
     )
     return Picture("sensitivity", caption, figure)
+
+
+SWEEP_FIGURES: Final[tuple[Callable[[SweepResult, float | None], Picture], ...]] = (figure6, sensitivity)
+"""Figures of the distance walked beside those of the grid: each draws what it can, or raises `NothingToShow`."""

@@ -17,7 +17,7 @@ import numpy as np
 import yaml
 from matplotlib.figure import Figure
 
-from warpchain.files import AnyPath, Kind, checked_output, write_whole
+from warpchain.files import AnyPath, FileKind, checked_output, write_whole
 from warpchain.inputs.arrays import AnyArray
 from warpchain.inputs.validation import short
 from warpchain.pictures.labels import cell_notes, cell_table, cell_text, cell_values, unit_text
@@ -44,7 +44,7 @@ def _is_report(path: Path) -> bool:
         return content.read(len(_HEAD)) == _HEAD
 
 
-REPORTS: Final = Kind("page that warpchain report has written", _is_report)
+REPORTS: Final = FileKind("page that warpchain report has written", _is_report)
 """All that a report replaces."""
 
 
@@ -137,7 +137,7 @@ def _walk(result: SweepResult, index: int, device: str | None) -> str:
     block, place = result.located(index)
     if device is not None:
         block = replace(block, origin=on_device(block.origin, device))
-    planned, frames = block.origin.planned(index), block.origin.recording.frames
+    planned, frames = block.origin.walk(index), block.origin.recording.frames
     cell = cell_values(block.axes, place[:-1])
     names = [f"block {block.name}"] * (len(result.blocks) > 1) + [cell_text(cell)] * bool(cell)
     if frames is not None and frames.includes(planned.sample) and block.kept[place]:
@@ -153,8 +153,8 @@ def _walk(result: SweepResult, index: int, device: str | None) -> str:
         caption = "Height and speed of the centre of mass, as in the paper's Figure 5."
         parts += [_picture(walk.plot("film_strip"), "The walk, drawn to scale.")]
         parts += [_picture(walk.plot("height_and_speed"), caption)]
-    if planned.drawn:
-        rows = [[name, short(value), unit_text(name)] for name, value in planned.drawn.items()]
+    if planned.draws:
+        rows = [[name, short(value), unit_text(name)] for name, value in planned.draws.items()]
         parts.append("<h3>Drawn for this walk</h3>" + _table(["name", "value", "unit"], rows))
     return "\n".join(parts)
 

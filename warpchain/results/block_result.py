@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.chain.keep import FRAME_INTERVAL
 from warpchain.chain.setup import Setup
 from warpchain.inputs.arrays import AnyArray
 from warpchain.inputs.parameters import Parameters
@@ -17,9 +18,10 @@ from warpchain.inputs.validation import InputError, InputWarning, by_name, check
 from warpchain.results.walk_result import WalkResult
 from warpchain.status import Status
 from warpchain.sweeps.block import POINT, Block
+from warpchain.sweeps.designs import SAMPLERS
 from warpchain.sweeps.plan import Sweep
 from warpchain.walks import rows
-from warpchain.walks.cell_statistics import CellStatistics
+from warpchain.walks.cell_statistics import CellStatistics, known_values
 from warpchain.walks.landmarks import LENGTHS
 from warpchain.walks.rows import COLUMNS, MISSING, Column, quantity_of
 from warpchain.walks.walk_numbers import read_motion
@@ -75,7 +77,7 @@ class BlockResult(Columns):
     motions: AnyArray
 
     @property
-    def planned(self) -> Block:
+    def block(self) -> Block:
         """The block of the sweep that it is of."""
         return self.origin.blocks[self.number]
 
@@ -95,7 +97,7 @@ class BlockResult(Columns):
             """A column."""
             columns = self.__dict__.get("columns", {})
             if name not in columns:
-                raise AttributeError(f"{name}: no such column; columns are {', '.join(columns)}", name=name, obj=self)
+                raise AttributeError(f"{name}: unknown column; use one of {', '.join(columns)}", name=name, obj=self)
             return columns[name]
 
     def __dir__(self) -> list[str]:
@@ -118,7 +120,7 @@ class BlockResult(Columns):
     def _column(self, name: str) -> Column:
         if name in _NUMBERED:
             return Column("<i8", "1", _NUMBERED[name])
-        if not any(name in known for known in (self.columns, self.axes, self.planned.points)):
+        if not any(name in known for known in (self.columns, self.axes, self.block.points)):
             raise KeyError(f"{shown(name)}: {suggestion(name, (*self.columns, *self.axes))}")
         return COLUMNS[name] if name in COLUMNS else rows.field_column(name)
 
@@ -159,31 +161,33 @@ class BlockResult(Columns):
         """Place along the axes and samples of a walk, see `series`."""
         at = by_name(at)
         if unknown := [name for name in at if name not in self.axes]:
-            raise InputError(f"{unknown[0]}: no axis of block {self.name}; {suggestion(unknown[0], tuple(self.axes))}")
+            raise InputError(
+                f"{unknown[0]}: not an axis of block {self.name}; {suggestion(unknown[0], tuple(self.axes))}"
+            )
         place = []
         for name, values in self.axes.items():
             wanted = plain(at[name], name) if name in at else values[0]
             found = [k for k, value in enumerate(values.tolist()) if value == wanted]
             if not len(found) or (name not in at and len(values) > 1):
                 problem = f"{shown(at[name])} is not on the axis" if name in at else "missing"
-                raise InputError(f"{name}: {problem}; give one of {', '.join(map(str, values))}")
+                raise InputError(f"{name}: {problem}; use one of {', '.join(map(str, values))}")
             place.append(found[0])
         if type(plain(sample)) is not int or not 0 <= sample < self.shape[-1]:
-            raise InputError(f"sample: there is no sample {shown(sample)}; give 0 to {self.shape[-1] - 1}")
+            raise InputError(f"sample: expected 0 to {self.shape[-1] - 1}, got {shown(sample)}; use one of them")
         return (*place, sample)
 
     def setup_at(self, place: tuple[int, ...]) -> Setup:
         """Everything that says what the walk at a place is, its draws included."""
-        return self.origin.planned(int(self.columns["index"][place])).setup
+        return self.origin.walk(int(self.columns["index"][place])).setup
 
     def walk(
         self,
         index: int | None = None,
         *,
         sample: int | None = None,
-        frame_interval: float | None = 2e-3,
+        frame_interval: float | None = FRAME_INTERVAL,
         record_before: float | None = None,
-        record_loads: bool = False,
+        record_joint_forces: bool = False,
         **at: Any,
     ) -> WalkResult:
         """Run one walk again, with series and frames: `walk(17)`, or `walk(links=60, frequency=15, sample=2)`.
@@ -196,7 +200,7 @@ class BlockResult(Columns):
             sample: number of the sample; None: 0.
             frame_interval: as of `warpchain.walk`, like the next two.
             record_before: see there.
-            record_loads: see there.
+            record_joint_forces: see there.
             at: value of each axis; of an axis with just one value it may be left out.
 
         Raises:
@@ -208,12 +212,16 @@ class BlockResult(Columns):
         if index is None:
             place = self.place(0 if sample is None else sample, at)
         elif words := [*at, *["sample"] * (sample is not None)]:
-            raise InputError(f"{', '.join(words)}: given together with index; leave one out")
+            raise InputError(f"{', '.join(words)}: not possible with index; remove one")
         else:
             _, place = located([self], index)
         from warpchain.results.one_walk import run_walk
 
-        recording = {"frame_interval": frame_interval, "record_before": record_before, "record_loads": record_loads}
+        recording = {
+            "frame_interval": frame_interval,
+            "record_before": record_before,
+            "record_joint_forces": record_joint_forces,
+        }
         walk = run_walk(self.setup_at(place), seed=self.origin.seed, **recording)  # type: ignore[arg-type]
         dx, number = self.columns["dx"][place], self.columns["index"][place]
         if self.is_there[place] and not self.has_same(walk, place):
@@ -232,7 +240,7 @@ class BlockResult(Columns):
         if not self.kept[place]:
             kept = np.flatnonzero(self.kept.any(axis=tuple(range(len(self.axes)))))
             samples = ", ".join(map(str, kept[:12]))
-            remedy = f"give one of the samples {samples}" if samples else "a sweep with record: {series: true} keeps it"
+            remedy = f"use one of the samples {samples}" if samples else "a sweep with record: {series: true} keeps it"
             raise InputError(f"the motion of walk {self.columns['index'][place]} is not there; {remedy}")
         numbers: dict[str, Any] = {}
         for name, column in rows.STORED_COLUMNS.items():
@@ -258,12 +266,16 @@ class BlockResult(Columns):
     @cached_property
     def faults(self) -> dict[str, NDArray[np.bool_]]:
         """What makes walks inaccurate, a key of `warpchain.walks.landmarks.FAULTS` → whether each walk has it."""
-        return rows.faults_of_columns(self.columns, {name: self.planned.parameter(name) for name in LENGTHS})
+        return rows.faults_of_columns(self.columns, {name: self.block.parameter(name) for name in LENGTHS})
 
     @property
     def inaccurate(self) -> NDArray[np.bool_]:
         """Whether a walk has one of the `faults`, shape `shape`."""
         return np.asarray(np.any([*self.faults.values()], axis=0))
+
+    def values(self, name: str = "dx") -> NDArray[np.float64]:
+        """A column as numbers, shape `shape`, those of which `statistics` are; NaN of walks that are in no mean."""
+        return known_values(self.columns[name], self.columns["status"])
 
     def statistics(self, name: str = "dx") -> CellStatistics:
         """Statistics of a column in each cell, over the walks at rest that have a number there.
@@ -277,7 +289,7 @@ class BlockResult(Columns):
         unit, column, status = self.unit(name), self.columns[name], self.columns["status"]
         is_bounded = name == "dx" and (status == Status.DISTANCE_LIMIT).any()
         farthest = self._farthest() if is_bounded else np.array(np.nan)
-        return CellStatistics.of(self.axes, unit, column, status, self.planned.groups, farthest)
+        return CellStatistics.of(self.axes, unit, column, status, self.block.groups, farthest)
 
     def named_sets(self, cells: CellStatistics) -> CellStatistics:
         """The statistics of some cells, with parameter sets named by their values, as figures show them."""
@@ -285,10 +297,10 @@ class BlockResult(Columns):
 
         if POINT not in self.axes:
             return cells
-        units = {name: unit_text(name) for name in self.planned.points}
+        units = {name: unit_text(name) for name in self.block.points}
         texts = [
             [f"{math_symbol(name)} = {text} {units[name]}".rstrip() for text in short_texts(values)]
-            for name, values in self.planned.points.items()
+            for name, values in self.block.points.items()
         ]
         names = [", ".join(parts) for parts in zip(*texts[:_MOST_NAMED], strict=True)]
         if len(texts) > _MOST_NAMED or len(set(names)) < len(names):
@@ -309,15 +321,15 @@ class BlockResult(Columns):
             falls = scene.slope >= 0 and bool((np.diff(heights) <= 0).all())
             return scene.distance_limit if scene.distance_limit is not None and falls else math.nan
 
-        return self.planned.over_cells(("slope", "distance_limit", "floor"), limit)[..., 0]
+        return self.block.over_cells(("slope", "distance_limit", "floor"), limit)[..., 0]
 
     def design(self) -> "xarray.DataArray":
         """What differs between the walks beside the axes, as one array with the names along its last axis, `quantity`.
 
         Values of parameter sets (`points`) and those that samples drew; NaN of a walk that is not there.
         """
-        points = [*self.planned.points]
-        if words := [name for name, values in self.planned.points.items() if isinstance(values[0], str)]:
+        points = [*self.block.points]
+        if words := [name for name, values in self.block.points.items() if isinstance(values[0], str)]:
             raise InputError(f"{words[0]}: its values are words, and a design has numbers; take to_xarray()")
         if not points and not self.drawn:
             raise InputError(f"block {self.name}: nothing differs between its walks beside axes; take to_xarray()")
@@ -342,9 +354,9 @@ class BlockResult(Columns):
         """Coordinates and variables; null among numbers is NaN."""
         along = {name: (name, values) for name, values in self.axes.items()}
         along |= {"sample": ("sample", np.arange(self.shape[-1]))}
-        along |= {name: (POINT, np.array(values)) for name, values in self.planned.points.items()}
-        if self.planned.sampler != "random":
-            along[RANDOMISATION] = "sample", self.planned.groups
+        along |= {name: (POINT, np.array(values)) for name, values in self.block.points.items()}
+        if SAMPLERS[self.block.sampler].engine is not None:
+            along[RANDOMISATION] = "sample", self.block.groups
         coordinates: _Variables = {
             name: ((dim,), values.astype(float) if values.dtype.kind == "O" else values, self.notes(name))
             for name, (dim, values) in along.items()
@@ -381,5 +393,7 @@ def located(blocks: Sequence[BlockResult], index: object) -> tuple[BlockResult, 
     found = [(block, tuple(map(int, at))) for block in blocks for at in np.argwhere(block.columns["index"] == number)]
     if not found:
         largest = max(int(block.columns["index"].max()) for block in blocks)
-        raise InputError(f"index: the sweep has no walk {number}; give one of its column index, at most {largest}")
+        raise InputError(
+            f"index: expected a number in the column index, at most {largest}, got {number}; use one of these"
+        )
     return found[0]

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from warpchain.chain.keep import LONGEST_INTERVAL, Keep
+from warpchain.chain.keep import FRAME_INTERVAL, LONGEST_INTERVAL, Keep
 from warpchain.chain.setup import Setup
 from warpchain.engine.devices import gpu_turn
 from warpchain.inputs.validation import InputError, checked
@@ -27,29 +27,29 @@ def run_walk(
     setup: Setup,
     *,
     seed: int | None = None,
-    frame_interval: float | None = 2e-3,
+    frame_interval: float | None = FRAME_INTERVAL,
     record_before: float | None = None,
-    record_loads: bool = False,
+    record_joint_forces: bool = False,
     on_progress: OnProgress | None = None,
 ) -> WalkResult:
     """Run a walk whose setup is complete, samples drawn; the seed is only noted. The rest is as of `warpchain.walk`."""
     interval: float | None = checked(frame_interval, "frame_interval", _INTERVAL | None, "s")
     before: float | None = checked(record_before, "record_before", _BEFORE | None, "s")
-    if interval is None and (before or record_loads):
-        name = "record_before" if before else "record_loads"
-        raise InputError(f"{name}: kept with frames, but frame_interval is None; give a frame_interval as well")
+    if interval is None and (before or record_joint_forces):
+        name = "record_before" if before else "record_joint_forces"
+        raise InputError(f"{name}: needs frames, but frame_interval is None; set frame_interval as well")
     method = setup.options.method
-    if record_loads and find_method(method).has_rigid_flight:
-        raise InputError(f"options.method: {method!r} has rigid joints, without forces; give explicit")
+    if record_joint_forces and find_method(method).has_rigid_flight:
+        raise InputError(f"options.method: {method!r} has rigid joints, without forces; use explicit")
     if not setup.has_drive:
         before = 0.0
     earlier = RECORD_BEFORE if before is None else before
-    keep = Keep.asked(interval, earlier, record_loads, setup.options.record_interval)
+    keep = Keep.asked(interval, earlier, record_joint_forces, setup.options.record_interval)
     report = on_progress or (lambda progress: None)
     with gpu_turn([setup.options.device]):
         compile_kernels([setup], on_compile=lambda: report(Progress("compile", 0.0, 0.0, 0)))
         started = time.perf_counter()
-        ((_, run),) = run_setups([setup], keeps=[keep], watch=lambda run: report(run.progress()))
+        (((_, run),),) = run_setups([setup], keeps=[keep], watch=lambda run: report(run.progress()))
         return WalkResult(
             **vars(run.outcome()),
             **run.motion(),

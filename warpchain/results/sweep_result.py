@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.chain.setup import Setup
-from warpchain.files import AnyPath, Kind, checked_output, clear_parts, given_path, write_whole
-from warpchain.hdf5_files import Format, hdf5_image, kind_of_hdf5, reading_hdf5
+from warpchain.files import AnyPath, FileKind, checked_output, clear_parts, given_path, write_whole
+from warpchain.hdf5_files import SWEEP_FILE, Format, hdf5_image, kind_of_hdf5, reading_hdf5
 from warpchain.inputs.arrays import AnyArray
 from warpchain.inputs.validation import InputError, InputWarning, checked_path, full_name, shown, suggestion
 from warpchain.results.block_result import BlockResult, counted, located, status_counts
@@ -70,7 +70,7 @@ MERGED: Final = Format.of("warpchain sweep result", COLUMNS, MOTION)
 REMEDY: Final = "merge the folders again, or fetch another copy of the file"
 TRIES, PAUSE = 100, 0.02
 """Times that a folder is read in which shards come and go, and time [s] between them."""
-WANTED: Final = "give a folder of a sweep or a merged file; a saved walk is for plot, animate and load_walk"
+WANTED: Final = "use the folder of a sweep or a merged file; a saved walk is for plot, animate and load_walk"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -109,7 +109,7 @@ class SweepResult(_OnlyBlock):
             blocks = self.__dict__.get("blocks", {})
             if len(blocks) == 1:
                 return getattr(next(iter(blocks.values())), name)
-            problem = f"{name}: no such attribute; there are several blocks, blocks[…] with {', '.join(blocks)}"
+            problem = f"{name}: unknown attribute; with several blocks use blocks[…] with one of {', '.join(blocks)}"
             raise AttributeError(problem, name=name, obj=self)
 
     def __dir__(self) -> list[str]:
@@ -156,7 +156,7 @@ class SweepResult(_OnlyBlock):
     def unit(self, name: str) -> str:
         """SI unit of a column or an axis of any block, "1" for pure numbers; a `KeyError` if there is none."""
         first, *others = self.blocks.values()
-        known = (block for block in others if name in (*block.columns, *block.dims, *block.planned.points))
+        known = (block for block in others if name in (*block.columns, *block.dims, *block.block.points))
         return next(known, first).unit(name)
 
     def cell_statistics(self, quantity: str = "dx") -> dict[str, CellStatistics]:
@@ -168,7 +168,7 @@ class SweepResult(_OnlyBlock):
         known = {name: None for block in self.blocks.values() for name in block.columns}
         columns = [name for name in known if name not in ("index", "status")]
         if quantity not in columns:
-            raise InputError(f"quantity: {shown(quantity)} is no column of numbers; {suggestion(quantity, columns)}")
+            raise InputError(f"quantity: {shown(quantity)} is not a column of numbers; {suggestion(quantity, columns)}")
         blocks = self.blocks.items()
         return {name: block.statistics(quantity) for name, block in blocks if quantity in block.columns}
 
@@ -178,7 +178,7 @@ class SweepResult(_OnlyBlock):
         Its other arguments, without a number, say which walk of the only block it is.
         """
         if index is None and len(self.blocks) > 1:
-            raise InputError("index: missing; give the number of a walk, or call walk of one of the blocks")
+            raise InputError("index: missing; pass the number of a walk, or call walk of one of the blocks")
         block = next(iter(self.blocks.values())) if index is None else self.located(index)[0]
         return block.walk(index, **words)
 
@@ -280,18 +280,20 @@ def load(path: AnyPath | Sequence[AnyPath]) -> SweepResult:
 def _together(sources: Sequence[AnyPath]) -> SweepResult:
     """The results of several folders and merged files as one; errors as of `load`."""
     if not sources:
-        raise InputError("path: an empty list; give the folders of a sweep")
+        raise InputError("path: expected folders of a sweep, got an empty list; pass them")
     first, *others = sources
     whole = load(first)
     for folder in others:
         result = load(folder)
         if any(whole.provenance[name] != result.provenance[name] for name in ("digest", "numerics_version")):
-            raise InputError(f"{folder}: is not the sweep of {first}, with the same seed and samples; give its parts")
+            raise InputError(
+                f"{folder}: expected a part of the sweep in {first}, got another sweep; use parts of one sweep"
+            )
         blocks = {}
         for block, other in zip(whole.blocks.values(), result.blocks.values(), strict=True):
             there = block.is_there
             if (there & other.is_there).any():
-                raise InputError(f"{folder}: has walks that a folder before it has; give each part of a sweep once")
+                raise InputError(f"{folder}: repeats walks of an earlier folder; pass each part of a sweep once")
             columns = {key: np.where(there, values, other.columns[key]) for key, values in block.columns.items()}
             blocks[block.name] = replace(block, columns=columns, motions=np.where(there, block.motions, other.motions))
         whole = replace(whole, blocks=blocks)
@@ -316,7 +318,7 @@ def _load_folder(directory: AnyPath) -> SweepResult:
 
 def _seen(directory: AnyPath) -> tuple[str, Manifest]:
     """Stamp and manifest of a folder."""
-    if os.path.lexists(Path(directory) / "sweep.h5"):
+    if os.path.lexists(Path(directory) / SWEEP_FILE):
         return stamp(directory), read_manifest(directory)
     return "", read_manifest(directory)  # says what is wrong
 
@@ -388,7 +390,7 @@ def _is_merged(path: Path) -> bool:
         return False
 
 
-_MERGED: Final = Kind("merged sweep", _is_merged)
+_MERGED: Final = FileKind("merged sweep", _is_merged)
 """All that a merged file replaces."""
 
 

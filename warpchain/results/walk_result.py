@@ -17,14 +17,24 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from warpchain.chain.resolution import SECTIONS
 from warpchain.chain.setup import Setup, State
 from warpchain.files import write_whole
-from warpchain.hdf5_files import Format, dataset_of, hdf5_image, put, read_fields, reading_hdf5, write_fields
+from warpchain.hdf5_files import (
+    SWEEP_FILE,
+    WALK_FILE,
+    Format,
+    dataset_of,
+    hdf5_image,
+    put,
+    read_fields,
+    reading_hdf5,
+    write_fields,
+)
+from warpchain.inputs.fields import SECTIONS
+from warpchain.inputs.figure_kinds import FigureWord
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import InputError, checked_path, json_value, validated
-from warpchain.loop.stationary_loop import FIELDS
-from warpchain.pictures.labels import Kind
+from warpchain.loop.stationary_loop import LOOP_FIELDS
 from warpchain.status import Status
 from warpchain.walks.landmarks import MOST_ENERGY_ERROR
 from warpchain.walks.restart import state_at
@@ -37,7 +47,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-WANTED: Final = "give a saved walk; `walk --like SWEEP --index I` saves one"
+WANTED: Final = "use a saved walk; `walk --like SWEEP --index I` saves one"
 SHOWN: Final = 12_000
 """Joints that a notebook keeps of the frames of a walk: 200 frames of 60 links take 0.12 MB."""
 
@@ -50,7 +60,7 @@ _STATE: Final = {
     "axes": ("1", "x and y axes of the plane in the laboratory frame"),
     "plane_rates": ("m/s, rad/s, rad/s", "speed across the plane, and its turning rates about x and y"),
 }
-_FORMAT: Final = Format.of("warpchain walk", STORED, FIELDS, {name: unit for name, (unit, _) in _STATE.items()})
+_FORMAT: Final = Format.of("warpchain walk", STORED, LOOP_FIELDS, {name: unit for name, (unit, _) in _STATE.items()})
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -91,7 +101,7 @@ class WalkResult(WalkNumbers):
 
     def plot(
         self,
-        kind: Kind = "height_and_speed",
+        kind: FigureWord = "height_and_speed",
         *,
         figure: "Figure | None" = None,
         ax: "Axes | None" = None,
@@ -236,9 +246,9 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
     """
     path = checked_path(path, "path")
     if os.path.isdir(path):
-        record = os.path.join(path, "walk.h5")
-        if not os.path.exists(record) and os.path.exists(os.path.join(path, "sweep.h5")):
-            raise InputError(f"{path}: the folder of a sweep, not of a saved walk; {WANTED}")
+        record = os.path.join(path, WALK_FILE)
+        if not os.path.exists(record) and os.path.exists(os.path.join(path, SWEEP_FILE)):
+            raise InputError(f"{path}: expected a saved walk, got the folder of a sweep; {WANTED}")
         path = record
     remedy = "run the walk again, or fetch another copy of the file"
     with reading_hdf5(path, _FORMAT, remedy, WANTED) as file:

@@ -30,6 +30,7 @@ class SweepProgress:
         seconds: Wall time [s] of this run so far.
         statuses: Number of walks of this run by status label.
         inaccurate: Walks of this run that are inaccurate, see `warpchain.walks.landmarks`.
+        waited: Time [s] for which the threads of this process have waited for a GPU.
         compiling: Kernels are being compiled, which takes seconds to minutes the first time on a machine.
     """
 
@@ -40,6 +41,7 @@ class SweepProgress:
     statuses: Counter[str] = field(default_factory=Counter)
     compiling: bool = False
     inaccurate: int = 0
+    waited: float = 0.0
 
     @property
     def rate(self) -> float:

@@ -106,7 +106,7 @@ def simulate(
     floor, gravity = plain(floor, "floor"), checked(gravity, "gravity", bool)
     chosen_times = None if times is None else checked_array(times, "times", "t")
     if duration is None and chosen_times is None:
-        raise InputError("duration: missing, and so is times; give the simulated time in s, or the instants")
+        raise InputError("duration: missing; set it in s, or set times")
     if duration is None and chosen_times is not None and len(chosen_times):
         duration = max(0.0, float(chosen_times[-1]))
     end: float = checked(
@@ -115,15 +115,15 @@ def simulate(
     options = validated(Options, {**_UNSOFTENED, **chosen}, "options")
     for name in _UNSOFTENED:
         if getattr(options, name):
-            raise InputError(f"options.{name}: only a walk has phases in which joints soften; leave it out")
+            raise InputError(f"options.{name}: only a walk softens its joints; remove it")
     if not isinstance(parameters, State):
         state = State.of_links(position, velocity, parameters)
     elif position is not None or velocity is not None:
-        raise InputError("position: given together with a state, which has positions and velocities; leave them out")
+        raise InputError("position: not possible with a state, which has positions and velocities; remove them")
     elif parameters.axes is not None:
-        raise InputError("parameters: the plane of this state tilts, which simulate does not do; give walk(start=…) it")
+        raise InputError("parameters: simulate does not support tilting planes; use walk(start=state) instead")
     elif parameters.memory and parameters.memory["state/softness"] > 0:
-        raise InputError("parameters: joints of this state are softened, as only a walk goes on; give walk(start=…) it")
+        raise InputError("parameters: simulate does not support softened joints; use walk(start=state) instead")
     else:
         state = parameters
     scene = state.setup.scene
@@ -136,14 +136,14 @@ def simulate(
     instants = np.linspace(0.0, end, 101) if chosen_times is None else chosen_times
     is_rising = chosen_times is None or bool(np.all(np.diff(instants) > 0))
     if not len(instants) or instants[0] < 0 or instants[-1] > end or not is_rising:
-        raise InputError(f"times: give rising instants between 0 and the duration of {end} s")
+        raise InputError(f"times: expected increasing times between 0 and the duration of {end} s; correct them")
     if len(instants) * state.links > MOST_PLACES:
-        raise InputError(f"times: {len(instants)} instants are too many; give at most {MOST_PLACES // state.links}")
+        raise InputError(f"times: expected at most {MOST_PLACES // state.links} times, got {len(instants)}; use fewer")
     if floor is not False and not (floor is None and state.is_placed_as_in(state.setup)):
         setup.floor.check_above(state.position, chain.link_length, "position")
     with gpu_turn([options.device]):
         batch = Batch(1, state.links, options, faces=len(setup.floor.laws))
-        batch.worlds[0].set_up(setup)
+        batch.several([0]).set_up([setup])
         batch.worlds[0].load(state.position, state.velocity, stop_time=instants[0], stop_status=Status.FINISHED)
         return _follow(batch, "none" if floor is False else setup.floor.body, instants, end)
 
@@ -183,14 +183,16 @@ class Chains:
         """
         options = validated(Options, {"method": "explicit", "soften_drive": False, **settings}, "options")
         if options.soften_drive:
-            raise InputError("options.soften_drive: there is no sprocket; leave it out")
+            raise InputError("options.soften_drive: these chains have no sprocket; remove it")
         floor = checked(floor, "floor", bool)
         position = checked_array(position, "position", "W", "n", 3)
         velocity, (worlds, links, _) = checked_array(velocity, "velocity", *position.shape), position.shape
         if not isinstance(parameters, list | tuple) or len(parameters) != worlds:
-            raise InputError(f"parameters: {shown(parameters)} are not of {worlds} chains; give Parameters of each")
+            raise InputError(
+                f"parameters: expected Parameters of each of {worlds} chains, got {shown(parameters)}; pass a list"
+            )
         if not parameters:
-            raise InputError("parameters: no chains; give one at least")
+            raise InputError("parameters: expected at least one chain, got none; add one")
         check_links_on_gpu(links, options.device, "position")
         states = [State.of_links(*given) for given in zip(position, velocity, parameters, strict=True)]
         for state in states if floor else ():
@@ -198,9 +200,9 @@ class Chains:
         self.time, self._links = 0.0, links
         with gpu_turn([options.device]):
             self._batch = Batch(worlds, links, options)
-            for world, state in zip(self._batch.worlds, states, strict=True):
-                world.set_up(state.setup)
-                world.load(state.position, state.velocity, stop_time=0.0, stop_status=Status.FINISHED)
+            every = self._batch.several(range(worlds))
+            every.set_up([state.setup for state in states])
+            every.load(position, velocity, stop_time=0.0, stop_status=Status.FINISHED)
             self._features = self._batch.features(fixed_body="floor" if floor else "none")
             self._batch.run(range(worlds), self._features)
 

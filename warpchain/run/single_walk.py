@@ -2,11 +2,13 @@
 
 from typing import TYPE_CHECKING, Never, Unpack
 
+from warpchain.chain.keep import FRAME_INTERVAL
 from warpchain.chain.resolution import MAY_BE_NONE, continued, resolve
 from warpchain.chain.setup import DEFAULT_PRESET, Setup, State
 from warpchain.inputs.distributions import Seed
+from warpchain.inputs.fields import by_section
 from warpchain.inputs.keywords import takes_fields
-from warpchain.inputs.validation import InputError, by_name, by_section, checked, shown
+from warpchain.inputs.validation import InputError, by_name, checked, shown
 from warpchain.results.one_walk import OnProgress, run_walk
 from warpchain.results.walk_result import WalkResult
 from warpchain.run.progress_bar import changing_line, walk_progress_text
@@ -22,9 +24,9 @@ def walk(
     preset: str | None = None,
     setup: Setup | None = None,
     seed: int | None = None,
-    frame_interval: float | None = 2e-3,
+    frame_interval: float | None = FRAME_INTERVAL,
     record_before: float | None = None,
-    record_loads: bool = False,
+    record_joint_forces: bool = False,
     on_progress: OnProgress | None = None,
     **settings: "Unpack[WalkFields[Never]]",
 ) -> WalkResult:
@@ -36,7 +38,7 @@ def walk(
         preset: None or ``"paper"`` (Table 1), or ``"soft"`` (softer joints, with ``reference`` 15 to 19
             times fewer steps).
         method: ``"standard"`` (``"hybrid"`` at 3e-3, with joints softened on the sprocket and in the pile; on a
-            GPU, and with ``record_loads``, the next), ``"explicit"`` (``"os32"`` at 3e-3, softened likewise),
+            GPU, and with ``record_joint_forces``, the next), ``"explicit"`` (``"os32"`` at 3e-3, softened likewise),
             ``"reference"`` (``"rkf78"`` at 1e-6, as in the paper), or an integrator: a key of
             ``warpchain.inputs.methods.METHODS``, such as ``"dp5"``.
         tolerance: Error allowed in a step, absolute (SI units) and relative alike; None: the method's, 1e-6 for an
@@ -53,8 +55,8 @@ def walk(
             the walk: they are taken at the end of the first step after their time.
         record_before: Time [s] before the release of which frames and samples are kept as well, as ``before_release``
             of the result, with the forces in the joints; None: 0.5 s if frames are kept; 0: none. Nothing is kept of
-            a loop under multiplied loads; ``further_hold`` makes room for more.
-        record_loads: Whether ``frame_forces`` and ``frame_moments``, the loads of the joints, are kept with each frame
+            a loop under multiplied loads; ``extra_hold`` makes room for more.
+        record_joint_forces: Whether ``frame_forces`` and ``frame_moments`` of the joints are recorded with each frame
             after the release. No method with rigid joints has them: ``"standard"`` then is ``"explicit"``. The picture
             of waves needs frames some 1e-4 s apart; with 60 links they take 24 MB for each second of the walk.
         on_progress: Called before kernels are compiled, if any are, and after each launch, several times a second; by
@@ -70,12 +72,12 @@ def walk(
     """
     given = by_name({name: value for name, value in settings.items() if value is not None or name not in MAY_BE_NONE})
     refuse_axes(given)
-    loads, seed = checked(record_loads, "record_loads", bool), checked(seed, "seed", Seed | None)
+    loads, seed = checked(record_joint_forces, "record_joint_forces", bool), checked(seed, "seed", Seed | None)
     start = given.get("start")
     if isinstance(start, State) and setup is None:
         for name, value in {"preset": preset, "seed": seed}.items():
             if value is not None:
-                raise InputError(f"{name}: given together with a state, which has its chain; leave it out")
+                raise InputError(f"{name}: not possible with a state, which has its own chain; remove it")
         del given["start"]
         setup = continued(start, by_section(given))
     elif setup is None:
@@ -83,16 +85,18 @@ def walk(
         setup = resolve(preset, **by_section(given), seed=seed, loads=loads)
     else:
         if not isinstance(setup, Setup):
-            raise InputError(f"setup: {shown(setup)} is none; give that of a WalkResult, such as load_walk(…).setup")
+            raise InputError(
+                f"setup: expected the setup of a walk, got {shown(setup)}; pass walk.setup, e.g. load_walk(…).setup"
+            )
         if others := [*["preset"] * (preset is not None), *given]:
-            raise InputError(f"{', '.join(others)}: given together with setup, which is complete; leave one out")
+            raise InputError(f"{', '.join(others)}: not possible with setup, which is complete; remove one")
     with changing_line(in_terminals=False) as show:
         return run_walk(
             setup,
             seed=seed,
             frame_interval=frame_interval,
             record_before=record_before,
-            record_loads=loads,
+            record_joint_forces=loads,
             on_progress=on_progress
             or (lambda progress: show(walk_progress_text(progress), progress.phase == "compile")),
         )

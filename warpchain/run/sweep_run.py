@@ -9,6 +9,7 @@ import math
 import os
 import re
 import time
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import ExitStack
@@ -25,20 +26,10 @@ from warpchain.chain.setup import DEFAULT_PRESET, Setup
 from warpchain.engine.devices import gpu_turn, has_gpu_turn, start_device
 from warpchain.engine.processors import free_memory, processors
 from warpchain.files import AnyPath
+from warpchain.inputs.fields import SECTION_OF, by_section
 from warpchain.inputs.keywords import takes_fields, types_of
 from warpchain.inputs.options import Options, on_gpu
-from warpchain.inputs.validation import (
-    SECTION_OF,
-    InputError,
-    Whole,
-    by_name,
-    by_section,
-    checked,
-    checked_path,
-    plain,
-    shown,
-    validated,
-)
+from warpchain.inputs.validation import InputError, Whole, by_name, checked, checked_path, plain, shown, validated
 from warpchain.results.sweep_result import SweepResult, load
 from warpchain.run import progress_bar
 from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text
@@ -47,18 +38,19 @@ from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
 from warpchain.store.shards import Part, Shard, check_numerics, opened_shard, rows_of, stamp, write_shard
 from warpchain.sweeps.block import is_axis
-from warpchain.sweeps.plan import PlannedWalk, Source, Sweep, load_sweep
+from warpchain.sweeps.plan import Source, Sweep, load_sweep
 from warpchain.sweeps.sweep_file import VERSION, BlockKeys, SweepFile
 from warpchain.walks.landmarks import LENGTHS
-from warpchain.walks.rows import MISSING, derived_columns, faults_of_columns, fill_row, missing_rows
+from warpchain.walks.rows import derived_columns, faults_of_columns, fill_drawn, fill_outcomes, missing_rows
 from warpchain.walks.scheduler import compile_kernels, run_setups
+from warpchain.walks.walk_phases import outcomes
 
 if TYPE_CHECKING:
     from warpchain.typed import SweepFields
 
 Tasks = Iterator[tuple[Future[None], list[Shard]]]
 
-KEYS: Final = (*BlockKeys.model_fields, "same_samples_along", "record", "name", "seed")
+FILE_KEYS: Final = (*BlockKeys.model_fields, "same_samples_along", "record", "name", "seed")
 """Keys of a sweep file that are keywords."""
 OF_FILE: Final = {name: f"{kind.removesuffix(' | None')} | None" for name, kind in types_of(SweepFile).items()}
 """Types of the keys of a sweep file as keywords."""
@@ -74,7 +66,7 @@ SHARDS = 32
 """Least number of shards of a sweep, about, if it has as many walks: the grain of a restart."""
 
 
-@takes_fields("scene", "parameters", "options", beside={name: (OF_FILE[name], None) for name in KEYS})
+@takes_fields("scene", "parameters", "options", beside={name: (OF_FILE[name], None) for name in FILE_KEYS})
 def sweep(
     source: str | os.PathLike[str] | Mapping[str, Any] | Sweep | None = None,
     out: str | os.PathLike[str] | None = None,
@@ -135,7 +127,7 @@ def sweep(
     """
     if executor is not None and not hasattr(executor, "submit"):
         wanted = "one with submit, such as concurrent.futures.ProcessPoolExecutor(), or a Dask client"
-        raise InputError(f"executor: expected {wanted}; got {shown(executor)}")
+        raise InputError(f"executor: expected {wanted}, got {shown(executor)}")
     planned, folder, own, count = _checked_call(source, out, settings, settings.pop("device", None), workers, part)
     if hasattr(executor, "get_executor"):
         count = count or sum(executor.nthreads().values())
@@ -158,11 +150,12 @@ def _checked_call(
         return planned if device is None else on_device(planned, device)
 
     problems, found = list[str](), list[Any]()
-    settings = {name: value for name, value in given.items() if value is not None or name not in (*KEYS, *MAY_BE_NONE)}
+    unsaid = {name for name in (*FILE_KEYS, *MAY_BE_NONE) if given.get(name) is None}
+    settings = {name: value for name, value in given.items() if name not in unsaid}
     replaced = {name: plain(settings[name], name) for name in ("seed", "samples") if name in settings}
     if source is not None and (others := [name for name in settings if name not in replaced]):
         names = ", ".join(others)
-        problems.append(f"{names}: given together with a source; leave one out, or write it into the source")
+        problems.append(f"{names}: not possible with a source; remove one, or write it into the source")
     at_least_one = Annotated[Whole, Field(ge=1)] | None
     checks = plan, partial(checked_path, out, "out"), partial(checked_part, part)
     for check in (*checks, partial(checked, workers, "workers", at_least_one)):
@@ -178,13 +171,13 @@ def _checked_call(
 def sweep_of_keywords(given: Values, out: AnyPath | None) -> Sweep:
     """The sweep that keyword arguments describe; an `InputError` with a line for each value that is refused.
 
-    They are `KEYS`, and fields of a walk by name or symbol; a list or a range is an axis of the grid, behind those
+    They are `FILE_KEYS`, and fields of a walk by name or symbol; a list or a range is an axis of the grid, behind those
     given. Left out, the name is that of the folder, the seed 0, and the preset that of a walk, unless it is an axis.
     """
     name = Path(out).absolute().name if isinstance(out, str | os.PathLike) else ""
     usual = {"name": name or "sweep", "seed": 0, "version": VERSION}
     values = plain(given, "sweep")
-    content: dict[str, Any] = usual | {key: values.pop(key) for key in KEYS if key in values}
+    content: dict[str, Any] = usual | {key: values.pop(key) for key in FILE_KEYS if key in values}
     by_section(values)  # refuses unknown names
     if isinstance(content.get("preset"), list):
         values = {"preset": content.pop("preset"), **values}
@@ -193,7 +186,7 @@ def sweep_of_keywords(given: Values, out: AnyPath | None) -> Sweep:
         others = content.setdefault(key, {})
         if isinstance(others, dict):  # the check of the content refuses anything else
             if name in by_name(others):
-                raise InputError(f"{name}: given twice, also in {key}; leave one out")
+                raise InputError(f"{name}: given twice, also in {key}; remove one")
             content[key] = {**others, name: value}
     grid = content.get("grid")
     if not (isinstance(grid, Mapping) and "preset" in grid):
@@ -207,7 +200,7 @@ def checked_part(given: object) -> Part:
         return 1, 1
     found = re.fullmatch(r"([1-9]\d{0,5})/([1-9]\d{0,5})", given) if isinstance(given, str) else None
     if found is None or int(found[1]) > int(found[2]):
-        raise InputError(f"part: {shown(given)} is no part; give k/N with 1 ≤ k ≤ N < 10⁶, such as 3/8")
+        raise InputError(f"part: expected k/N with 1 ≤ k ≤ N < 10⁶, got {shown(given)}; use e.g. 3/8")
     return int(found[1]), int(found[2])
 
 
@@ -220,7 +213,7 @@ def _run_in_folder(
     if executor is None:
         devices = {setup.options.device for setup in kinds}
         if has_gpu_turn() and any(map(on_gpu, devices)):
-            raise InputError("device: this thread is in the middle of a walk on a GPU; begin a sweep when it is over")
+            raise InputError("device: this thread is running a walk on a GPU; start the sweep after it has ended")
         for device in devices:
             start_device(device)  # refuses one that is not there before anything is written
         if all(map(on_gpu, devices)):
@@ -228,7 +221,7 @@ def _run_in_folder(
     needed = BYTES_OF_WALK * planned.walk_count
     if needed > (free := free_memory()):
         problem = f"{planned.walk_count:,} walks take {needed / 1e9:.2g} GB of memory, and {free / 1e9:.2g} GB are free"
-        raise InputError(f"samples: {problem}; give fewer samples or cells, or a machine with more memory")
+        raise InputError(f"samples: {problem}; use fewer samples or cells, or a machine with more memory")
     size = max(1, min(SHARD_WALKS, planned.walk_count // SHARDS))  # by the sweep only: equal sweeps leave equal files
     with SweepFolder.open(folder, planned, fresh=fresh, shard_size=size, part=part) as store, ExitStack() as held:
         missing = store.missing()
@@ -274,7 +267,7 @@ def on_device(planned: Sweep, device: str) -> Sweep:
     the same method on any device. An `InputError` says that the sweep's grid goes over devices.
     """
     if any("device" in block.varied for block in planned.blocks):
-        raise InputError(f"device: {device} is given, but the sweep's grid goes over devices; leave one of them out")
+        raise InputError(f"device: {device} is not possible with device as an axis of the grid; remove one")
     validated(Options, {"device": device}, "options")
     blocks = []
     for block in planned.blocks:
@@ -295,26 +288,33 @@ def run_shards(planned: Sweep, directory: str, seal: str, shards: Sequence[Shard
     stop = None if pulse is None else pulse.stop
     walks = list(planned.undrawn(index for shard in shards for index in shard.walks.tolist()))
     setups, keeps = [walk.setup for walk in walks], [planned.keep(walk) for walk in walks]
-    places = [(shard, row) for shard in shards for row in range(len(shard))]
-    rows = {shard: missing_rows(shard.kind, shard.keys) for shard in shards}
-    motions: dict[Shard, dict[int, dict[str, Any]]] = {shard: {} for shard in shards}
-    under_way: dict[int, PlannedWalk] = {}
+    of_walk = np.repeat(np.arange(len(shards)), [len(shard) for shard in shards])
+    firsts = np.flatnonzero(np.diff(of_walk, prepend=-1))
+    rows = missing_rows(shards[0].kind, np.concatenate([shard.keys for shard in shards]))
+    motions: dict[int, dict[int, dict[str, Any]]] = defaultdict(dict)
+    missing = np.bincount(of_walk)
 
-    def draw(number: int) -> Setup:
-        under_way[number] = planned.drawn(walks[number])
-        return under_way[number].setup
+    def draw(places: Sequence[int]) -> list[Setup]:
+        drawn = [planned.with_draws(walks[place]) for place in places]
+        fill_drawn(rows, places, [walk.draws for walk in drawn])
+        return [walk.setup for walk in drawn]
 
     with gpu_turn((setup.options.device for setup in setups), stop):
         compile_kernels(setups)  # all at once: a walk that needs one would wait for it alone
-        for number, run in run_setups(setups, draw=draw, keeps=keeps, stop=stop):
-            shard, row = places[number]
+        waited = (lambda seconds: None) if pulse is None else pulse.wait
+        for over in run_setups(setups, draw=draw, keeps=keeps, stop=stop, waited=waited):
+            places = [place for place, _ in over]
+            fill_outcomes(rows, places, outcomes([run for _, run in over]))
             if pulse is not None:
-                pulse.beat()
-            fill_row(rows[shard][row], run.outcome(), under_way.pop(number).drawn)
-            if keeps[number].series_every is not None:
-                motions[shard][row] = run.motion()
-            if (rows[shard]["status"] != MISSING).all():
-                write_shard(directory, seal, shard, rows.pop(shard), motions.pop(shard))
+                pulse.beat(len(over))
+            for place, run in over:
+                if keeps[place].series_every is not None:
+                    motions[of_walk[place]][place - firsts[of_walk[place]]] = run.motion()
+            np.subtract.at(missing, of_walk[places], 1)
+            for number in np.unique(of_walk[places]):
+                if missing[number] == 0:
+                    shard, first = shards[number], firsts[number]
+                    write_shard(directory, seal, shard, rows[first : first + len(shard)], motions.pop(number, {}))
 
 
 def _follow(
@@ -351,7 +351,7 @@ def _follow(
                 progress.inaccurate += int(np.any([*found.values()], axis=0).sum())
                 written += len(shard)
             progress.done = progress.before + max(written, pulse.over)
-            progress.seconds = time.perf_counter() - began
+            progress.seconds, progress.waited = time.perf_counter() - began, pulse.waited
             report(progress)
     finally:
         for future in pending:

@@ -73,16 +73,24 @@ def losses_named() -> Iterator[None]:
 
 
 class Pulse:
-    """What threads of this process and their sweep tell each other: how many walks are over, when to stop the work."""
+    """What threads of this process and their sweep tell each other: what has been done, and when to stop the work.
+
+    So many walks are `over`; for so many seconds the threads have `waited` for a GPU.
+    """
 
     def __init__(self) -> None:
         """Begin to count."""
-        self.stop, self.over, self._lock = threading.Event(), 0, threading.Lock()
+        self.stop, self.over, self.waited, self._lock = threading.Event(), 0, 0.0, threading.Lock()
 
-    def beat(self) -> None:
-        """Count a walk."""
+    def beat(self, walks: int) -> None:
+        """Count walks that are over."""
         with self._lock:
-            self.over += 1
+            self.over += walks
+
+    def wait(self, seconds: float) -> None:
+        """Count time in which a thread waited for a GPU."""
+        with self._lock:
+            self.waited += seconds
 
 
 @contextlib.contextmanager

@@ -28,14 +28,14 @@ import yaml
 from numpy.typing import NDArray
 
 from warpchain.files import AnyPath, given_path, make_folder, naming, remove_output, write_whole
-from warpchain.hdf5_files import claims_to_be
+from warpchain.hdf5_files import SWEEP_FILE, WALK_FILE, claims_to_be
 from warpchain.inputs.validation import ChangedFileError, DamagedFileError, InputError, InputWarning
 from warpchain.store import shards
 from warpchain.store.folder_lock import locked
 from warpchain.store.shards import Manifest, Part, Shard, read_manifest
-from warpchain.sweeps.designs import EXTENSIBLE
+from warpchain.sweeps.designs import SAMPLERS
 from warpchain.sweeps.plan import Sweep
-from warpchain.walks.rows import KEYS, MISSING, Rows, missing_rows
+from warpchain.walks.rows import MISSING, ROW_KEYS, Rows, missing_rows
 
 _PART: Final = re.compile(r"\.(?:sweep|\d{6,})\.[0-9a-f]{8}\.part\.(?:yaml|h5)")
 
@@ -77,7 +77,7 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         for own in (path / name for name in (*shards.OWN, "lock")):
             if own.is_symlink() or (own.exists() and not (own.is_file() or own.is_dir())):
                 kind = "a symbolic link" if own.is_symlink() else "a pipe or a device"
-                raise InputError(f"{own}: {kind}, where a sweep writes and deletes; remove it, or give another folder")
+                raise InputError(f"{own}: {kind}, where a sweep writes and deletes; remove it, or use another folder")
         is_new = not (path / "lock").exists()
         unlock = locked(path)
         try:
@@ -92,7 +92,7 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
                 warnings.warn(f"{problem}; its walks are computed again", InputWarning, stacklevel=3)
             if read_manifest(path).sweep.digest() != manifest.sweep.digest():
                 remove_output(path / "sweep.yaml")  # which is never older than sweep.h5
-                write_whole(path / "sweep.h5", manifest.image())
+                write_whole(path / SWEEP_FILE, manifest.image())
             if not (path / "sweep.yaml").exists():
                 text = yaml.safe_dump(manifest.sweep.canonical(), sort_keys=False, allow_unicode=True)
                 write_whole(path / "sweep.yaml", _YAML_HEAD + text)
@@ -151,7 +151,7 @@ def read_rows(
             continue
         place = Path(directory).absolute(), name, manifest.digest, manifest.numerics_version
         opened = partial(shards.opened_shard, *place)
-        numbers, cells, samples = (rows[key] for key in KEYS.names or ())
+        numbers, cells, samples = (rows[key] for key in ROW_KEYS.names or ())
         try:
             for number, table in enumerate(tables):
                 own = numbers == number
@@ -169,11 +169,11 @@ def _prepared(folder: Path, sweep: Sweep, manifest: Manifest, fresh: bool) -> Ma
     What comes back is the manifest that the folder is to have; a grown one is not written yet.
     """
     _clear_leftovers(folder)
-    named, has_shards = folder / "sweep.h5", any(shards.own_shards(folder))
+    named, has_shards = folder / SWEEP_FILE, any(shards.own_shards(folder))
     if not (named.exists() or has_shards):
-        for name in (*shards.OWN, shards.EARLIER, "walk.h5"):
+        for name in (*shards.OWN, shards.EARLIER, WALK_FILE):
             if (folder / name).exists():
-                raise InputError(f"{folder / name}: in the way of a sweep; move it away, or give another folder")
+                raise InputError(f"{folder / name}: in the way of a sweep; move it away, or use another folder")
         write_whole(named, manifest.image())
     elif fresh:
         if not has_shards:
@@ -210,7 +210,7 @@ def _is_whole(folder: Path) -> bool:
 
 def _rebuild(folder: Path, manifest: Manifest) -> None:
     """Write a lost or damaged sweep.h5 anew, if the shards are those of this sweep; else an `InputError`."""
-    path, damaged = folder / "sweep.h5", dict[str, str]()
+    path, damaged = folder / SWEEP_FILE, dict[str, str]()
     problem = f"{path}: lost or damaged, and the shards are"
     try:
         read_rows(folder, manifest, damaged)
@@ -224,12 +224,14 @@ def _rebuild(folder: Path, manifest: Manifest) -> None:
         with shards.opened_shard(folder, name, manifest.digest, manifest.numerics_version) as shard:
             parts.add(tuple(shard.attrs["part"].tolist()))
     if len(parts) == 1 and manifest.part not in parts:
-        raise InputError(f"{problem} of one part of the sweep; give --part {{}}/{{}}".format(*parts.pop()))
+        raise InputError(f"{problem} of one part of the sweep; use --part {{}}/{{}}".format(*parts.pop()))
     write_whole(path, manifest.image())
     given = folder / "sweep.yaml"
     if given.exists() and given.read_text("utf-8").startswith(_YAML_HEAD):
         given.unlink()  # it may be of fewer samples
-    warnings.warn(f"{path}: was lost or damaged; written anew, all shards are kept", InputWarning, stacklevel=4)
+    warnings.warn(
+        f"{path}: was missing or damaged; it was written again, and all shards are kept", InputWarning, stacklevel=4
+    )
 
 
 def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
@@ -238,21 +240,21 @@ def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
     shards.check_numerics_of(folder, found.numerics_version)
     if found.part != manifest.part:
         own, wanted = ("{}/{}".format(*part) if part[1] > 1 else "1/1 (all)" for part in (found.part, manifest.part))
-        remedy = f"give --part {own}" if found.part[1] > 1 else "leave --part out"
+        remedy = f"use --part {own}" if found.part[1] > 1 else "remove --part"
         raise InputError(f"{folder}: holds part {own} of its sweep, not {wanted}; {remedy}, or another folder")
     there, asked = ([block.samples_given for block in one.blocks] for one in (found.sweep, sweep))
     ones = [1] * len(there)  # digests by this version, which may know of more fields than that which began the folder
     if len(there) != len(asked) or sweep.digest(ones) != found.sweep.digest(ones):
         raise InputError(
             f"{folder}: holds another sweep ({found.sweep.name}), or this one before it was changed; "
-            "give another folder, or start anew with fresh, which deletes what is there"
+            "use another folder, or fresh, which deletes what is there"
         )
     for count, more, block in zip(there, asked, sweep.blocks, strict=True):
         holds = f"{folder}: holds {count} samples of each cell of block {block.name}, but"
         if more < count:
-            raise InputError(f"{holds} {more} are asked for; give samples: {count} or more, or another folder")
-        if more > count and block.sampler not in EXTENSIBLE:
-            raise InputError(f"{holds} a {block.sampler} does not grow; give samples: {count}, or another folder")
+            raise InputError(f"{holds} {more} are requested; use samples: {count} or more, or another folder")
+        if more > count and not SAMPLERS[block.sampler].grows:
+            raise InputError(f"{holds} a {block.sampler} design cannot grow; use samples: {count}, or another folder")
     return found if there == asked else replace(manifest, versions=found.versions)
 
 

@@ -50,16 +50,16 @@ def locked(folder: Path) -> Callable[[], None]:
     try:
         holder = os.read(descriptor, 200).decode(errors="replace").strip()
         if holder and not _HOLDER.fullmatch(holder):
-            raise InputError(f"{path}: in the way of a sweep; give another folder")
+            raise InputError(f"{path}: in the way of a sweep; use another folder")
         in_use = f"{folder}: in use by {holder or 'another process'}; wait for it to end"
         try:
             with naming(path):
                 if not _has_flock(descriptor):
                     release_file = _locked_by_a_file(folder, in_use)
         except BlockingIOError:
-            raise InputError(f"{in_use}, or give another folder") from None
+            raise InputError(f"{in_use}, or use another folder") from None
         if not path.exists():  # by a process that was refused the folder
-            raise InputError(f"{path}: was deleted at this moment; try again")
+            raise InputError(f"{path}: was deleted meanwhile; try again")
         os.ftruncate(descriptor, 0)
         os.lseek(descriptor, 0, os.SEEK_SET)
         os.write(descriptor, f"process {os.getpid()} on {socket.gethostname()}\n".encode())

@@ -27,13 +27,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.files import AnyPath, naming, write_whole
-from warpchain.hdf5_files import Format, claims_to_be, hdf5_image, open_regular, reading_hdf5
+from warpchain.hdf5_files import SWEEP_FILE, WALK_FILE, Format, claims_to_be, hdf5_image, open_regular, reading_hdf5
 from warpchain.inputs.validation import DamagedFileError, InputError
-from warpchain.sweeps.designs import EXTENSIBLE
+from warpchain.sweeps.designs import SAMPLERS
 from warpchain.sweeps.plan import Sweep
 from warpchain.sweeps.sweep_file import fields_of
 from warpchain.version import NUMERICS_VERSION, package_versions
-from warpchain.walks.rows import KEYS, MISSING, STORED_COLUMNS, Rows, row_type
+from warpchain.walks.rows import MISSING, ROW_KEYS, STORED_COLUMNS, Rows, row_type
 from warpchain.walks.walk_numbers import MOTION, write_motion
 
 if TYPE_CHECKING:
@@ -41,12 +41,12 @@ if TYPE_CHECKING:
 
 Part = tuple[int, int]
 """Number of a part of a sweep, and number of parts."""
-OWN: Final = ("sweep.h5", "sweep.yaml", "shards", "log.txt")
+OWN: Final = (SWEEP_FILE, "sweep.yaml", "shards", "log.txt")
 """What a sweep has in its folder, beside the lock."""
 EARLIER: Final = "sweep.json"
 """What earlier versions have there instead of sweep.h5."""
 MANIFEST: Final = Format.of("warpchain sweep")
-SHARD: Final = Format.of("warpchain shard", STORED_COLUMNS, MOTION, dict(KEYS.fields or {}))
+SHARD: Final = Format.of("warpchain shard", STORED_COLUMNS, MOTION, dict(ROW_KEYS.fields or {}))
 _NAME: Final = re.compile(r"\d{6,}\.h5")
 FOREIGN: Final = "a shard of another sweep; move it out of this folder"
 REBUILT: Final = "run the sweep in this folder again; all shards are kept"
@@ -59,8 +59,8 @@ FIRST_SHARDS: Final = 32
 class Shard:
     """Some walks of a sweep that are computed together and kept in one file.
 
-    `kind` is the type of the rows; `keys` of type `KEYS` and `walks` are of each walk its place and its number; `part`
-    is that of the folder which the shard was computed for.
+    `kind` is the type of the rows; `keys` of type `ROW_KEYS` and `walks` are of each walk its place and its number;
+    `part` is that of the folder which the shard was computed for.
     """
 
     digest: str
@@ -96,7 +96,7 @@ class Manifest:
     @cached_property
     def digest(self) -> str:
         """What all shards of the folder have: digest of the sweep, which is the same with more samples."""
-        return self.sweep.digest([1 if b.sampler in EXTENSIBLE else b.samples_given for b in self.sweep.blocks])
+        return self.sweep.digest([1 if SAMPLERS[b.sampler].grows else b.samples_given for b in self.sweep.blocks])
 
     @cached_property
     def row_type(self) -> np.dtype[np.void]:
@@ -106,7 +106,7 @@ class Manifest:
     @cached_property
     def keys(self) -> Rows:
         """Block, cell and sample of all walks, in this order."""
-        keys, first = np.empty(self.sweep.walk_count, KEYS), 0
+        keys, first = np.empty(self.sweep.walk_count, ROW_KEYS), 0
         for number, block in enumerate(self.sweep.blocks):
             own = keys[first : first + block.walk_count]
             own["block"], (own["cell"], own["sample"]) = number, np.divmod(np.arange(len(own)), block.samples)
@@ -158,16 +158,16 @@ def stored_sweep(path: AnyPath, content: Mapping[str, object]) -> Sweep:
 
 def read_manifest(directory: AnyPath) -> Manifest:
     """The manifest of a folder; an `OSError` if unreadable, an `InputError` if it holds no sweep of this version."""
-    path = Path(directory) / "sweep.h5"
+    path = Path(directory) / SWEEP_FILE
     if not os.path.lexists(path):
         if not os.path.exists(directory):
-            raise InputError(f"{directory}: is not there; give the folder of a sweep, or a merged file")
+            raise InputError(f"{directory}: does not exist; use the folder of a sweep, or a merged file")
         if (Path(directory) / EARLIER).exists():
             raise InputError(f"{directory}: holds a sweep of an earlier warpchain; read it with that version")
         if any(own_shards(directory)):
-            raise DamagedFileError(f"{path}: is lost; {REBUILT}")
-        there = "a saved walk, no sweep" if (Path(directory) / "walk.h5").exists() else "no sweep"
-        raise InputError(f"{directory}: {there} in this folder; give the folder of one, or a merged file")
+            raise DamagedFileError(f"{path}: is missing; {REBUILT}")
+        there = "a saved walk, no sweep" if (Path(directory) / WALK_FILE).exists() else "no sweep"
+        raise InputError(f"{directory}: {there} in this folder; use the folder of a sweep, or a merged file")
     with reading_hdf5(path, MANIFEST, REBUILT) as file:
         return Manifest(
             stored_sweep(path, json.loads(file.attrs["sweep"])),
@@ -181,10 +181,10 @@ def read_manifest(directory: AnyPath) -> Manifest:
 def stamp(directory: AnyPath) -> str:
     """What tells whether the folder still holds the same sweep: the SHA-256 of its sweep.h5."""
     try:
-        with open_regular(Path(directory) / "sweep.h5") as file:
+        with open_regular(Path(directory) / SWEEP_FILE) as file:
             return hashlib.sha256(file.read()).hexdigest()
     except (FileNotFoundError, NotADirectoryError):
-        problem = "no sweep in this folder; give the folder of one, which every worker can reach by this path"
+        problem = "no sweep in this folder; use the folder of a sweep that every worker can reach by this path"
         raise InputError(f"{directory}: {problem}") from None
 
 
@@ -204,7 +204,8 @@ def write_shard(
     """
     if stamp(directory) != expected:
         raise InputError(f"{directory}: belongs to another sweep now; these walks were not written")
-    if any((rows[name] != shard.keys[name]).any() for name in KEYS.names or ()) or (rows["status"] == MISSING).any():
+    others = any((rows[name] != shard.keys[name]).any() for name in ROW_KEYS.names or ())
+    if others or (rows["status"] == MISSING).any():
         raise ValueError(f"{shard.name}: the rows are not those of its walks, all ended and in order")
     rows = rows.copy()
     for column in rows.dtype.names or ():  # a NaN has many bit patterns, and the pattern may depend on the batch
@@ -270,7 +271,7 @@ def own_shards(directory: AnyPath) -> Iterator[Path]:
 
 def check_numerics(directory: AnyPath) -> None:
     """What a worker does before it computes: an `InputError` if the folder's walks are of other numerics than ours."""
-    path = Path(directory) / "sweep.h5"
+    path = Path(directory) / SWEEP_FILE
     with reading_hdf5(path, MANIFEST, REBUILT) as file:
         check_numerics_of(directory, int(file.attrs["numerics_version"]))
 
@@ -280,5 +281,5 @@ def check_numerics_of(directory: AnyPath, version: int) -> None:
     if version != NUMERICS_VERSION:
         raise InputError(
             f"{directory}: its walks are of numerics {version}, but this warpchain has {NUMERICS_VERSION}; "
-            "use one version for all workers, give another folder, or start anew"
+            "use one version for all workers, another folder, or fresh"
         )

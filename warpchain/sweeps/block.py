@@ -15,15 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, Field, ValidationError, ValidationInfo, WrapValidator
 
-from warpchain.chain.resolution import SECTIONS
 from warpchain.chain.setup import Setup
 from warpchain.inputs import validation
 from warpchain.inputs.distributions import Distribution, Gaussian
+from warpchain.inputs.fields import FIELDS, SECTION_OF, SECTIONS
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset as parameter_preset
 from warpchain.inputs.scene import COMPOUND, Scene
-from warpchain.inputs.validation import FIELDS, SECTION_OF, InputError, checked, json_value, path_of, shown, validated
-from warpchain.sweeps.designs import independent_groups, walks_per_sample
+from warpchain.inputs.validation import InputError, checked, json_value, path_of, shown, validated
+from warpchain.sweeps.designs import SAMPLERS, independent_groups
 from warpchain.walks.landmarks import least
 
 Value = float | int | str | tuple[Any, ...] | None
@@ -56,7 +56,7 @@ class Block:
         points: name of each quantity that parameter sets have → its value in each, along the axis `point`.
         distributions: name → distribution, in the order of drawing.
         independent: names of those that each cell draws by itself, also along axes with the same samples.
-        sampler: one of `warpchain.sweeps.designs.SAMPLERS`.
+        sampler: a key of `warpchain.sweeps.designs.SAMPLERS`.
         randomisations: number of independent randomisations of designed samples; random ones need none.
         samples_given: samples per cell, as the file says.
         first_cell: number of the block's first cell among all cells of the sweep.
@@ -88,7 +88,7 @@ class Block:
     @property
     def samples(self) -> int:
         """Walks in each cell; for `saltelli` all walks of all samples."""
-        return self.samples_given * walks_per_sample(self.sampler, len(self.distributions))
+        return self.samples_given * SAMPLERS[self.sampler].walks(len(self.distributions))
 
     @property
     def groups(self) -> NDArray[np.int64]:
@@ -196,7 +196,7 @@ class Block:
             **({} if self.preset is None else {"preset": self.preset}),
             "samples": self.samples_given,
             "sampler": self.sampler,
-            **({} if self.sampler == "random" else {"randomisations": self.randomisations}),
+            **({} if SAMPLERS[self.sampler].engine is None else {"randomisations": self.randomisations}),
             **{section: getattr(first, section).model_dump(exclude=replaced) for section in SECTIONS},
             "distributions": {"all": "fixed"} | {name: each.canonical() for name, each in self.distributions.items()},
             **({"independent": list(self.independent)} if self.independent else {}),
@@ -218,16 +218,16 @@ class _Range(BaseModel):
         """All values, computed in decimals, so that three steps of 0.1 from 0 lead to 0.3 and to no other number."""
         first, last = Decimal(str(self.first)), Decimal(str(self.last))
         if first >= last:
-            raise InputError(f"to: {self.last} is not greater than from: {self.first}; give a greater value")
+            raise InputError(f"to: expected more than from, {self.first}, got {self.last}; use a greater value")
         if (self.step is None) == (self.count is None):
-            raise InputError("step: a range needs either step or count; give one of them")
+            raise InputError("step: expected either step or count; use one of them")
         step = (last - first) / (self.count - 1) if self.count else Decimal(str(self.step))
         if (last - first) / step >= AXIS_LIMIT:
-            raise InputError(f"step: gives more than {AXIS_LIMIT} values; give a larger step")
+            raise InputError(f"step: expected at most {AXIS_LIMIT} values, got more; use a larger step")
         intervals = int((last - first) / step) if self.count is None else self.count - 1
         below = first + intervals * step
         if self.count is None and below != last:
-            raise InputError(f"to: steps of {step} from {first} miss {last}; give {below}, {below + step} or a count")
+            raise InputError(f"to: steps of {step} from {first} miss {last}; use {below}, {below + step} or a count")
         values = [first + number * step for number in range(intervals)] + [last]
         return [int(value) if value == int(value) and abs(value) < 2**53 else float(value) for value in values]
 
@@ -236,7 +236,7 @@ def _expanded(values: Any, check: Callable[[Any], list[Any]], info: ValidationIn
     """The values of an axis, those of a range written out; together no more than sweeps of `CELL_LIMIT` cells have."""
     if isinstance(values, Mapping):
         if info.context["expanded"] > CELL_LIMIT + validation.MOST_VALUES:  # type: ignore[index]
-            raise ValueError(f"more than {CELL_LIMIT} values in the ranges of all axes; give fewer")
+            raise ValueError(f"expected at most {CELL_LIMIT} values in all ranges, got more; use fewer")
         try:
             values = _Range.model_validate(values).values()
         except ValidationError as error:
@@ -245,7 +245,7 @@ def _expanded(values: Any, check: Callable[[Any], list[Any]], info: ValidationIn
     checked = check(values)
     value, count = Counter(checked).most_common(1)[0]
     if count > 1:
-        raise ValueError(f"{shown(value)} is given twice; leave one out")
+        raise ValueError(f"{shown(value)} is given twice; remove one")
     return checked
 
 
@@ -261,7 +261,7 @@ def axis(kind: Any) -> Any:
 
 def _with_names(values: Any) -> Any:
     if not isinstance(values, Mapping):
-        raise ValueError("no names; give each value one, as in floor: {flat: flat, ramp: [[0, 0], [1, 0.1]]}")
+        raise ValueError("expected a name for each value; use e.g. floor: {flat: flat, ramp: [[0, 0], [1, 0.1]]}")
     return values
 
 
@@ -275,7 +275,7 @@ def refuse_axes(values: Mapping[str, object]) -> None:
     """Refuse values of a walk, by names of fields, that are axes of a sweep, in one line that names `sweep`."""
     for name, value in validation.by_name(values).items():
         if name in FIELDS and is_axis(name, given := validation.plain(value, name)):
-            problem = f"{shown(given)} is several values, and a walk has one"
+            problem = f"expected one value for a walk, got {shown(given)}"
             raise InputError(f"{SECTION_OF[name]}.{name}: {problem}; use warpchain.sweep or a sweep file for a grid")
 
 

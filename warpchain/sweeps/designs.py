@@ -14,7 +14,8 @@ hypercubes); A. Saltelli et al., Comput. Phys. Commun. 181 (2010) 259 (A, B and 
 """
 
 import functools
-from typing import Final
+from collections.abc import Mapping
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,12 +23,41 @@ from numpy.typing import NDArray
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.validation import InputError
 
-SAMPLERS: Final = ("random", "sobol", "latin_hypercube", "saltelli")
-"""Independent samples; scrambled Sobol' sequences; latin hypercubes; Sobol' sequences of twice the dimension, each row
-of which becomes two points and their crossings."""
 
-EXTENSIBLE: Final = ("random", "sobol", "saltelli")
-"""Samplers whose samples stay the same when more follow; a latin hypercube of another size has other points."""
+class Sampler(NamedTuple):
+    """How the samples of a cell are chosen.
+
+    Attributes:
+        meaning: for the reference of sweep files.
+        engine: class in `scipy.stats.qmc` that makes the points of a randomisation; None: samples are independent.
+        grows: whether samples stay the same when more follow.
+        is_balanced: whether samples and randomisations are powers of two.
+        crosses: whether a row becomes two points, and the first with each value of the second in turn.
+    """
+
+    meaning: str
+    engine: str | None = None
+    grows: bool = True
+    is_balanced: bool = False
+    crosses: bool = False
+
+    def walks(self, dimensions: int) -> int:
+        """Walks that one sample of a cell takes, given the number of drawn quantities."""
+        return dimensions + 2 if self.crosses else 1
+
+    def columns(self, dimensions: int) -> int:
+        """Length of a row, given the number of drawn quantities."""
+        return 2 * dimensions if self.crosses else dimensions
+
+
+_SALTELLI: Final = "points for Sobol indices: each sample of d drawn quantities takes d + 2 walks; "
+SAMPLERS: Final[Mapping[str, Sampler]] = {
+    "random": Sampler("independent samples"),
+    "sobol": Sampler("scrambled Sobol' sequences; a power of two of samples", "Sobol", is_balanced=True),
+    "latin_hypercube": Sampler("latin hypercubes", "LatinHypercube", grows=False),
+    "saltelli": Sampler(f"{_SALTELLI}a power of two of samples", "Sobol", is_balanced=True, crosses=True),
+}
+"""All samplers; sweep files, checks, figures and the reference read these."""
 
 RANDOMISATIONS: Final = 8
 """Independent randomisations of a design unless a sweep says otherwise: seven degrees of freedom for its error."""
@@ -39,18 +69,14 @@ _END: Final = 2.0**-53
 """Distance that designed points keep from the ends 0 and 1, where a Gaussian has no quantile."""
 
 
-def walks_per_sample(sampler: str, dimensions: int) -> int:
-    """Walks that one sample of a cell takes: d + 2 for `saltelli` with d drawn quantities, else 1."""
-    return dimensions + 2 if sampler == "saltelli" else 1
-
-
 def independent_groups(sampler: str, walks: int, dimensions: int, randomisations: int) -> NDArray[np.int64]:
     """Number of the group of each walk of a cell; walks of different groups are independent of one another.
 
     Every random sample is a group of its own. Designed ones belong to the randomisations in turn, with all their walks.
     """
-    samples = np.arange(walks) // walks_per_sample(sampler, dimensions)
-    return samples if sampler == "random" else samples % randomisations
+    own = SAMPLERS[sampler]
+    samples = np.arange(walks) // own.walks(dimensions)
+    return samples if own.engine is None else samples % randomisations
 
 
 def check_design(sampler: str, samples: int, dimensions: int, randomisations: int, path: str) -> None:
@@ -58,24 +84,29 @@ def check_design(sampler: str, samples: int, dimensions: int, randomisations: in
 
     An `InputError`, which begins with `path`, says that samples would be equal, too many, or no balanced sequence.
     """
+    own = SAMPLERS[sampler]
     if dimensions == 0:
-        if sampler == "saltelli":
-            raise InputError(f"{path}.sampler: saltelli has nothing to draw; give distributions")
+        if own.crosses:
+            raise InputError(f"{path}.sampler: {sampler} needs sampled quantities; set distributions")
         if samples > 1:
-            raise InputError(f"{path}.samples: nothing is drawn, so all would be the same; give 1, or distributions")
+            raise InputError(
+                f"{path}.samples: nothing is sampled, so all samples would be equal; use 1, or set distributions"
+            )
         return
-    if sampler == "random":
+    if own.engine is None:
         return
-    columns = dimensions * (2 if sampler == "saltelli" else 1)
+    columns = own.columns(dimensions)
     if samples * columns > DESIGN_LIMIT:
         most = 1 << (DESIGN_LIMIT // columns).bit_length() - 1
-        raise InputError(f"{path}.samples: {samples} are too many; give at most {most}, or sampler: random")
-    if sampler in ("sobol", "saltelli") and randomisations & (randomisations - 1):
-        problem = f"{randomisations} is not a power of 2, as {sampler} needs"
+        raise InputError(f"{path}.samples: expected at most {most}, got {samples}; use fewer, or sampler: random")
+    if own.is_balanced and randomisations & (randomisations - 1):
+        problem = f"expected a power of 2 for {sampler}, got {randomisations}"
         raise InputError(f"{path}.randomisations: {problem}; use {1 << randomisations.bit_length() - 1}")
-    if sampler in ("sobol", "saltelli") and samples & (samples - 1):
+    if own.is_balanced and samples & (samples - 1):
         lower = 1 << (samples.bit_length() - 1)
-        raise InputError(f"{path}.samples: {samples} is no power of 2, as {sampler} needs; give {lower} or {2 * lower}")
+        raise InputError(
+            f"{path}.samples: expected a power of 2 for {sampler}, got {samples}; use {lower} or {2 * lower}"
+        )
 
 
 @functools.lru_cache(maxsize=4)
@@ -91,15 +122,12 @@ def design_points(
 
     # A spawn key of one number names no sample, so a design shares its stream with none.
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(cell,)))
-    columns = dimensions * (2 if sampler == "saltelli" else 1)
+    columns, engine = SAMPLERS[sampler].columns(dimensions), getattr(qmc, str(SAMPLERS[sampler].engine))
     points: Array = np.empty((samples, columns))
     for group in range(min(randomisations, samples)):
         own = points[group::randomisations]
-        if sampler == "latin_hypercube":
-            engine = qmc.LatinHypercube(columns, seed=rng)
-        else:  # takes equally many random numbers for any number of points, so that groups can grow
-            engine = qmc.Sobol(columns, scramble=True, seed=rng)
-        own[:] = np.clip(engine.random(len(own)), _END, 1 - _END)
+        # A scrambled sequence takes equally many random numbers for any number of points, so that groups can grow.
+        own[:] = np.clip(engine(columns, scramble=True, seed=rng).random(len(own)), _END, 1 - _END)
     points.flags.writeable = False
     return points
 

@@ -10,9 +10,10 @@ and the index only: no table of walks exists, and a walk is the same whoever ask
 
 import bisect
 import hashlib
+import itertools
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any, Final
 
@@ -20,17 +21,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.chain.keep import Keep
-from warpchain.chain.resolution import SECTIONS
 from warpchain.chain.setup import Setup
 from warpchain.files import AnyPath
 from warpchain.inputs.distributions import DRAW_LIMIT, Distribution, draw, random_generator
+from warpchain.inputs.fields import SECTIONS
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS
 from warpchain.inputs.scene import Scene
 from warpchain.inputs.unit_slips import check_units
 from warpchain.inputs.validation import InputError
 from warpchain.sweeps.block import Block
-from warpchain.sweeps.designs import design_points, walks_per_sample
+from warpchain.sweeps.designs import SAMPLERS, design_points
 from warpchain.sweeps.recording import Recording
 from warpchain.sweeps.sweep_file import VERSION, read_sweep
 
@@ -57,7 +58,7 @@ class PlannedWalk:
     sample: int
     setup: Setup
     laws: Mapping[str, Distribution]
-    drawn: Point
+    draws: Point
 
 
 @dataclass(frozen=True)
@@ -88,12 +89,12 @@ class Sweep:
         """Numbers of all walks, block by block."""
         return np.concatenate([block.indices.ravel() for block in self.blocks])
 
-    def planned(self, index: int) -> PlannedWalk:
-        """The walk with a number, one of `indices`; an `IndexError` if there is none; errors as of `drawn`."""
+    def walk(self, index: int) -> PlannedWalk:
+        """The walk with a number, one of `indices`; an `IndexError` if there is none; errors as of `with_draws`."""
         (walk,) = self.undrawn([index])
-        return self.drawn(walk)
+        return self.with_draws(walk)
 
-    def drawn(self, walk: PlannedWalk) -> PlannedWalk:
+    def with_draws(self, walk: PlannedWalk) -> PlannedWalk:
         """A walk of `undrawn` with what is drawn for it.
 
         A sample may make no possible walk: with the drawn lengths, say, the chain does not reach round its sprocket.
@@ -103,29 +104,31 @@ class Sweep:
         block, fixed = self.blocks[walk.block], walk.setup
         if not block.drawn:
             return walk
-        row, member = divmod(walk.sample, walks_per_sample(block.sampler, len(block.drawn)))
-        points, setups = self._first_possible(
-            block, walk.cell, fixed, walk.laws, row, designed=block.sampler != "random"
-        )
-        return replace(walk, setup=setups[member], drawn=points[member])
+        sampler = SAMPLERS[block.sampler]
+        row, member = divmod(walk.sample, sampler.walks(len(block.drawn)))
+        is_designed = sampler.engine is not None
+        points, setups = self._first_possible(block, walk.cell, fixed, walk.laws, row, is_designed)
+        return PlannedWalk(walk.index, walk.block, walk.cell, walk.sample, setups[member], walk.laws, points[member])
 
     def undrawn(self, indices: Iterable[int]) -> Iterator[PlannedWalk]:
         """Walks without their draws, which take most of the time; options and number of links never depend on them."""
 
         @lru_cache(2**12)
-        def of_cell(number: int, cell: Cell) -> tuple[Setup, Mapping[str, Distribution]]:
-            """What all samples of a cell have in common."""
-            setup = self.blocks[number].fixed(cell)
-            return setup, setup.placed(self.blocks[number].distributions)
-
-        for index in map(int, indices):
-            sample, place = divmod(index, self.blocks[0].stride)
+        def of_cell(place: int) -> tuple[int, Cell, Setup, Mapping[str, Distribution]]:
+            """What all samples of a cell have in common, and their block."""
             number = bisect.bisect_right(self.blocks, place, key=lambda block: block.first_cell) - 1
             block = self.blocks[number]
-            if not 0 <= sample < block.samples:
-                raise IndexError(f"walk {index} of a sweep of {self.walk_count} walks")
             cell = tuple(map(int, np.unravel_index(place - block.first_cell, block.shape[:-1])))
-            yield PlannedWalk(index, number, cell, sample, *of_cell(number, cell), {})
+            setup = block.fixed(cell)
+            return number, cell, setup, setup.placed(block.distributions)
+
+        stride = self.blocks[0].stride
+        for index in map(int, indices):
+            sample, place = divmod(index, stride)
+            number, cell, setup, laws = of_cell(place)
+            if not 0 <= sample < self.blocks[number].samples:
+                raise IndexError(f"walk {index} of a sweep of {self.walk_count} walks")
+            yield PlannedWalk(index, number, cell, sample, setup, laws, {})
 
     def keep(self, walk: PlannedWalk) -> Keep:
         """What is kept of the motion of a walk."""
@@ -136,7 +139,9 @@ class Sweep:
         most = max(block.samples for block in self.blocks)
         for name, choice in self.recording.choices.items():
             if choice.samples != "all" and (last := choice.samples[-1]) >= most:
-                raise InputError(f"sweep.record.{name}.samples: no block has sample {last}; give 0 to {most - 1}")
+                raise InputError(
+                    f"sweep.record.{name}.samples: expected 0 to {most - 1}, got {last}; use samples of a block"
+                )
         for block in self.blocks:
             first = before = None
             checked: dict[str, Distribution] = {}
@@ -150,11 +155,11 @@ class Sweep:
                 for name, distribution in distributions.items():
                     if distribution != checked.get(name) and distribution.share() < LEAST_SHARE:
                         path, law = f"{block.path}.distributions.{name}", distribution.canonical()
-                        raise InputError(f"{path}: less than {LEAST_SHARE:.0%} of {law} is physical; give uniform")
+                        raise InputError(f"{path}: less than {LEAST_SHARE:.0%} of {law} is physical; use uniform")
                     if distribution != checked.get(name) and not fixed.options.unusual_values:
                         check_units({name: distribution.quantile(0.5)}, f"{block.path}.distributions")
                 checked = distributions
-                self._first_possible(block, cell, fixed, distributions, 0, designed=False)
+                self._first_possible(block, cell, fixed, distributions, 0, is_designed=False)
 
     def _check_options(self, block: Block, first: Options, options: Options) -> None:
         """Check the options of a cell beside those of the block's first cell; else an `InputError`."""
@@ -163,12 +168,12 @@ class Sweep:
             follows = name == "precision" and not {"tolerance", "soft_tolerance"}.isdisjoint(block.varied)
             if here != there and name not in block.varied and not follows:
                 both = f"{here!r} in one cell, {there!r} in another"
-                raise InputError(f"{block.path}.grid: {name} is {both}; give each a block of its own")
+                raise InputError(f"{block.path}.grid: {name} is {both}; use a separate block for each")
         for name, choice in self.recording.choices.items():
             choice.steps(options, f"sweep.record.{name}")
 
     def _first_possible(
-        self, block: Block, cell: Cell, fixed: Setup, laws: Mapping[str, Distribution], row: int, designed: bool
+        self, block: Block, cell: Cell, fixed: Setup, laws: Mapping[str, Distribution], row: int, is_designed: bool
     ) -> tuple[list[Point], list[Setup]]:
         """Points for the walks of sample `row` of a cell, the first that make possible walks only, and their setups.
 
@@ -183,22 +188,25 @@ class Sweep:
         rng, problem = random_generator(self.seed, stream, row), ""
         own = {name: laws[name] for name in block.independent}
         of_cell = random_generator(self.seed, stream, row, 1, *cell) if own else rng
-        makers: list[Callable[[], Point]] = [lambda: draw(laws, rng)] * DRAW_LIMIT
-        if designed:
+        makers: Iterable[Callable[[], Point]] = itertools.repeat(lambda: draw(laws, rng), DRAW_LIMIT)
+        if is_designed:
             given = block.samples_given, len(laws), block.randomisations
             matrix = design_points(block.sampler, self.seed, stream, *given)
             fractions = iter(matrix[row].tolist())
-            makers = [lambda: {name: each.quantile(next(fractions)) for name, each in laws.items()}, *makers]
+            designed_point = lambda: {name: each.quantile(next(fractions)) for name, each in laws.items()}  # noqa: E731
+            makers = itertools.chain([designed_point], makers)
         for point in makers:
             points = [point() | draw(own, of_cell)]
-            if block.sampler == "saltelli":  # rows of A and B, and A with one value of B, of each quantity in turn
+            if SAMPLERS[block.sampler].crosses:  # rows of A and B, and A with one value of B, of each quantity in turn
                 first, second = points[0], point() | draw(own, of_cell)
                 points = [first, second, *({**first, name: second[name]} for name in first)]
             try:
                 return points, [fixed.with_drawn(point) for point in points]
             except InputError as error:
                 problem = str(error)
-        raise InputError(f"{block.path}.distributions: {DRAW_LIMIT} samples made no possible walk; the last: {problem}")
+        raise InputError(
+            f"{block.path}.distributions: none of {DRAW_LIMIT} samples makes a possible walk; the last: {problem}"
+        )
 
     def canonical(self) -> dict[str, Any]:
         """The sweep as JSON-able content of a file, with every default and range written out."""

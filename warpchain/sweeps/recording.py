@@ -4,14 +4,12 @@ from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Discriminator, Field, Strict, Tag, model_validator
 
-from warpchain.chain.keep import LONGEST_INTERVAL, Keep
+from warpchain.chain.keep import FRAME_INTERVAL, LONGEST_INTERVAL, Keep
 from warpchain.inputs.options import Options
 from warpchain.inputs.validation import STRICT, InputError, number_field
 
 SERIES_INTERVAL: Final = 1e-3
 """Default time [s] between two samples of a series."""
-FRAME_INTERVAL: Final = 2e-3
-"""Default time [s] between two frames."""
 
 _Numbers = Annotated[
     tuple[Annotated[int, Field(ge=0, le=2**30)], ...],
@@ -51,7 +49,9 @@ class Series(BaseModel):
         ratio = self.interval / options.record_interval
         steps = round(ratio)
         if steps < 1 or abs(ratio - steps) > 1e-6 * ratio:
-            raise InputError(f"{path}.interval: {self.interval} s is no multiple of options.record_interval; give one")
+            raise InputError(
+                f"{path}.interval: expected a multiple of options.record_interval, got {self.interval} s; use one"
+            )
         return steps
 
 
@@ -89,7 +89,7 @@ class Recording(BaseModel):
     def _frames_beside_series(self) -> Self:
         series, frames = self.series and self.series.samples, self.frames and self.frames.samples
         if frames and series != "all" and (not series or frames == "all" or not set(frames) <= set(series)):
-            raise InputError("frames: kept of samples without series; give them in series as well")
+            raise InputError("frames: expected only samples with series; add these samples to series")
         return self
 
     @property

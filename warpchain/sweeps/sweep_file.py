@@ -16,13 +16,13 @@ from typing import Annotated, Any, Final, Literal, Self
 import pydantic
 from pydantic import AfterValidator, BaseModel, Field, ValidationError, ValidationInfo, model_validator
 
-from warpchain.chain.resolution import SECTIONS
 from warpchain.files import AnyPath, write_whole
 from warpchain.inputs import validation
 from warpchain.inputs.distributions import DRAWABLE, TABLE, Distribution, Gaussian, Seed, Uniform
+from warpchain.inputs.fields import FIELDS, SECTION_OF, SECTIONS, SYMBOL_OF
 from warpchain.inputs.parameters import PRESETS
 from warpchain.inputs.scene import COMPOUND
-from warpchain.inputs.validation import FIELDS, SECTION_OF, STRICT, SYMBOL_OF, InputError, ModelT, shown
+from warpchain.inputs.validation import STRICT, InputError, ModelT, shown
 from warpchain.inputs.yaml_files import read_yaml
 from warpchain.sweeps.block import CELL_LIMIT, POINT, Block, Name, Sections, Value, axis, list_of, named_axis
 from warpchain.sweeps.designs import RANDOMISATIONS, SAMPLERS, check_design
@@ -111,11 +111,11 @@ def _distribution(given: Any, info: ValidationInfo) -> Distribution | None:
     """What is drawn of the quantity; None for what is fixed."""
     name = str(info.field_name)
     if given == "table" and name not in TABLE:
-        raise ValueError(f"there is no uncertainty of {name} in Table 1; give uniform or gaussian")
+        raise ValueError(f"Table 1 has no uncertainty of {name}; use uniform or gaussian")
     if isinstance(given, str):
         return TABLE[name] if given == "table" else None
     if (given.uniform is None) == (given.gaussian is None):
-        raise ValueError("no distribution; give {uniform: [lower, upper]} or {gaussian: {mean: …, sigma: …}}")
+        raise ValueError("unknown distribution; use {uniform: [lower, upper]} or {gaussian: {mean: …, sigma: …}}")
     bounds = validation.field_bounds(FIELDS[name])
     law: Distribution
     if given.gaussian is not None:
@@ -124,7 +124,7 @@ def _distribution(given: Any, info: ValidationInfo) -> Distribution | None:
     else:
         lower, upper = given.uniform
         if lower >= upper:
-            raise InputError(f"uniform[1]: {upper} is not greater than {lower}; give a greater value")
+            raise InputError(f"uniform[1]: expected more than {lower}, got {upper}; use a greater value")
         law, numbers = Uniform(lower, upper, bounds), {"uniform[0]": lower, "uniform[1]": upper}
     least, most = math.nextafter(bounds[0], -math.inf), math.nextafter(bounds[1], math.inf)  # one may be an open bound
     for where, number in numbers.items():
@@ -146,7 +146,7 @@ _Drawn = Annotated[
 
 def _printable(name: str) -> str:
     if not name.strip() or not name.isprintable():
-        raise ValueError(f"{shown(name)} is no name; give a line of text")
+        raise ValueError(f"expected a line of text, got {shown(name)}; use a short name")
     return name
 
 
@@ -204,13 +204,15 @@ class BlockKeys(WalkKeys):
         for key, name in [("grid", name) for name in self.grid] + [("points", name) for name in self.points]:
             home = SECTION_OF.get(name, name)
             if self.preset is not None if name == "preset" else name in getattr(self, home):
-                raise InputError(f"{key}.{name}: also given in {home}; leave one out")
+                raise InputError(f"{key}.{name}: given twice, also in {home}; remove one")
             if key == "points" and name in self.grid:
-                raise InputError(f"points.{name}: also given in grid; leave one out")
+                raise InputError(f"points.{name}: given twice, also in grid; remove one")
         first = next(iter(self.points), "")
         for name, values in self.points.items():
             if len(values) != len(self.points[first]):
-                raise InputError(f"points.{name}: {len(values)} values, not {len(self.points[first])}; give as many")
+                raise InputError(
+                    f"points.{name}: expected {len(self.points[first])} values, as {first} has, got {len(values)}"
+                )
         return self
 
 
@@ -242,10 +244,10 @@ class SweepFile(BlockKeys):
         names = [block.name for block in self.blocks or ()]
         for key in ("grid", "points"):
             if names and getattr(self, key):
-                raise InputError(f"{key}: given together with blocks; move it into a block")
+                raise InputError(f"{key}: not possible with blocks; move it into a block")
         for number, name in enumerate(names):
             if name in names[:number]:
-                raise InputError(f"blocks[{number}].name: {shown(name)} is given twice; give another name")
+                raise InputError(f"blocks[{number}].name: {shown(name)} is given twice; use another name")
         return self
 
 
@@ -260,7 +262,7 @@ def sweep_schema() -> dict[str, Any]:
 def _checked(model: type[ModelT], content: object, path: str, source: object) -> ModelT:
     """Content of a file by its grammar; an `InputError` has a line for each problem."""
     if not isinstance(content, dict):
-        raise InputError(f"{source}: no mapping at the top; give the keys {', '.join(model.model_fields)}")
+        raise InputError(f"{source}: expected a mapping; use the keys {', '.join(model.model_fields)}")
     try:
         return model.model_validate(content, context={"expanded": 0})
     except ValidationError as error:
@@ -303,7 +305,7 @@ def fields_of(content: Any, source: AnyPath | Mapping[str, object] = "") -> Fiel
     known = {name for block in blocks for name in block.axes}
     for name in same - known:
         remedy = validation.suggestion(name, sorted(known))
-        raise InputError(f"sweep.same_samples_along: {shown(name)} is no axis of any block; {remedy}")
+        raise InputError(f"sweep.same_samples_along: {shown(name)} is not an axis of any block; {remedy}")
     along = tuple(sorted(same))
     return file.name, file.seed, along, tuple(_numbered(blocks, along)), file.record
 
@@ -326,18 +328,18 @@ def _block(name: str, path: str, outer: BlockKeys | None, inner: BlockKeys) -> B
     sections = {key: {name: value for name, value in merged(key).items() if name not in varied} for key in SECTIONS}
     preset, samples, sampler = (either(key) for key in ("preset", "samples", "sampler"))
     if preset is None and "preset" not in axes:
-        raise InputError(f"{path}.preset: missing; name the parameters to start from, such as preset: paper")
+        raise InputError(f"{path}.preset: missing; set the parameters to start from, e.g. preset: paper")
     if samples is None:
-        raise InputError(f"{path}.samples: missing; give the number of samples per cell")
+        raise InputError(f"{path}.samples: missing; set the number of samples per cell")
     drawn = _drawn(merged("distributions"), sections, varied, f"{path}.distributions")
     sampler, randomisations = sampler or "random", either("randomisations") or RANDOMISATIONS
-    if inner.randomisations is not None and sampler == "random":
-        raise InputError(f"{path}.randomisations: random samples are independent anyway; leave it out")
+    if inner.randomisations is not None and SAMPLERS[sampler].engine is None:
+        raise InputError(f"{path}.randomisations: {sampler} samples are independent anyway; remove it")
     check_design(sampler, samples, len(drawn), randomisations, path)
     own = {*map(validation.full_name, either("independent") or ())}
     for quantity in own - drawn.keys():
         remedy = validation.suggestion(quantity, sorted(drawn))
-        raise InputError(f"{path}.independent: {shown(quantity)} is not drawn; {remedy}")
+        raise InputError(f"{path}.independent: {shown(quantity)} is not sampled; {remedy}")
     independent, fixed = tuple(each for each in drawn if each in own), None if "preset" in axes else preset
     return Block(path, name, fixed, sections, axes, named, points, drawn, independent, sampler, randomisations, samples)
 
@@ -355,7 +357,7 @@ def _drawn(given: Mapping[str, Any], sections: Sections, varied: set[str], path:
         if distribution is None:
             continue
         if home is not None and not (isinstance(distribution, Gaussian) and distribution.mean is None):
-            raise InputError(f"{path}.{name}: {name} also has a value in {home}; leave one out, or give fixed")
+            raise InputError(f"{path}.{name}: {name} also has a value in {home}; remove one, or use fixed")
         drawn[name] = distribution
     return drawn
 
@@ -369,9 +371,11 @@ def _numbered(blocks: list[Block], same_samples_along: tuple[str, ...]) -> Itera
         cells += math.prod(block.shape[:-1])
         walks += block.walk_count
         if cells > CELL_LIMIT:
-            raise InputError(f"{block.path}.grid: {cells:.6g} cells; give fewer values, for {CELL_LIMIT} cells at most")
+            raise InputError(
+                f"{block.path}.grid: expected at most {CELL_LIMIT} cells, got {cells:.6g}; use fewer values"
+            )
         if walks > WALK_LIMIT:
-            raise InputError(f"{block.path}.samples: {walks:.6g} walks; give fewer, for {WALK_LIMIT} walks at most")
+            raise InputError(f"{block.path}.samples: expected at most {WALK_LIMIT} walks, got {walks:.6g}; use fewer")
         first_stream += math.prod(len(values) for name, values in block.axes.items() if name not in same_samples_along)
 
 
@@ -399,5 +403,5 @@ def write_new_sweep(path: Path) -> None:
     """Write a small sweep file whose comments explain its keys; an `InputError` if there is a file already."""
     text = (_PACKAGE / "sweeps" / "new_sweep.yaml").read_text(encoding="utf-8")
     if os.path.lexists(path):
-        raise InputError(f"--new: {path} exists; give another name")
+        raise InputError(f"--new: {path} already exists; use another name")
     write_whole(path, text)

@@ -66,9 +66,9 @@ class CellStatistics:
         Walks of different ``groups``, a number for each along that axis, are independent of one another. Walks that
         ended by their distance had come ``farthest``, in each cell; NaN where that is no bound.
         """
-        rested = np.isin(status, [code for code in Status if code.ok])
-        had = rested & (column != MISSING if column.dtype.kind == "i" else ~np.isnan(column))
-        values = np.ma.masked_array(column.astype(float), ~had)
+        rested, known = _ended_as_planned(status), known_values(column, status)
+        had = ~np.isnan(known)
+        values = np.ma.masked_array(known, ~had)
         mean, count = np.ma.filled(values.mean(axis=-1), np.nan), had.sum(axis=-1)
         error, independent = _standard_error(np.where(had, column - mean[..., np.newaxis], 0.0), had, groups)
         absent, failed = (rested & ~had).sum(axis=-1), (~rested & (status != MISSING)).sum(axis=-1)
@@ -100,7 +100,17 @@ class CellStatistics:
         if not ((self.count > 1) & (self.independent < 2)).any():
             return ""
         problem = "walks of one randomisation depend on one another, so their spread gives no standard error"
-        return f"{problem}; randomisations: 8 and more samples give one"
+        return f"{problem}; use randomisations: 8 and more samples"
+
+
+def known_values(column: AnyArray, status: AnyArray) -> Floats:
+    """Values of the walks that ended as planned and have one, those that means are of; NaN of all others."""
+    is_known = column != MISSING if column.dtype.kind == "i" else ~np.isnan(column)
+    return np.where(_ended_as_planned(status) & is_known, column, np.nan)
+
+
+def _ended_as_planned(status: AnyArray) -> NDArray[np.bool_]:
+    return np.isin(status, [code for code in Status if code.ok])
 
 
 def _standard_error(deviations: Floats, had: NDArray[np.bool_], groups: NDArray[np.int64]) -> tuple[Floats, Counts]:

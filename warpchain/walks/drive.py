@@ -1,11 +1,14 @@
 """What the sprocket does with a chain until the release, as kernels read it."""
 
 import math
+from collections.abc import Sequence
 
-from warpchain.chain.link_values import LinkValues, mean_value
+import numpy as np
+
+from warpchain.chain.link_values import LinkValues
 from warpchain.chain.setup import Setup
 from warpchain.chain.softened_joints import SOFT, SOFT_MASS, SOFTEST, Joints
-from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.arrays import Array
 
 HOLD_STRAIN = 3e-4
 """Greatest strain of a held loop on softened joints by its speed."""
@@ -29,20 +32,31 @@ BY_ITSELF = -1.0
 """As `steady_time` means: the kernel chooses how long to watch, see :mod:`warpchain.kernels.events.release`."""
 
 
-def drive_of(setup: Setup) -> dict[str, float]:
-    """The fields of `Drive`, by name, of a walk that begins on a sprocket."""
-    scene, parameters, options, links = setup.scene, setup.parameters, setup.options, setup.link_values
+def drives_of(setups: Sequence[Setup], links: LinkValues) -> dict[str, Array]:
+    """The fields of `Drive`, (w,) by name, of walks that begin on a sprocket; `links` are what their chains have."""
+    greatest = links.greatest_load(np.array([setup.parameters.link_length for setup in setups]))
+    facts = (values.tolist() for values in (links.mean_mass, links.alternates, greatest))
+    drives = [_drive_of(*given) for given in zip(setups, *facts, strict=True)]
+    return {name: np.array([drive[name] for drive in drives]) for name in drives[0]}
+
+
+def _drive_of(setup: Setup, mean_mass: float, alternates: bool, greatest_load: float) -> dict[str, float]:
+    """The fields of `Drive` of a walk, given three facts of its `LinkValues`."""
+    scene, parameters, options = setup.scene, setup.parameters, setup.options
     from_rest = scene.start == "rest"
     radius = setup.joint_radius
     speed = 2 * math.pi * scene.frequency * radius
-    density = mean_value(links.mass) / parameters.link_length
+    density = mean_mass / parameters.link_length
     tension = density * speed**2
     side = max(0.0, scene.links * parameters.link_length / 2 - math.pi * radius)
     weight = density * parameters.gravity * side / 2  # the tension that it causes in the middle of the sides
-    alternates = links.alternates  # else the loop under load is another
     own = parameters.joint_stiffness
-    soft, softest = (_as_soft_as(each, own, links) for each in (SOFT, SOFTEST))
-    suitable = _suitable_load(parameters, links, soft if options.soften_drive else own, weight) if alternates else 1.0
+    soft, softest = (_as_soft_as(each, own, mean_mass) for each in (SOFT, SOFTEST))
+    suitable = 1.0  # unless links alternate: the loop under load is another
+    if alternates:
+        bearable = LOADED_STRAIN * (soft if options.soften_drive else own) * parameters.link_length
+        limit = min(GREATEST_LOAD, greatest_load)
+        suitable = max(1.0, min(limit, bearable / weight) if weight > 0 else limit)
     load_factor = scene.load_factor or suitable
     softness = loaded_softness = 0.0
     if options.soften_drive:
@@ -66,7 +80,7 @@ def drive_of(setup: Setup) -> dict[str, float]:
         "steady_window": window,
         "steady_time": BY_ITSELF if scene.steady_time is None else scene.steady_time,
         "steady_tolerance": scene.steady_tolerance,
-        "further_hold": scene.further_hold,
+        "extra_hold": scene.extra_hold,
         "release_phase": scene.phase,
         "hold_softness": softness,
         "loaded_softness": loaded_softness,
@@ -74,9 +88,9 @@ def drive_of(setup: Setup) -> dict[str, float]:
     }
 
 
-def _as_soft_as(joints: Joints, own: float, links: LinkValues) -> float:
+def _as_soft_as(joints: Joints, own: float, mean_mass: float) -> float:
     """Stiffness [N/m] of a chain's joints that are as soft as these; none becomes stiffer than its own."""
-    heavier = mean_value(links.mass) / SOFT_MASS
+    heavier = mean_mass / SOFT_MASS
     return min(own, (heavier if heavier > 2 else 1.0) * joints.stiffness)
 
 
@@ -87,10 +101,3 @@ def _softness(own: float, soft: float, softest: float, wanted: float) -> float:
     if wanted > soft:
         return math.log(own / min(wanted, own)) / math.log(own / soft) if own > soft else 1.0
     return 1.0 + math.log(soft / wanted) / math.log(soft / softest)
-
-
-def _suitable_load(parameters: Parameters, links: LinkValues, stiffness: float, weight: float) -> float:
-    """Factor by which loads are multiplied while a loop of two kinds of links becomes stationary."""
-    bearable = LOADED_STRAIN * stiffness * parameters.link_length
-    limit = min(GREATEST_LOAD, links.greatest_load(parameters.link_length))
-    return max(1.0, min(limit, bearable / weight) if weight > 0 else limit)

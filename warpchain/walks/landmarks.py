@@ -29,14 +29,14 @@ BOUNCE: Final = ("start", "end", "impulse_x", "impulse_y", "sticks_at")
 MOST_ENERGY_ERROR: Final = 0.05
 """Greatest energy error of a walk that nothing warns of."""
 FAULTS: Final = {
-    "energy": f"more than {100 * MOST_ENERGY_ERROR:g} % of the energy at release is unaccounted for; "
+    "energy": f"the energy balance lacks more than {100 * MOST_ENERGY_ERROR:g} % of the energy at the release; "
     "lower options.tolerance",
-    "opening": "joints opened by more than a link length, so that the chain came apart; lower the masses or "
+    "opening": "joints separated by more than a link length, so the chain came apart; lower the masses or "
     "options.tolerance, or raise parameters.joint_stiffness",
-    "penetration": "circles sank in by more than the least radius, through what they touched; "
+    "penetration": "contact circles penetrated by more than the smallest radius, i.e. completely; "
     "lower options.contact_step",
 }
-"""Faults of a walk, each with what it means and what to try."""
+"""Faults of a walk → what happened, and what to try."""
 LENGTHS: Final = ("link_length", "circle_radius", "link_radii", "charm_radius")
 """Quantities against which openings and penetrations are held."""
 

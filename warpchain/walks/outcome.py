@@ -5,7 +5,7 @@ derive from them.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Final
 
@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.chain.setup import Setup
-from warpchain.engine.tallies import CONTACTS, COUNTS, DEPTHS, EXTREMES, IMPULSES, LOST
+from warpchain.engine.tallies import CONTACTS, COUNTS, DEPTHS, EXTREMES, IMPULSES, LOSSES, LOST
 from warpchain.engine.world import World
 from warpchain.hdf5_files import Stored
+from warpchain.inputs.arrays import Array
 from warpchain.kernels import layout
 from warpchain.status import Status
 from warpchain.walks.landmarks import RELEASE
@@ -123,6 +124,16 @@ class Outcome:
     release: Annotated[dict[str, float], Stored("m", "geometry of the loop at the release", keys=RELEASE)]
     release_speed: Annotated[float, Stored("m/s", "mean speed of the link centres along the loop at the release")]
 
+    @property
+    def energy_at_release(self) -> float:
+        """Kinetic and potential energy at the release [J]; NaN without one."""
+        return self.energy["kinetic_at_release"] + self.energy["potential_at_release"]
+
+    @property
+    def energy_at_end(self) -> float:
+        """Kinetic and potential energy at the end [J]; NaN without a release."""
+        return self.energy["kinetic_at_end"] + self.energy["potential_at_end"]
+
 
 @dataclass(kw_only=True)
 class Driven:
@@ -165,43 +176,65 @@ _MEMORY: Final = "driven/"
 """How the names of its fields begin in a memory."""
 
 
-def outcome_of(world: World, setup: Setup, status: Status, driven: Driven, is_released: bool) -> Outcome:
-    """The numbers of a walk that has ended in a world with a status."""
-    counts, extremes = world.counts, world.extremes
-    now = world.time
-    held = (driven.drive_time if is_released else now) - driven.full_speed_at
-    if is_released:
-        counts = {name: before + counts[name] for name, before in zip(COUNTS, driven.counts.tolist(), strict=True)}
-        greatest = np.fmax(driven.extremes, [*extremes.values()])
-        extremes = dict(zip(EXTREMES, greatest.tolist(), strict=True))
-    is_at_rest = status == Status.AT_REST
-    first, last = world.first_sample, world.last_sample
-    released = first if is_released else np.full_like(first, np.nan)
+def outcomes_of(
+    world: World,
+    setups: Sequence[Setup],
+    statuses: Sequence[Status],
+    driven: Sequence[Driven],
+    released: Sequence[bool],
+) -> dict[str, Any]:
+    """The numbers of walks that have ended in worlds: arrays (w,) by the fields of `Outcome`, of some by keys as well.
+
+    Given are all worlds together, and of each walk its setup, status, time before the release, and whether that came.
+    """
+    is_released, status = np.array(released), np.array(statuses, np.int32)
+    is_at_rest, has_sprocket = status == Status.AT_REST, np.array([each.has_sprocket for each in driven])
+    drive_time, full_speed_at, drift, raised = np.array(
+        [(each.drive_time, each.full_speed_at, each.drift, each.raised) for each in driven]
+    ).T
+    now, first, last = world.state("time"), world.state("first_sample"), world.state("last_sample")
+    counts, extremes = world.state("counts"), world.state("extremes")
+    held = np.where(is_released, drive_time, now) - full_speed_at
+    counts = np.where(is_released[:, np.newaxis], np.array([each.counts for each in driven]) + counts, counts)
+    greatest = np.fmax(np.array([each.extremes for each in driven]), extremes)
+    extremes = np.where(is_released[:, np.newaxis], greatest, extremes)
+    count, extreme = dict(zip(COUNTS, counts.T, strict=True)), dict(zip(EXTREMES, extremes.T, strict=True))
+    sample = np.where(is_released[:, np.newaxis], first, np.nan)
     columns = [layout.CENTER_X, layout.CENTER_Y, layout.WIDTH, layout.HEIGHT, layout.LOWEST]
     # Δx is x of the centre of mass, because the sprocket's centre is at x = 0; on a slope, along the floor
-    return Outcome(
-        status=status,
-        dx=float(last[layout.CENTER_X]) / along_floor(setup) if is_at_rest else math.nan,
-        walk_time=now if is_released else 0.0,
-        simulated_time=driven.drive_time + now,
-        hold_time=max(0.0, held) if driven.has_sprocket else math.nan,
-        drift=driven.drift,
-        softened_at=world.watched(layout.SOFTENED_AT),
-        bounces=counts["bounces"],
-        steps_accepted=counts["accepted"],
-        steps_rejected=counts["rejected"],
-        impulses={kind: counts[kind] for kind in CONTACTS},
-        greatest_opening=extremes["opening"],
-        greatest_penetration={kind: extremes[kind] for kind in CONTACTS},
-        energy=_energy(world, setup, is_released),
-        **_fall(world, is_at_rest) if is_released and setup.scene.plane == "tilting" else _NO_FALL,
-        **_ending(world, is_released, "self_contact_at", "self_contact", layout.SELF_CONTACT_AT),
-        **_ending(world, is_released, "strands_met_at", "strands_met", layout.STRANDS_MET_AT),
-        **_ending(world, is_released, "collapsed_at", "collapse", layout.COLLAPSED_AT),
-        sprocket_height=driven.raised if driven.has_sprocket else math.nan,
-        release=dict(zip(RELEASE, released[columns].tolist(), strict=True)),
-        release_speed=float(released[layout.LOOP_SPEED]),
-    )
+    distance = last[:, layout.CENTER_X] / np.array([along_floor(setup) for setup in setups])
+    return {
+        "status": status,
+        "dx": np.where(is_at_rest, distance, np.nan),
+        "walk_time": np.where(is_released, now, 0.0),
+        "simulated_time": drive_time + now,
+        "hold_time": np.where(has_sprocket, np.fmax(0.0, held), np.nan),
+        "drift": np.where(is_released, drift, world.watched(layout.DRIFT)),
+        "softened_at": world.watched(layout.SOFTENED_AT),
+        "bounces": count["bounces"],
+        "steps_accepted": count["accepted"],
+        "steps_rejected": count["rejected"],
+        "impulses": {kind: count[kind] for kind in CONTACTS},
+        "greatest_opening": extreme["opening"],
+        "greatest_penetration": {kind: extreme[kind] for kind in CONTACTS},
+        "energy": _energies(world, setups, is_released),
+        **_falls(world, is_released & [setup.scene.plane == "tilting" for setup in setups], is_at_rest),
+        **_endings(world, is_released, "self_contact_at", "self_contact", layout.SELF_CONTACT_AT),
+        **_endings(world, is_released, "strands_met_at", "strands_met", layout.STRANDS_MET_AT),
+        **_endings(world, is_released, "collapsed_at", "collapse", layout.COLLAPSED_AT),
+        "sprocket_height": np.where(has_sprocket, raised, np.nan),
+        "release": dict(zip(RELEASE, sample[:, columns].T, strict=True)),
+        "release_speed": sample[:, layout.LOOP_SPEED],
+    }
+
+
+def only(outcomes: Mapping[str, Any]) -> Outcome:
+    """The outcome of a walk that `outcomes_of` has the numbers of, and of no other."""
+    values: dict[str, Any] = {
+        name: {key: part.item() for key, part in value.items()} if isinstance(value, dict) else value.item()
+        for name, value in outcomes.items()
+    }
+    return Outcome(**values | {"status": Status(values["status"])})
 
 
 def along_floor(setup: Setup) -> float:
@@ -209,61 +242,65 @@ def along_floor(setup: Setup) -> float:
     return math.cos(math.radians(setup.scene.slope))
 
 
-def datum(world: World, setup: Setup) -> float:
-    """Energy [J] of the chain's mass on the floor below the release, from which potential energies count."""
-    x = world.first_sample[layout.CENTER_X]
-    return setup.link_values.total_mass * setup.parameters.gravity * float(setup.floor.heights(x))
+def datums(world: World, setups: Sequence[Setup]) -> Array:
+    """Energy [J] of chains' masses on the floor below the release, from which potential energies count, (w,)."""
+    heights = np.zeros(len(setups))
+    for place, setup in enumerate(setups):
+        if not setup.scene.is_level:
+            heights[place] = setup.floor.heights(world.state("first_sample")[place, layout.CENTER_X])
+    weights: Array = world.constant("mass") * world.constant("gravity")
+    return weights * heights
 
 
-def _energy(world: World, setup: Setup, is_released: bool) -> dict[str, float]:
-    """Where the energy of the walk went [J]; NaN before the release. Keys: `ENERGIES`."""
-    first, last, below = world.first_sample, world.last_sample, datum(world, setup)
-    lost = {name: loss for name, loss in world.losses.items() if name in LOST}
+def _energies(world: World, setups: Sequence[Setup], is_released: NDArray[np.bool_]) -> dict[str, Array]:
+    """Where the energy of walks went [J]; NaN before the release. Keys: `ENERGIES`."""
+    first, last, below = world.state("first_sample").T, world.state("last_sample").T, datums(world, setups)
+    lost = {name: loss for name, loss in zip(LOSSES, world.state("losses").T, strict=True) if name in LOST}
     ledger = {
-        "kinetic_at_release": float(first[layout.KINETIC]),
-        "potential_at_release": float(first[layout.GRAVITATIONAL] + first[layout.SPRING]) - below,
-        "kinetic_at_end": float(last[layout.KINETIC]),
-        "potential_at_end": float(last[layout.GRAVITATIONAL] + last[layout.SPRING]) - below,
+        "kinetic_at_release": first[layout.KINETIC],
+        "potential_at_release": first[layout.GRAVITATIONAL] + first[layout.SPRING] - below,
+        "kinetic_at_end": last[layout.KINETIC],
+        "potential_at_end": last[layout.GRAVITATIONAL] + last[layout.SPRING] - below,
         **lost,
     }
     at_release = ledger["kinetic_at_release"] + ledger["potential_at_release"]
     at_end = ledger["kinetic_at_end"] + ledger["potential_at_end"]
     ledger["residual"] = at_release - at_end - sum(lost.values())
-    return ledger if is_released else dict.fromkeys(ledger, math.nan)
+    return {name: np.where(is_released, values, np.nan) for name, values in ledger.items()}
 
 
-_NO_FALL: Final[Mapping[str, Any]] = {
-    **dict.fromkeys(("lateral_drift", "final_tilt", "final_yaw", "greatest_tilt", "fell_at"), math.nan),
-    **dict.fromkeys(("fell_over", "fell_before_collapse"), -1),
-}
-"""Of a plane that is fixed or was never released."""
+_FALL: Final = ("lateral_drift", "final_tilt", "final_yaw", "greatest_tilt", "fell_at")
 
 
-def _fall(world: World, is_at_rest: bool) -> Mapping[str, Any]:
-    """What became of the plane."""
-    last = world.last_sample
-    tilt, yaw = angles(last[layout.PLANE_COLUMN :])
+def _falls(world: World, tilts: NDArray[np.bool_], is_at_rest: NDArray[np.bool_]) -> dict[str, NDArray[Any]]:
+    """What became of planes; `tilts` is false of one that is fixed or was never released."""
+    if not tilts.any():
+        never = {name: np.full(len(tilts), np.nan) for name in _FALL}
+        return never | {name: np.full(len(tilts), -1) for name in ("fell_over", "fell_before_collapse")}
+    last = world.state("last_sample")
+    tilt, yaw = angles(last[:, layout.PLANE_COLUMN :])
     rows = (layout.COLLAPSED_AT, layout.FELL_AT, layout.GREATEST_LEAN)
     collapsed_at, fell_at, lean = map(world.watched, rows)
+    leans = np.array([math.asin(each) for each in np.fmin(1.0, lean)])
+    found = np.where(is_at_rest, last[:, layout.CENTER_Z], np.nan), tilt, yaw, leans, fell_at
+    has_fallen = ~np.isnan(fell_at), fell_at < np.where(np.isnan(collapsed_at), np.inf, collapsed_at)
     return {
-        "lateral_drift": float(last[layout.CENTER_Z]) if is_at_rest else math.nan,
-        "final_tilt": float(tilt),
-        "final_yaw": float(yaw),
-        "greatest_tilt": math.asin(min(1.0, lean)),
-        "fell_at": fell_at,
-        "fell_over": int(not math.isnan(fell_at)),
-        "fell_before_collapse": int(fell_at < (math.inf if math.isnan(collapsed_at) else collapsed_at)),
+        **{name: np.where(tilts, values, np.nan) for name, values in zip(_FALL, found, strict=True)},
+        "fell_over": np.where(tilts, has_fallen[0], -1),
+        "fell_before_collapse": np.where(tilts, has_fallen[1], -1),
     }
 
 
-def _ending(world: World, is_released: bool, moment: str, event: str, first: int) -> dict[str, Any]:
+def _endings(
+    world: World, is_released: NDArray[np.bool_], moment: str, event: str, first: int
+) -> dict[str, NDArray[Any]]:
     """When an event came, after how many bounces begun, and how long after the last impulse on the floor.
 
     Given is the first of its three entries of :attr:`State.watch`.
     """
-    at, bounces, flight = (world.watched(row) if is_released else math.nan for row in range(first, first + 3))
+    at, bounces, flight = (np.where(is_released, world.watched(row), np.nan) for row in range(first, first + 3))
     return {
         moment: at,
-        f"bounces_before_{event}": -1 if math.isnan(bounces) else int(bounces),
-        f"flight_before_{event}": flight if math.isfinite(flight) else math.nan,
+        f"bounces_before_{event}": np.where(np.isnan(bounces), -1, bounces).astype(np.int64),
+        f"flight_before_{event}": np.where(np.isfinite(flight), flight, np.nan),
     }

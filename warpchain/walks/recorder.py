@@ -16,7 +16,7 @@ from warpchain.chain.setup import Setup
 from warpchain.engine.world import Recorded, World
 from warpchain.inputs.arrays import Array
 from warpchain.kernels import layout
-from warpchain.loop.stationary_loop import BEFORE, BeforeRelease
+from warpchain.loop.stationary_loop import BEFORE_RELEASE, BeforeRelease
 from warpchain.walks.moving_plane import angles, frame_axes
 
 SERIES: Final[dict[str, int | list[int]]] = {
@@ -117,7 +117,7 @@ class Recorder:
             "frame_moments": loads[:, :, 2],
             "frame_origin": planes[:, layout.ORIGIN : layout.ORIGIN + 3],
             "frame_axes": frame_axes(planes),
-            BEFORE: self.before,
+            BEFORE_RELEASE: self.before,
         }
 
 

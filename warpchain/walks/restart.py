@@ -15,7 +15,7 @@ from warpchain.engine.devices import gpu_turn
 from warpchain.inputs.validation import InputError, checked
 from warpchain.status import Status
 from warpchain.walks.moving_plane import state_of_plane
-from warpchain.walks.walk_phases import WalkRun
+from warpchain.walks.walk_phases import WalkRun, go_on
 
 
 def memory_of(run: WalkRun) -> dict[str, NDArray[Any]]:
@@ -35,21 +35,23 @@ def state_at(setup: Setup, t: object, end: float) -> State:
     if setup.start is not None:
         first = setup.start.time
     if np.isnan(end):
-        raise InputError("t: the walk ended before its release, and has no such time; see its status")
+        raise InputError("t: the walk ended before its release; see its status")
     if setup.start is None and 0 <= time < first:
-        remedy = "give more" if end >= first else f"but the walk ends at {end:g} s: it has no state"
-        raise InputError(f"t: {time:g} s: the sprocket is there until {first:g} s, and a state has none; {remedy}")
+        remedy = "use a later time" if end >= first else f"but the walk ends at {end:g} s: it has no state"
+        raise InputError(f"t: expected a time after {first:g} s, when the sprocket vanishes, got {time:g} s; {remedy}")
     if not first <= time <= end:
-        raise InputError(f"t: {time:g} s is not in the walk; give a time from {first:g} to {end:.6g}")
+        raise InputError(f"t: expected {first:g} to {end:.6g} s, got {time:g} s; use a time of the walk")
     with gpu_turn([setup.options.device]):
         batch = Batch(1, setup.scene.links, setup.options, faces=len(setup.floor.laws))
         world = batch.worlds[0]
         run = WalkRun(world, setup)
         attempts = batch.attempts_of_launch
-        for features in run.phases():
+        while run.status == Status.RUNNING:
+            go_on([run])
             while not (has_come := run.is_free and world.time >= time) and world.status == Status.RUNNING:
                 before = world.snapshot() if run.is_free else None
-                batch.launch([0], features, attempts)
+                assert run.features is not None
+                batch.launch([0], run.features, attempts)
                 if before is not None and world.time >= time and attempts > 1:
                     world.restore(before)
                     attempts = max(1, attempts // 8)
@@ -62,4 +64,4 @@ def state_at(setup: Setup, t: object, end: float) -> State:
                     memory=memory_of(run),
                     **(state_of_plane(world.plane) if setup.scene.plane == "tilting" else {}),
                 )
-        raise InputError(f"t: run again, the walk ends as {run.status.label} at {world.time:.6g} s; give less")
+        raise InputError(f"t: the repeated walk ended as {run.status.label} at {world.time:.6g} s; use an earlier time")

@@ -1,6 +1,6 @@
 """Rows of a sweep: the numbers of each walk, keyed by its block, its cell and its sample."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import reduce
 from operator import getitem
@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 from warpchain.engine.tallies import CONTACTS, LOST
 from warpchain.hdf5_files import stored_fields
 from warpchain.inputs.distributions import DRAWABLE
-from warpchain.inputs.validation import FIELDS, field_unit
+from warpchain.inputs.fields import FIELDS
+from warpchain.inputs.validation import field_unit
 from warpchain.walks.landmarks import MOST_ENERGY_ERROR, energy_error, faults
 from warpchain.walks.outcome import Outcome
 
 Rows = NDArray[np.void]
 Columns = Mapping[str, NDArray[Any]]
 
-KEYS: Final = np.dtype([("block", "<i4"), ("cell", "<i4"), ("sample", "<i4")])
+ROW_KEYS: Final = np.dtype([("block", "<i4"), ("cell", "<i4"), ("sample", "<i4")])
 """What a row is found by: number of its block, of its cell in C order over the axes, of its sample in the cell."""
 
 MISSING: Final = -1
@@ -81,24 +82,28 @@ def row_type(drawn: Iterable[str]) -> np.dtype[np.void]:
     """Type of a row, given the quantities that some block of the sweep draws, in any order."""
     names = set(drawn)
     stored = [("status", "<i1"), *((name, column.kind) for name, column in STORED_COLUMNS.items())]
-    return np.dtype([*KEYS.descr, *stored, *((drawn_column(name), "<f8") for name in DRAWABLE if name in names)])
+    return np.dtype([*ROW_KEYS.descr, *stored, *((drawn_column(name), "<f8") for name in DRAWABLE if name in names)])
 
 
 def missing_rows(kind: np.dtype[np.void], keys: Rows) -> Rows:
     """Rows of walks of which nothing is known but their keys, shape (len(keys),)."""
     rows = np.empty(len(keys), kind)
     for name in kind.names or ():
-        rows[name] = keys[name] if name in (KEYS.names or ()) else np.nan if kind[name].kind == "f" else MISSING
+        rows[name] = keys[name] if name in (ROW_KEYS.names or ()) else np.nan if kind[name].kind == "f" else MISSING
     return rows
 
 
-def fill_row(row: Any, outcome: Outcome, drawn: Mapping[str, float]) -> None:
-    """Write the numbers of a walk, and what was drawn for it, into one of `missing_rows`."""
-    row["status"] = outcome.status
+def fill_outcomes(rows: Rows, places: Sequence[int], outcomes: Mapping[str, Any]) -> None:
+    """Write the numbers of walks, of `outcomes_of`, into those of `missing_rows` at their places."""
+    rows["status"][places] = outcomes["status"]
     for name, column in STORED_COLUMNS.items():
-        row[name] = reduce(getitem, column.path, vars(outcome))
-    for name, value in drawn.items():
-        row[drawn_column(name)] = value
+        rows[name][places] = reduce(getitem, column.path, outcomes)
+
+
+def fill_drawn(rows: Rows, places: Sequence[int], points: Sequence[Mapping[str, float]]) -> None:
+    """Write what was drawn for each of some walks into `missing_rows` at their places."""
+    for name in dict.fromkeys(name for point in points for name in point):
+        rows[drawn_column(name)][places] = [point.get(name, np.nan) for point in points]
 
 
 def derived_columns(columns: Columns) -> dict[str, NDArray[np.float64]]:

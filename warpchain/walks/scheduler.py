@@ -3,21 +3,21 @@
 import threading
 import time
 from collections import defaultdict, deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
+
+import numpy as np
 
 from warpchain.chain.keep import NOTHING, Keep
 from warpchain.chain.setup import Setup
-from warpchain.chain.starts import first_motions
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import Gpu, gpu_turn, start_device
 from warpchain.engine.kernel_choice import block_threads, load_kernels, resident_blocks
-from warpchain.engine.world import World
 from warpchain.inputs.options import Options, on_gpu
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.status import Status
-from warpchain.walks.walk_phases import WalkRun, phase_features
+from warpchain.walks.walk_phases import WalkRun, go_on, phase_features
 
 WORLDS_OF_BLOCK = 2
 """Chains under way for each block that a GPU holds: while some are with the host, the others fill it.
@@ -32,10 +32,15 @@ SHARED_WALKS = 2000
 Kernels for blocks of different sizes compete for the instruction cache of a multiprocessor: the 504 walks of Figure 6
 took a fifth longer in blocks of five sizes than in blocks of 192 threads, some of them idle; 2016 walks took as long.
 """
+BEGUN_TOGETHER = 32
+"""Free worlds of a batch of some hundred that are worth a beginning, if chains are under way there.
+
+To begin w walks takes about F + c w, with F as much as 20 walks (F = 1.2 ms, c = 0.06 ms on a quiet core of 3 GHz): so
+much of it goes to Python and not to numbers. From 32 walks on F is less than half of that. Meanwhile an eighth of the
+worlds at most is idle, and there are `WORLDS_OF_BLOCK` times as many as fill the device.
+"""
 BATCHES_PER_GPU = 4
 """While the host handles one of them, the others go on and fill the device."""
-BEGUN_AT_ONCE = 64
-"""Most walks that begin with a launch, together; launches that are over wait meanwhile."""
 NAP = 5e-4
 """Pause [s] before asking again whether a batch is done."""
 
@@ -43,39 +48,40 @@ NAP = 5e-4
 def run_setups(
     setups: Sequence[Setup],
     *,
-    draw: Callable[[int], Setup] | None = None,
+    draw: Callable[[Sequence[int]], list[Setup]] | None = None,
     keeps: Sequence[Keep] | None = None,
     slots: int | None = None,
     stop: threading.Event | None = None,
     watch: Callable[[WalkRun], None] | None = None,
-) -> Iterator[tuple[int, WalkRun]]:
-    """Run walks and yield each when it is over, as (place, run); place: index in ``setups``.
+    waited: Callable[[float], None] = lambda seconds: None,
+) -> Iterator[list[tuple[int, WalkRun]]]:
+    """Run walks and yield those that end with the same launch, as (place, run); place: index in ``setups``.
 
-    A run must be read before the next one is asked for: its world is used again. No bit of a walk depends on the others
-    or on the number of slots.
+    Runs must be read before the next ones are asked for: their worlds are used again. No bit of a walk depends on the
+    others or on the number of slots.
 
     Args:
         setups: The walks, samples drawn; with ``draw``, options and links suffice.
-        draw: Called with the place of a walk when it begins; returns its setup, with options and links of ``setups``.
+        draw: Called with the places of walks that begin; returns their setups, with options and links of ``setups``.
         keeps: What is kept of the motion of each; None: nothing. Walks of equal options keep frames equally often.
         slots: Number of chains that run at the same time. Default: on a GPU as many as fill it; on a CPU, where one
             core does a launch, one, which stays in the cache.
         stop: When set, the walks are abandoned after the launch that is under way.
         watch: Called after each launch of each walk.
+        waited: Called with the seconds of each pause in which the host waited for a GPU.
     """
 
-    def begin(places: Sequence[int], worlds: Sequence[World]) -> list[WalkRun]:
-        complete = [setups[place] if draw is None else draw(place) for place in places]
-        kept = [NOTHING if keeps is None else keeps[place] for place in places]
-        return [*map(WalkRun, worlds, complete, kept, first_motions(complete))]
+    def complete(places: Sequence[int]) -> Iterator[tuple[int, Setup, Keep]]:
+        drawn = [setups[place] for place in places] if draw is None else draw(places)
+        return zip(places, drawn, [NOTHING if keeps is None else keeps[place] for place in places], strict=True)
 
     def group(places: list[int]) -> list[BatchRun]:
         kept = [] if keeps is None else [keeps[place] for place in places]
         batches, capacity = _batches([setups[place] for place in places], kept, slots)
         waiting = deque(places)
-        return [BatchRun(batch, waiting, capacity, begin, watch) for batch in batches]
+        return [BatchRun(batch, waiting, capacity, complete, watch) for batch in batches]
 
-    yield from _run_groups(map(group, _groups(setups, len(setups))), stop)
+    yield from _run_groups(map(group, _groups(setups, len(setups))), stop, waited)
 
 
 def _groups(setups: Sequence[Setup], walks: int) -> list[list[int]]:
@@ -149,59 +155,73 @@ class BatchRun:
         batch: Batch,
         waiting: deque[int],
         capacity: int,
-        begin: Callable[[Sequence[int], Sequence[World]], list[WalkRun]],
+        complete: Callable[[Sequence[int]], Iterator[tuple[int, Setup, Keep]]],
         watch: Callable[[WalkRun], None] | None,
     ) -> None:
         """Prepare to run waiting walks, of which `capacity` would fill the device; those that begin are taken away."""
         self.batch, self.waiting = batch, waiting
-        self._capacity, self._begin, self._watch = capacity, begin, watch
-        self._free = list(reversed(range(len(batch.worlds))))
-        self._running: dict[int, tuple[int, WalkRun, Iterator[Features]]] = {}
-        self._features: dict[int, Features] = {}
+        self._capacity, self._complete, self._watch = capacity, complete, watch
+        self._running: dict[int, tuple[int, WalkRun]] = {}
+        self._kernels = list[Features]()
+        self._kernel = np.full(len(batch.worlds), -1)  # that each world needs, by its number; −1: it is free
 
     @property
-    def load(self) -> float:
+    def filled_share(self) -> float:
         """Share of the device that its walks fill."""
         return len(self._running) / self._capacity
 
     def start(self) -> bool:
-        """Give some waiting walks free worlds and begin a launch; False if there is nothing to carry on."""
-        count = min(len(self._free), len(self.waiting), BEGUN_AT_ONCE)
-        places, worlds = [self.waiting.popleft() for _ in range(count)], [self._free.pop() for _ in range(count)]
-        runs = self._begin(places, [self.batch.worlds[world] for world in worlds])
-        for place, world, run in zip(places, worlds, runs, strict=True):
-            phases = run.phases()
-            self._running[world], self._features[world] = (place, run, phases), next(phases)
-        together: dict[Features, list[int]] = defaultdict(list)
-        for world, features in self._features.items():
-            together[features].append(world)
-        self.batch.start(together)
+        """Give waiting walks free worlds, if there are enough, and begin a launch; False if nothing is to carry on."""
+        free = np.flatnonzero(self._kernel < 0)[: len(self.waiting)].tolist()
+        enough = min(BEGUN_TOGETHER, len(self._kernel) // 8, len(self.waiting))
+        if free and (len(free) >= enough or not self._running):
+            walks = self._complete([self.waiting.popleft() for _ in free])
+            begun = {
+                world: (place, WalkRun(self.batch.worlds[world], setup, keep))
+                for world, (place, setup, keep) in zip(free, walks, strict=True)
+            }
+            self._running |= begun
+            self._go_on(begun)
+        together = {
+            features: np.flatnonzero(self._kernel == kernel)
+            for kernel, features in enumerate(self._kernels)
+            if kernel in self._kernel
+        }
+        if together:
+            self.batch.start(together)
         return bool(together)
 
-    def finish(self) -> Iterator[tuple[int, WalkRun]]:
-        """Wait for the launch, and yield every walk that is over as its world becomes free."""
+    def finish(self) -> list[tuple[int, WalkRun]]:
+        """Wait for the launch; the walks that are over, whose worlds are free."""
         self.batch.finish()
-        running = self.batch.statuses() == Status.RUNNING
-        for world, (place, run, phases) in list(self._running.items()):
-            run.drain()
-            if self._watch is not None:
-                self._watch(run)
-            if running[world]:
-                continue
-            if (features := next(phases, None)) is not None:
-                self._features[world] = features
-                continue
-            yield place, run
-            del self._running[world], self._features[world]
-            self._free.append(world)
+        if self._watch is not None or self.batch.worlds[0].records:
+            for _, run in self._running.values():
+                run.drain()
+                if self._watch is not None:
+                    self._watch(run)
+        has_stopped = (self._kernel >= 0) & (self.batch.statuses() != Status.RUNNING)
+        stopped = {world: self._running[world] for world in np.flatnonzero(has_stopped).tolist()}
+        self._go_on(stopped)
+        return [self._running.pop(world) for world, (_, run) in stopped.items() if run.features is None]
+
+    def _go_on(self, walks: Mapping[int, tuple[int, WalkRun]]) -> None:
+        """Begin the next phase of walks on worlds, and note what kernels these need."""
+        if walks:
+            go_on([run for _, run in walks.values()])
+        for world, (_, run) in walks.items():
+            if run.features is not None and run.features not in self._kernels:
+                self._kernels.append(run.features)
+            self._kernel[world] = -1 if run.features is None else self._kernels.index(run.features)
 
 
-def _run_groups(groups: Iterator[list[BatchRun]], stop: threading.Event | None) -> Iterator[tuple[int, WalkRun]]:
+def _run_groups(
+    groups: Iterator[list[BatchRun]], stop: threading.Event | None, waited: Callable[[float], None]
+) -> Iterator[list[tuple[int, WalkRun]]]:
     """Run groups one after the other; when the last walks of a group no longer fill the device, the next joins in."""
     under_way: list[BatchRun] = []
     try:
         while not (stop is not None and stop.is_set()):
-            while not any(run.waiting for run in under_way) and sum(run.load for run in under_way) < 1:
+            while not any(run.waiting for run in under_way) and sum(run.filled_share for run in under_way) < 1:
                 group = next(groups, None)
                 if group is None:
                     break
@@ -210,9 +230,12 @@ def _run_groups(groups: Iterator[list[BatchRun]], stop: threading.Event | None) 
                 return
             ready = next((run for run in under_way if run.batch.is_done()), None)
             if ready is None:
+                began = time.perf_counter()
                 time.sleep(NAP)
+                waited(time.perf_counter() - began)
                 continue
-            yield from ready.finish()
+            if over := ready.finish():
+                yield over
             under_way.remove(ready)
             if ready.start():
                 under_way.append(ready)

@@ -14,7 +14,7 @@ import numpy as np
 from warpchain.chain.setup import Setup
 from warpchain.hdf5_files import Stored, read_fields, stored_fields, write_fields
 from warpchain.inputs.arrays import Array
-from warpchain.loop.stationary_loop import BEFORE, FIELDS, BeforeRelease, StationaryLoop, average_loop
+from warpchain.loop.stationary_loop import BEFORE_RELEASE, LOOP_FIELDS, BeforeRelease, StationaryLoop, average_loop
 from warpchain.walks.landmarks import FAULTS, LENGTHS, bounces, energy_error, faults, least
 from warpchain.walks.outcome import Outcome
 
@@ -86,7 +86,7 @@ class WalkNumbers(Outcome):
         return np.nan if had_none or not self.setup.scene.is_on_sprocket else self.setup.contact_radius
 
     @property
-    def joints_in_room(self) -> Array | None:
+    def joints_lab(self) -> Array | None:
         """Joints x, y, z [m] in the room, (f, n, 3), if the plane tilts; else None: `frame_joints` are in the room."""
         if self.setup.scene.plane == "fixed":
             return None
@@ -95,8 +95,7 @@ class WalkNumbers(Outcome):
     @property
     def energy_error(self) -> float:
         """Size of the energy unaccounted for, relative to the energy at release; above 0.05 the walk is inaccurate."""
-        at_release = self.energy["kinetic_at_release"] + self.energy["potential_at_release"]
-        return float(energy_error(at_release, self.energy["residual"]))
+        return float(energy_error(self.energy_at_release, self.energy["residual"]))
 
     def warnings(self) -> list[str]:
         """Why the walk is inaccurate, each with what to try: energy, joints or contacts; empty if it is not."""
@@ -144,11 +143,12 @@ MOTION: Final = {name: stored for name, stored in STORED.items() if stored.shape
 def write_motion(group: "h5py.Group", values: Mapping[str, Any], joints: type = np.float64) -> None:
     """Write the arrays of a walk, and `before_release`, into a group; `joints`: precision of what each joint has."""
     write_fields(group, values, MOTION, joints)
-    if (before := values[BEFORE]) is not None:
-        write_fields(group.create_group(BEFORE, track_order=True), vars(before), FIELDS, joints)
+    if (before := values[BEFORE_RELEASE]) is not None:
+        write_fields(group.create_group(BEFORE_RELEASE, track_order=True), vars(before), LOOP_FIELDS, joints)
 
 
 def read_motion(group: "h5py.Group", links: int) -> dict[str, Any]:
     """What `write_motion` wrote of a chain of so many links."""
-    before = BeforeRelease(**read_fields(group[BEFORE], FIELDS, links)) if BEFORE in group else None
-    return {**read_fields(group, MOTION, links), BEFORE: before}
+    had = group.get(BEFORE_RELEASE)
+    before = None if had is None else BeforeRelease(**read_fields(had, LOOP_FIELDS, links))
+    return {**read_fields(group, MOTION, links), BEFORE_RELEASE: before}

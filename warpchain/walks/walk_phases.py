@@ -1,31 +1,36 @@
-"""The phases of one walk on a world: drive, release, walk.
+"""The phases of walks on the worlds of a batch: drive, release, walk.
 
 The drive (settle, spin-up, hold until steady) needs a sprocket and no floor, the walk a floor and no sprocket. The
 equations of the drive do not contain the floor, so the chain is driven about the origin and raised to its clearance at
 the release. `warpchain.walks.outcome` reads the numbers of a walk, `warpchain.walks.restart` its states.
+
+Walks that begin a phase with the same launch begin it together, as arrays (w, …) over all of equal numbers of links.
 """
 
+import functools
 import math
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from warpchain.chain.floor import circles_of
+from warpchain.chain.floor import circles_of, raised_by
 from warpchain.chain.keep import NOTHING, Keep
-from warpchain.chain.setup import Setup, State
+from warpchain.chain.setup import Setup
 from warpchain.chain.sprocket_motion import motion_rows
-from warpchain.chain.starts import Motion, first_motions
+from warpchain.chain.starts import first_motions
 from warpchain.engine.world import CACHES, World
 from warpchain.inputs.arrays import Array
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.status import Status
-from warpchain.walks.drive import drive_of
+from warpchain.walks.drive import drives_of
 from warpchain.walks.moving_plane import released_plane, state_of_plane
-from warpchain.walks.outcome import Driven, Outcome, along_floor, datum, outcome_of
+from warpchain.walks.outcome import Driven, Outcome, along_floor, datums, only, outcomes_of
 from warpchain.walks.recorder import Recorder
 
 
@@ -55,126 +60,83 @@ class Progress:
 
 def phase_features(setup: Setup) -> dict[str, Features]:
     """What kernels are compiled for in those phases that a walk has: `driven`, `moving` (beside a sprocket), `free`."""
-    scene, options = setup.scene, setup.options
-    columns = layout.padded_width(scene.links)
-    features = partial(Features, options.method, columns, self_contact=options.self_contact, is_mixed=options.is_mixed)
-    body, tilts = setup.floor.body, scene.plane == "tilting"
+    scene, options, columns = setup.scene, setup.options, layout.padded_width(setup.scene.links)
+    body, tilts = "floor" if scene.is_level else setup.floor.body, scene.plane == "tilting"
+    own = options.method, columns, options.self_contact, options.is_mixed
+    return _kernels(*own, body, tilts, setup.has_drive, scene.release is not None)
+
+
+@functools.cache
+def _kernels(
+    method: str, columns: int, contact: bool, is_mixed: bool, body: str, tilts: bool, has_drive: bool, moves: bool
+) -> dict[str, Features]:
+    """See `phase_features`; `moves`: whether the sprocket moves after the release."""
+    features = partial(Features, method, columns, self_contact=contact, is_mixed=is_mixed)
     found = {"free": features(body, tilts=tilts)}
-    if setup.has_drive:
+    if has_drive:
         found["driven"] = features("sprocket")
-        if scene.release is not None:
+        if moves:
             found["moving"] = features(body, tilts=tilts, moving_sprocket=True)
     return found
 
 
 class WalkRun:
-    """One walk on a world, which :meth:`phases` takes from one phase to the next.
+    """One walk on a world, which `go_on` takes from one phase to the next.
 
     Attributes:
         world: Where it runs, set up and read between launches.
         setup: What it is.
+        features: What the kernel of its phase must be compiled for; None before the first phase and when it is over.
         driven: What is known of the time before the release.
         status: RUNNING until the run is over.
         is_released: Whether the chain walks, with or without a sprocket that moves.
-        is_free: Whether the chain walks without a sprocket, and all that its start brings has been done.
     """
 
-    def __init__(self, world: World, setup: Setup, keep: Keep = NOTHING, motion: Motion | None = None) -> None:
-        """Prepare a walk; the batch of the world has its options, and records what is to be kept.
-
-        ``motion``: how the chain lies at first, of `first_motions`, if many walks begin at once.
-        """
+    def __init__(self, world: World, setup: Setup, keep: Keep = NOTHING) -> None:
+        """Prepare a walk; the batch of the world has its options, and records what is to be kept."""
         scene = setup.scene
         self.world, self.setup = world, setup
-        self._first_motion = first_motions([setup])[0] if motion is None else motion
+        self.features: Features | None = None
         self.recorder = Recorder(world, keep, setup)
         self.driven = Driven(has_sprocket=setup.has_drive)
         self.status = Status.RUNNING
-        self.is_free = self.is_released = False
+        self.is_released = False
+        self._next: Phase | None = _begin
+        self._kernels = phase_features(setup)
+        self._hanging = math.nan  # how far it must be raised as it hung on its sprocket at rest [m]
         self._hold_softness = 0.0
-        self._tilts = scene.plane == "tilting"
-        self._walk_end = min(scene.walk_limit, scene.walk_until or math.inf)  # since the release, if it is not at rest
+        self._walk_end = min(scene.walk_limit, scene.stop_time or math.inf)  # since the release, if it is not at rest
         self._farthest = (scene.distance_limit or 0.0) * along_floor(setup)  # along x
 
-    def phases(self) -> Iterator[Features]:
-        """Set the world up for one phase after the other, and yield what its kernel must be compiled for.
+    @property
+    def is_free(self) -> bool:
+        """Whether the chain walks without a sprocket, and all that its start brings has been done."""
+        return self._next is None
 
-        The world is then to be carried on until it stops. At the end the walk has its `status`.
-        """
-        yield from self._phases()
-        status, scene = self.world.status, self.setup.scene
-        is_planned = scene.walk_until is not None and scene.walk_until <= scene.walk_limit
+    def enter(self, kernel: str, following: "Phase | None") -> None:
+        """Be in a phase with a kernel of `phase_features`, and know what begins when its chain stops."""
+        self.features, self._next = self._kernels[kernel], following
+
+    def end(self, status: Status) -> None:
+        """Be over, as the world stopped with a status."""
+        scene = self.setup.scene
+        is_planned = scene.stop_time is not None and scene.stop_time <= scene.walk_limit
         self.status = Status.FINISHED if status == Status.TIME_LIMIT and is_planned else status
-
-    def _phases(self) -> Iterator[Features]:
-        world, setup, driven, features = self.world, self.setup, self.driven, phase_features(self.setup)
-        world.set_up(setup)
-        if setup.start is not None:
-            area = self._go_on(setup.start)
-            if area is not None:
-                yield features["free"]
-                if self._has_failed():
-                    return
-                world.set_state(first_area=area)
-                world.resume(self._walk_end, Status.TIME_LIMIT)
-        elif not setup.has_drive:
-            assert self._first_motion is not None
-            self._release(*self._first_motion)
-        else:
-            assert self._first_motion is not None
-            hanging, drive = math.nan, drive_of(setup)
-            driven.full_speed_at, self._hold_softness = drive["hold_start"], drive["hold_softness"]
-            world.set_drive(**drive)
-            load = partial(world.load, *self._first_motion, softness=self._hold_softness)
-            load(stop_time=setup.settling_time, stop_status=Status.FINISHED)
-            if setup.scene.start == "rest":
-                yield features["driven"]
-                if self._has_failed():
-                    return
-                hanging = self._raise(world.position, setup.scene.clearance)
-            world.resume(driven.full_speed_at + setup.scene.hold_limit, Status.NOT_STEADY)
-            yield features["driven"]
-            driven.drift = world.watched(layout.DRIFT)
-            if self._has_failed():
-                return
-            driven.drive_time = world.time
-            driven.counts, driven.extremes = np.array([*world.counts.values()]), np.array([*world.extremes.values()])
-            free_since = float(np.fmax(driven.full_speed_at, world.unloaded_at))
-            self._release(world.position, world.velocity, hanging)
-            self.recorder.release(driven.drive_time, driven.raised, free_since)
-            if setup.scene.release is not None:
-                moving = motion_rows(setup.scene.release, setup.scene.frequency, driven.raised)
-                world.set_drive(motion=moving)
-                world.resume(min(setup.scene.release[-1][0], self._walk_end), Status.FINISHED)
-                yield features["moving"]
-                if self._has_failed():
-                    return
-                world.resume(self._walk_end, Status.TIME_LIMIT)
-        self.is_free = True
-        yield features["free"]
-
-    def _has_failed(self) -> bool:
-        """Whether the phase that is over ended otherwise than planned."""
-        return self.world.status != Status.FINISHED
+        self.features = None
 
     def outcome(self) -> Outcome:
         """The numbers of the walk, which is over."""
-        return outcome_of(self.world, self.setup, self.status, self.driven, self.is_released)
+        return only(outcomes([self]))
 
     def motion(self) -> dict[str, Any]:
         """What was kept of its motion, by the names of the arrays of `WalkResult`."""
-        return self.recorder.motion(datum(self.world, self.setup))
-
-    @property
-    def _attempts_before(self) -> int:
-        """Attempts before the release, if it has come."""
-        return int(self.driven.counts[[layout.ACCEPTED, layout.REJECTED]].sum())
+        return self.recorder.motion(float(datums(World.together([self.world]), [self.setup])[0]))
 
     def progress(self) -> Progress:
         """Where the walk is."""
         now, sample = self.world.time, self.world.last_sample
         counts = self.world.counts
-        attempts = self._attempts_before + counts["accepted"] + counts["rejected"]
+        attempts = int(_attempts_before([self])[0]) + counts["accepted"] + counts["rejected"]
         if self.is_released:
             speed = math.hypot(sample[layout.CENTER_U], sample[layout.CENTER_V])
             height = self.driven.raised if self.driven.has_sprocket else math.nan
@@ -188,61 +150,185 @@ class WalkRun:
         """Take what a launch has recorded; to be called after each launch, before the next phase."""
         self.recorder.drain(self.is_released)
 
-    def _go_on(self, start: State) -> float | None:
-        """Place a chain as a state has it; if that was taken from a walk, go on with the walk.
 
-        If the state was changed, the world is to stop at once, and so make the sample with which its new ledger begins;
-        after that `State.first_area` is to be set to what is returned, else None.
-        """
-        world, memory = self.world, start.memory
-        self.is_released = True
-        if not memory:
-            self._load(start.position, start.velocity)
-            return None
-        self.driven = Driven.remembered(memory)
-        is_kept, interval = start.is_placed_as_in(self.setup), self.recorder.keep.frame_interval
-        world.restore({name: part for name, part in memory.items() if is_kept or name not in CACHES})
-        world.set_state(next_frame=np.floor(start.time / interval) if interval > 0 else -1)
-        world.set_drive(farthest=self._farthest)
-        here = {"position": world.position, "velocity": world.velocity}
-        here |= state_of_plane(world.plane) if self._tilts else {}
-        is_there = all(values.tobytes() == getattr(start, name).tobytes() for name, values in here.items())
-        if is_kept and is_there:  # to the bit
-            world.resume(self._walk_end, Status.TIME_LIMIT)
-            self.recorder.go_on(memory["state/last_sample"], start.time)
-            return None
-        if self._tilts:
-            assert start.origin is not None and start.axes is not None and start.plane_rates is not None
-            e1, e2 = start.axes
-            axes = np.stack([e1, e2, np.cross(e1, e2)])  # the plane's along axis 0
-            world.set_plane(np.concatenate([start.plane_rates, axes[:, 0], axes[:, 1], start.origin]))
-        world.change(start.position, start.velocity)
-        world.resume(world.time, Status.FINISHED)
-        return float(memory["state/first_area"])
+Phase = Callable[[Sequence[WalkRun]], None]
+"""What begins a phase of walks that are alike."""
 
-    def _raise(self, position: Array, clearance: float) -> float:
-        """How far a chain at this position must be raised to a clearance [m]."""
-        length, radius = self.setup.parameters.link_length, self.setup.link_values.radius
-        return self.setup.floor.raised_by(circles_of(position, length), np.tile(radius, 2), clearance)
 
-    def _release(self, position: Array, velocity: Array, hanging: float = math.nan) -> None:
-        """Begin the walk of a chain; ``hanging``: how far it must be raised as it hung on its sprocket at rest [m]."""
-        scene = self.setup.scene
-        if scene.clearance_of == "hanging":
-            raised = max(hanging, self._raise(position, 0.0))  # a loop is wider, and may reach into a wall
+def go_on(runs: Sequence[WalkRun]) -> None:
+    """Begin the next phase of walks that have not begun, or whose worlds have stopped: of all those alike together.
+
+    Each world is then to be carried on with the `features` of its walk until it stops; a walk without is over.
+    """
+    alike: dict[tuple[Phase, int, str, bool], list[WalkRun]] = defaultdict(list)
+    statuses = _together(runs).state("status").tolist()
+    for run, status in zip(runs, statuses, strict=True):
+        setup = run.setup
+        if run._next is None or (run.features is not None and status != Status.FINISHED):
+            run.end(Status(status))
         else:
-            raised = self._raise(position, scene.clearance)
-        self.driven.raised = raised
-        position[:, 1] += raised
-        self._load(position, velocity)
-        if self._tilts:
-            self.world.set_plane(released_plane(self.setup, position))
-        self.is_released = True
+            alike[run._next, setup.scene.links, setup.scene.start, setup.start is None].append(run)
+    for (begin, *_), group in alike.items():
+        begin(group)
 
-    def _load(self, position: Array, velocity: Array) -> None:
-        """Begin the walk of a chain on its floor."""
-        self.world.set_drive(farthest=self._farthest)
-        has_marks = self.recorder.keep.frame_interval > 0
-        before = self._attempts_before
-        load = partial(self.world.load, position, velocity, softness=self._hold_softness)
-        load(stop_time=self._walk_end, stop_status=Status.TIME_LIMIT, attempts_before=before, has_frame_marks=has_marks)
+
+def outcomes(runs: Sequence[WalkRun]) -> dict[str, Any]:
+    """The numbers of walks that are over, see `outcomes_of`."""
+    setups, statuses = [run.setup for run in runs], [run.status for run in runs]
+    driven, released = [run.driven for run in runs], [run.is_released for run in runs]
+    return outcomes_of(_together(runs), setups, statuses, driven, released)
+
+
+def _together(runs: Sequence[WalkRun]) -> World:
+    """The worlds of several walks as one."""
+    return World.together([run.world for run in runs])
+
+
+def _begin(runs: Sequence[WalkRun]) -> None:
+    """Set worlds up, and begin the first phase."""
+    world, setups = _together(runs), [run.setup for run in runs]
+    world.set_up(setups)
+    if setups[0].start is not None:
+        for run in runs:
+            _continue(run)
+        return
+    position, velocity = first_motions(setups)
+    if not setups[0].has_drive:
+        _release(runs, position, velocity)
+        return
+    drives = drives_of(setups, world.link_values)
+    world.set_drive(**drives)
+    for run, start, softness in zip(runs, drives["hold_start"].tolist(), drives["hold_softness"].tolist(), strict=True):
+        run.driven.full_speed_at, run._hold_softness = start, softness
+        run.enter("driven", _spin_up)
+    settled = np.array([setup.settling_time for setup in setups])
+    world.load(position, velocity, stop_time=settled, stop_status=Status.FINISHED, softness=drives["hold_softness"])
+    if setups[0].scene.start != "rest":
+        _hold(runs)
+
+
+def _spin_up(runs: Sequence[WalkRun]) -> None:
+    """Note how chains hang at rest; their sprockets go on and turn."""
+    clearances = np.array([run.setup.scene.clearance for run in runs])
+    for run, hanging in zip(runs, _raised(runs, _together(runs).position, clearances).tolist(), strict=True):
+        run._hanging = hanging
+    _hold(runs)
+
+
+def _hold(runs: Sequence[WalkRun]) -> None:
+    """Carry loops on until they are steady."""
+    limits = np.array([run.driven.full_speed_at + run.setup.scene.hold_limit for run in runs])
+    _together(runs).resume(limits, Status.NOT_STEADY)
+    for run in runs:
+        run.enter("driven", _let_go)
+
+
+def _let_go(runs: Sequence[WalkRun]) -> None:
+    """Release steady loops from their sprockets, which vanish or move on."""
+    world = _together(runs)
+    position, velocity, unloaded_at = world.position, world.velocity, world.unloaded_at
+    times, drifts = world.state("time").tolist(), world.watched(layout.DRIFT).tolist()
+    tallies = world.state("counts"), world.state("extremes")
+    for run, time, drift, counts, extremes in zip(runs, times, drifts, *tallies, strict=True):
+        driven = run.driven
+        driven.drive_time, driven.drift, driven.counts, driven.extremes = time, drift, counts, extremes
+    _release(runs, position, velocity)
+    for run, since in zip(runs, unloaded_at.tolist(), strict=True):
+        driven, scene = run.driven, run.setup.scene
+        run.recorder.release(driven.drive_time, driven.raised, float(np.fmax(driven.full_speed_at, since)))
+        if scene.release is not None:
+            run.world.set_drive(motion=motion_rows(scene.release, scene.frequency, driven.raised))
+            run.world.resume(min(scene.release[-1][0], run._walk_end), Status.FINISHED)
+            run.enter("moving", _walk)
+
+
+def _walk(runs: Sequence[WalkRun]) -> None:
+    """Let chains walk on until they rest; nothing comes after that."""
+    _together(runs).resume(np.array([run._walk_end for run in runs]), Status.TIME_LIMIT)
+    for run in runs:
+        run.enter("free", None)
+
+
+def _continue(run: WalkRun) -> None:
+    """Place a chain as a state has it; if that was taken from a walk, go on with the walk.
+
+    If the state was changed, the world stops at once, and so makes the sample with which its new ledger begins.
+    """
+    start, world = run.setup.start, run.world
+    assert start is not None
+    memory, tilts = start.memory, run.setup.scene.plane == "tilting"
+    run.is_released = True
+    if not memory:
+        _load([run], start.position[np.newaxis], start.velocity[np.newaxis])
+        return
+    run.driven = Driven.remembered(memory)
+    is_kept, interval = start.is_placed_as_in(run.setup), run.recorder.keep.frame_interval
+    world.restore({name: part for name, part in memory.items() if is_kept or name not in CACHES})
+    world.set_state(next_frame=np.floor(start.time / interval) if interval > 0 else -1)
+    world.set_drive(farthest=run._farthest)
+    here = {"position": world.position, "velocity": world.velocity}
+    here |= state_of_plane(world.plane) if tilts else {}
+    is_there = all(values.tobytes() == getattr(start, name).tobytes() for name, values in here.items())
+    if is_kept and is_there:  # to the bit
+        _walk([run])
+        run.recorder.go_on(memory["state/last_sample"], start.time)
+        return
+    if tilts:
+        assert start.origin is not None and start.axes is not None and start.plane_rates is not None
+        e1, e2 = start.axes
+        axes = np.stack([e1, e2, np.cross(e1, e2)])  # the plane's along axis 0
+        world.set_plane(np.concatenate([start.plane_rates, axes[:, 0], axes[:, 1], start.origin]))
+    world.change(start.position, start.velocity)
+    world.resume(world.time, Status.FINISHED)
+    run.enter("free", _walk_from_change)
+
+
+def _walk_from_change(runs: Sequence[WalkRun]) -> None:
+    """Let chains walk on whose states were changed."""
+    for run in runs:
+        assert run.setup.start is not None
+        run.world.set_state(first_area=run.setup.start.memory["state/first_area"])
+    _walk(runs)
+
+
+def _raised(runs: Sequence[WalkRun], position: Array, clearances: Array) -> Array:
+    """How far chains at these positions must be raised to their clearances [m], (w,)."""
+    circles = circles_of(position, np.array([run.setup.parameters.link_length for run in runs]))
+    radius = _together(runs).link_values.radius
+    return raised_by([run.setup.floor for run in runs], circles, np.tile(radius, 2), clearances)
+
+
+def _release(runs: Sequence[WalkRun], position: Array, velocity: Array) -> None:
+    """Begin the walks of chains on their floors."""
+    hangs = np.array([run.setup.scene.clearance_of == "hanging" for run in runs])
+    raised = _raised(runs, position, np.where(hangs, 0.0, [run.setup.scene.clearance for run in runs]))
+    # a loop is wider than it hung, and may reach into a wall
+    raised = np.where(hangs, np.fmax([run._hanging for run in runs], raised), raised)
+    position[..., 1] += raised[:, np.newaxis]
+    _load(runs, position, velocity)
+    for run, own, height in zip(runs, position, raised.tolist(), strict=True):
+        run.driven.raised, run.is_released = height, True
+        if run.setup.scene.plane == "tilting":
+            run.world.set_plane(released_plane(run.setup, own))
+
+
+def _load(runs: Sequence[WalkRun], position: Array, velocity: Array) -> None:
+    """Begin the last phase of walks anew."""
+    world = _together(runs)
+    world.load(
+        position,
+        velocity,
+        stop_time=0.0,
+        stop_status=Status.TIME_LIMIT,
+        softness=np.array([run._hold_softness for run in runs]),
+        attempts_before=_attempts_before(runs),
+        has_frame_marks=np.array([run.recorder.keep.frame_interval > 0 for run in runs]),
+    )
+    world.set_drive(farthest=np.array([run._farthest for run in runs]))
+    _walk(runs)
+
+
+def _attempts_before(runs: Sequence[WalkRun]) -> NDArray[np.int64]:
+    """Attempts before the releases that have come, (w,)."""
+    counts: NDArray[np.int64] = np.array([run.driven.counts for run in runs])
+    return counts[:, layout.ACCEPTED] + counts[:, layout.REJECTED]

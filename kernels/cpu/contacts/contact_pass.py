@@ -13,7 +13,7 @@ from warpchain.kernels.cpu.contacts.neighbour_list import list_slack, neighbour_
 from warpchain.kernels.cpu.contacts.proximity import fixed_contacts
 from warpchain.kernels.cpu.contacts.self_contacts import self_contacts
 from warpchain.kernels.cpu.joints import Joints
-from warpchain.kernels.cpu.upright import Plane
+from warpchain.kernels.cpu.upright import PlaneHooks
 from warpchain.kernels.events.tallies import add_count, book_loss, note_floor_impulse, of_fixed_body, raise_extreme
 from warpchain.kernels.features import Features
 from warpchain.kernels.physics.elementary import ZERO
@@ -21,7 +21,7 @@ from warpchain.kernels.types import Chain, Control, Drive, Ground, Integers, Row
 
 
 @functools.cache
-def body_pass(features: Features, plane: Plane):
+def body_pass(features: Features, plane: PlaneHooks):
     """Warp function of the contacts with the floor or sprocket, and with a sprocket that moves above a floor.
 
     ``meet_bodies(K, P, chain, felt, ground, still, drive, state, world)`` → number of impulses. ``felt``: the chain on

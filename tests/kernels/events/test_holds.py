@@ -1,6 +1,7 @@
 """Loops that are held and released: which loop it is, how long that takes, hard cases and refusals."""
 
 import math
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from warpchain.walks import scheduler
 CELL = {"links": 60, "frequency": 15.0}
 
 UNDAMPED = {"load_factor": 1.0, "steady_time": 0.0, "steady_tolerance": 1.0}
-"""A hold under its own loads, for a time that `further_hold` says."""
+"""A hold under its own loads, for a time that `extra_hold` says."""
 
 
 def released(preset: str = "soft", **settings: Any) -> warpchain.WalkResult:
@@ -39,7 +40,7 @@ def shape_of(walk: warpchain.WalkResult) -> np.ndarray:
 @pytest.fixture(scope="module")
 def truth() -> np.ndarray:
     """The loop of 60 links at 15 Hz after ten seconds under its own loads."""
-    walk = released(start="spinning", further_hold=10.0, **CELL, **UNDAMPED)
+    walk = released(start="spinning", extra_hold=10.0, **CELL, **UNDAMPED)
     assert 10 < walk.hold_time < 11
     return shape_of(walk)
 
@@ -62,7 +63,7 @@ def test_a_drive_depends_neither_on_its_launches_nor_on_its_neighbours(monkeypat
     cases = [
         {"links": 30, "frequency": 15.0},
         {"links": 44, "frequency": 10.0, "start": "rest", "settle_time": 0.1, "spin_up_time": 0.2},
-        {"links": 36, "frequency": 20.0, "load_factor": 5.0, "further_hold": 0.05},
+        {"links": 36, "frequency": 20.0, "load_factor": 5.0, "extra_hold": 0.05},
         {"links": 30, "frequency": 12.0, "load_factor": 1.0, "steady_time": 0.2, "steady_tolerance": 0.05},
     ]
     setups = [
@@ -72,7 +73,7 @@ def test_a_drive_depends_neither_on_its_launches_nor_on_its_neighbours(monkeypat
     def outcomes(attempts: int, slots: int) -> dict[int, tuple[Any, ...]]:
         monkeypatch.setitem(ATTEMPTS, "cpu", attempts)
         found = {}
-        for place, run in scheduler.run_setups(setups, slots=slots):
+        for place, run in chain.from_iterable(scheduler.run_setups(setups, slots=slots)):
             assert run.status == Status.TIME_LIMIT
             outcome = run.outcome()
             found[place] = outcome.hold_time, str(vars(outcome))
@@ -142,7 +143,7 @@ def test_factors_that_links_cannot_bear_are_refused() -> None:
     most = alternating(SOFT.with_values(TENTH), 4).greatest_load(SOFT.link_length)
     setup_walk("soft", TENTH | {"load_factor": 0.999 * most})
     with pytest.raises(
-        InputError, match=r"^scene\.load_factor: 15 is too much for links .*; give at most 1\.\d+, or null$"
+        InputError, match=r"^scene\.load_factor: 15 is too much for links .*; use at most 1\.\d+, or null$"
     ):
         setup_walk("soft", TENTH | {"load_factor": 15.0})
     setup_walk("soft", TENTH | {"load_factor": 15.0, "start": "ellipse"})

@@ -121,8 +121,8 @@ def end_of_watch(start: float, window: float, wanted: float, since: float | None
 
 
 def test_a_loop_that_keeps_its_shape_is_released_in_time() -> None:
-    """Held for a window and a crossing under load, let down, watched for a period; then further_hold and the phase."""
-    watched = Watched(drive={"further_hold": 0.75, "release_phase": 0.5}).sample()
+    """Held for a window and a crossing under load, let down, watched for a period; then extra_hold and the phase."""
+    watched = Watched(drive={"extra_hold": 0.75, "release_phase": 0.5}).sample()
     time, loads = watched.time, watched.loads
     fall = end_of_watch(0.5, max(float(SHORTEST_WINDOW), crossing(16.0) / 2), crossing(16.0))
     assert np.all(loads[time < 0.5] == 1.0)

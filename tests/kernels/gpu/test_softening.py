@@ -66,7 +66,7 @@ def driven(load_factor: float) -> Batch:
     batch.worlds[0].set_drive(
         **times, loop_speed=3.0, loop_period=12 * FIXED_STEP, load_factor=load_factor, push_rate=1e4
     )
-    batch.worlds[0].set_drive(steady_window=12 * FIXED_STEP, steady_time=-1.0, steady_tolerance=1.0, further_hold=1.0)
+    batch.worlds[0].set_drive(steady_window=12 * FIXED_STEP, steady_time=-1.0, steady_tolerance=1.0, extra_hold=1.0)
     batch.worlds[0].set_drive(hold_softness=1.25, loaded_softness=1.1)
     if load_factor > 1:
         batch.state.watch.numpy()[0, layout.UNLOADED_SINCE] = 90 * FIXED_STEP

@@ -168,6 +168,6 @@ def test_the_default_precision_follows_the_tolerance(options: dict[str, Any], pr
 
 def test_mixed_precision_is_refused_where_it_does_not_follow_the_tolerance() -> None:
     """One line says what to give instead."""
-    line = r"^options\.precision: mixed does not follow a tolerance of 1e-08; use double, or .* at least 1e-06$"
+    line = r"^options\.precision: mixed cannot meet a tolerance of 1e-08; use double, or .* at least 1e-06$"
     with pytest.raises(InputError, match=line):
         warpchain.walk(method="dp5", tolerance=1e-8, precision="mixed")

@@ -1,4 +1,4 @@
-"""Figures of the study of films."""
+"""Figures of the study of videos."""
 
 from collections.abc import Mapping
 from statistics import NormalDist
@@ -7,8 +7,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from studies.common import BLUE, DASHES, FAINT, LINE_COLORS, RED, tidy
-from studies.films.calibration import Calibration
-from warpchain import films
+from studies.video.calibration import Calibration
+from warpchain import video
 
 SYMBOLS = {
     "floor_friction": "μ",
@@ -27,7 +27,7 @@ def _unit(value: float) -> tuple[float, str]:
     return (1.0, "") if power >= -1 else (10.0**power, f" / $10^{{{power}}}$")
 
 
-def corner(answer: films.Posterior) -> Figure:
+def corner(answer: video.Posterior) -> Figure:
     """Ellipses of 68 and 95 % for each pair of parameters, and the Gaussians on the diagonal."""
     count, mean, sigma = len(answer.names), answer.mean, answer.sigma
     figure = Figure(figsize=(1.5 * count, 1.5 * count), layout="constrained")
@@ -59,13 +59,13 @@ def corner(answer: films.Posterior) -> Figure:
     return figure
 
 
-def line_figure(line: films.FrictionLine) -> Figure:
+def line_figure(line: video.FrictionLine) -> Figure:
     """Way against lift, with the friction line; crosses were not fitted."""
     figure, used = Figure(figsize=(5.2, 3.4), layout="constrained"), line.time <= line.end
     axes = figure.subplots()
     for chosen, style in ((used, "o"), (~used, "x")):
-        axes.plot(1e3 * line.lift[chosen], 1e3 * line.way[chosen], style, color=BLUE, markersize=3.5)
-    ends = 1e3 * np.array([0, line.lift[used].max()])
+        axes.plot(1e3 * line.height_gain[chosen], 1e3 * line.displacement[chosen], style, color=BLUE, markersize=3.5)
+    ends = 1e3 * np.array([0, line.height_gain[used].max()])
     axes.plot(ends, line.friction * ends, color=RED, label=f"$μ$ = {line.friction:.4f} ± {line.error:.4f}")
     axes.legend(frameon=False)
     tidy(axes, grid="both", xlabel="lift $y - y_0 + g t^2/2$ / mm", ylabel="way $x - x_0$ / mm")
