@@ -231,15 +231,34 @@ def test_a_terminal_shows_a_bar(tmp_path, monkeypatch):
     assert "1 of 1 walks" in text and "1 time_limit" in text
 
 
+@pytest.mark.parametrize("compiled", [0, 2])
+def test_compiling_is_told_once_where_output_is_piped(compiled, tmp_path, monkeypatch, capsys):
+    """A walk and a sweep say that they wait for kernels if any are compiled, and nothing if all are there."""
+
+    def load(wanted, on_compile):
+        list(wanted)
+        for _ in range(compiled):
+            on_compile()
+
+    monkeypatch.setattr("warpchain.walks.scheduler.load_kernels", load)
+    text = "compiling kernels for this machine"
+    warpchain.sweep(grid={"links": [30]}, samples=1, scene=SHORT, preset="soft", out=tmp_path / "shown")
+    assert capsys.readouterr().err.count(text) == min(compiled, 1)
+    warpchain.walk(links=30, preset="soft", **SHORT)
+    assert capsys.readouterr().err.count(text) == min(compiled, 1)
+    warpchain.walk(links=30, preset="soft", **SHORT, on_progress=lambda progress: None)
+    assert capsys.readouterr().err == ""
+
+
 def test_a_notebook_shows_a_line(tmp_path, monkeypatch):
     """In the output of the cell, of sweeps and of walks, which are silent in a terminal."""
     screen = type("OutStream", (io.StringIO,), {"__module__": "ipykernel.iostream"})()
     monkeypatch.setattr(sys, "stdout", screen)
     warpchain.sweep(grid={"links": [30]}, samples=1, scene=SHORT, preset="soft", out=tmp_path / "shown")
     lines = screen.getvalue().split("\r")
-    assert "compiling kernels" in lines[1] and "[##########] 1 of 1 walks" in lines[-1] and "1 time_limit" in lines[-1]
+    assert "[##########] 1 of 1 walks" in lines[-1] and "1 time_limit" in lines[-1]
     warpchain.walk(links=30, preset="soft", **SHORT)
-    assert "compiling kernels" in screen.getvalue().splitlines()[1]
+    assert "steps" in screen.getvalue().splitlines()[-1]
     monkeypatch.setattr(sys, "stdout", Terminal())
     monkeypatch.setattr(sys, "stderr", Terminal())
     warpchain.walk(links=30, preset="soft", **SHORT)

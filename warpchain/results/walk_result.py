@@ -71,6 +71,7 @@ class WalkResult(WalkNumbers):
     shapes stand beside the fields. Time series have a row at every `record_interval` exactly, and at the end; at an
     impact a row of a velocity or an energy lies between the values before and after. Frames are at the ends of steps.
     `setup` is complete; `seed` is that of the random draw, None if nothing was drawn; `versions` names the software.
+    `provenance` names command, date, system, processor or GPU and driver; it is empty of a walk that a sweep kept.
     `before_release` is the motion on the sprocket just before the release, None if it was not kept.
     """
 
@@ -180,6 +181,7 @@ class WalkResult(WalkNumbers):
                 **_setup_as_dict(self.setup),
                 "seed": self.seed,
                 "versions": self.versions,
+                "provenance": self.provenance,
             }
         )
         return plain
@@ -222,6 +224,7 @@ class WalkResult(WalkNumbers):
             "setup": json.dumps(_setup_as_dict(self.setup), allow_nan=False),
             "seed": json.dumps(self.seed),
             "versions": json.dumps(self.versions),
+            "provenance": json.dumps(self.provenance),
         }
 
     def _fill(self, file: "h5py.File") -> None:
@@ -264,6 +267,7 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
             setup=setup,
             seed=json.loads(file.attrs["seed"]),
             versions=json.loads(file.attrs["versions"]),
+            provenance=json.loads(file.attrs.get("provenance", "{}")),
             **read_fields(file, NUMBERS, setup.scene.links),
             **read_motion(file, setup.scene.links),
         )

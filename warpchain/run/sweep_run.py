@@ -24,6 +24,7 @@ from pydantic import Field
 from warpchain.chain.resolution import MAY_BE_NONE, Values
 from warpchain.chain.setup import DEFAULT_PRESET, Setup
 from warpchain.engine.devices import gpu_turn, has_gpu_turn, start_device
+from warpchain.engine.machine import made_by
 from warpchain.engine.processors import free_memory, processors
 from warpchain.files import AnyPath
 from warpchain.inputs.fields import SECTION_OF, by_section
@@ -35,6 +36,7 @@ from warpchain.run import progress_bar
 from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text
 from warpchain.run.workers import Pulse, losses_named, pulsing_threads
 from warpchain.status import Status
+from warpchain.store.crate import write_crate
 from warpchain.store.folder import SweepFolder
 from warpchain.store.shards import Part, Shard, check_numerics, opened_shard, rows_of, stamp, write_shard
 from warpchain.sweeps.block import is_axis
@@ -209,9 +211,9 @@ def _run_in_folder(
 ) -> None:
     """Run what is missing in a folder."""
     kinds = kinds_of_kernels(planned)
-    pulse, at_once = None, workers or processors()
+    pulse, at_once, on_devices = None, workers or processors(), set[str]()
     if executor is None:
-        devices = {setup.options.device for setup in kinds}
+        devices = on_devices = {setup.options.device for setup in kinds}
         if has_gpu_turn() and any(map(on_gpu, devices)):
             raise InputError("device: this thread is running a walk on a GPU; start the sweep after it has ended")
         for device in devices:
@@ -233,10 +235,13 @@ def _run_in_folder(
             compile_kernels(kinds, walks - before, lambda: report(replace(progress, compiling=True)))
             executor, pulse = held.enter_context(pulsing_threads(at_once))
         if missing:
+            crated = partial(write_crate, store.directory, store.manifest, made_by(sorted(on_devices)))
+            crated()
             tasks = _tasks(planned, missing, at_once if pulse is None else 1)  # threads take turns on a GPU
             where = str(store.directory), stamp(store.directory)
             submitted = ((executor.submit(run_shards, planned, *where, tuple(task), pulse), task) for task in tasks)
             _follow(submitted, 2 * at_once, pulse or Pulse(), store, progress, report)
+            crated(is_over=True)
         counts = counts_text(progress) or "nothing to do"
         store.log(f"complete after {progress.seconds:.1f} s: {counts}")
 

@@ -6,7 +6,7 @@ them.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
@@ -73,6 +73,7 @@ class WalkNumbers(Outcome):
     ]
     frame_axes: Annotated[Array, Stored("1", "x and y axes of the plane in the laboratory frame", "f 2 3", _FIXED)]
     before_release: BeforeRelease | None = None
+    provenance: dict[str, str] = field(default_factory=dict)
 
     @property
     def sprocket_center(self) -> Array | None:
