@@ -1,7 +1,8 @@
 """Writes the pages of docs/reference/ from the code: parameters, scene, options, sweep file, results, commands.
 
-Run ``python docs/generate_reference.py`` after a change of any of these; a test compares the pages with the code. Their
-texts stand in reference.txt, which names parts in braces, such as {{samplers}}: `PARTS`.
+It also writes `warpchain/typed.pyi`, by which type checkers and editors know keywords and columns. Run ``python
+docs/generate_reference.py`` after a change of any of these; a test compares what it writes with the code. The texts
+of the pages stand in reference.txt, which names parts in braces, such as {{samplers}}: `PARTS`.
 """
 
 import re
@@ -14,22 +15,26 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from warpchain.chain.keep import FRAME_INTERVAL
+from warpchain.chain.resolution import MAY_BE_NONE
 from warpchain.cli.main import app
-from warpchain.inputs.distributions import TABLE, Uniform
+from warpchain.inputs.distributions import DRAWABLE, TABLE, Uniform
 from warpchain.inputs.fields import FIELDS
+from warpchain.inputs.keywords import walk_keywords
 from warpchain.inputs.methods import METHODS, METHODS_BY_NEED
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS, Parameters
 from warpchain.inputs.scene import COMPOUND, Scene
 from warpchain.inputs.validation import field_limits, field_unit, spelled
+from warpchain.run.sweep_run import FILE_KEYS, OF_FILE
 from warpchain.status import Status
 from warpchain.sweeps.designs import SAMPLERS
 from warpchain.sweeps.recording import SERIES_INTERVAL, Frames
 from warpchain.sweeps.sweep_file import BlockKeys, BlockOfFile, SweepFile
-from warpchain.walks.rows import COLUMNS
+from warpchain.walks.rows import COLUMNS, drawn_column
 from warpchain.walks.walk_numbers import STORED
 
 FOLDER = Path(__file__).parent / "reference"
+STUB = Path(__file__).parents[1] / "warpchain/typed.pyi"
 NOTE = "<!-- Written by docs/generate_reference.py; change the code, then run that script. -->\n"
 JSON = "--json"  # An option of most commands, which is explained once
 
@@ -201,6 +206,34 @@ def pages() -> Mapping[str, str]:
     return {name: NOTE + page for name, page in zip(parts[::2], parts[1::2], strict=True)}
 
 
+def stub() -> str:
+    """The keywords of walk, simulate and sweep and the columns of a sweep, as type checkers and editors read them."""
+
+    def fields(types: Mapping[str, str], other: str = "") -> str:
+        lines = (f"    {name}: {other}{kind}{' | None' * (name in MAY_BE_NONE)}\n" for name, kind in types.items())
+        text = re.sub(r"\b(int|float)\b", lambda match: match[1].capitalize(), "".join(lines))
+        return text.replace("Sequence[Any]", "List").replace("'", '"')
+
+    types = {name: kind for name, (kind, _) in walk_keywords().items()}
+    solver = {name: types.pop(name) for name in Options.model_fields if not name.startswith("soften_")}
+    solver["soften_area"] = types.pop("soften_area")
+    columns = [*COLUMNS, *map(drawn_column, DRAWABLE)]
+    return (
+        "# Written by docs/generate_reference.py; change the code, then run that script.\n"
+        "from collections.abc import Mapping, Sequence\n"
+        "from typing import Any, Generic, Literal, TypedDict, TypeVar\n\n"
+        "import numpy as np\nfrom numpy.typing import NDArray\n\nfrom warpchain.chain.setup import State\n"
+        'from warpchain.inputs.starts import StartWord\n\nT = TypeVar("T")\nInt = int | np.integer[Any]\n'
+        "Float = float | np.integer[Any] | np.floating[Any]\nList = Sequence[Any] | NDArray[Any]\n"
+        'Start = StartWord | State\nFloor = Literal["flat"] | List\n\n'
+        f"class SolverFields(TypedDict, Generic[T], total=False):\n{fields(solver, 'T | ')}\n"
+        f"class WalkFields(SolverFields[T], total=False):\n{fields(types, 'T | ')}\n"
+        f"class SweepFields(WalkFields[Any], total=False):\n{fields({name: OF_FILE[name] for name in FILE_KEYS})}\n"
+        "class Columns:\n" + "".join(f"    {name}: NDArray[Any]\n" for name in columns)
+    )
+
+
 if __name__ == "__main__":
+    STUB.write_text(stub(), encoding="utf-8")
     for name, text in pages().items():
         (FOLDER / name).write_text(text, encoding="utf-8")

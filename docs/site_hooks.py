@@ -5,6 +5,7 @@ Pages link as GitHub needs it, such as `../sweeps/figure6.yaml`. In the site fil
 no script.
 """
 
+import inspect
 import json
 import os
 import re
@@ -12,9 +13,11 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+from griffe import Extension, Function, Parameter, ParameterKind, Parameters
 from latex2mathml.converter import convert
 from mkdocs.structure.files import File, Files
 
+import warpchain
 from warpchain.live_page.export import export_page
 
 ROOT = Path(__file__).parents[1]
@@ -25,6 +28,26 @@ WHOLE = re.compile(
 )
 """What has no subscripts: code, formulas, tags."""
 SUBSCRIPT = re.compile(r"(?<![\w.])([^\W\d_][\u0302-\u0308]?)_(?:\{([^}]+)\}|([a-zA-Z]+|\d)(?![a-zA-Z0-9_(]|\.\w))")
+
+
+class Signatures(Extension):
+    """Shows the fields that `walk`, `sweep` and `simulate` take as keywords, which their source has not one by one."""
+
+    def on_function(self, *, func: Function, **_: Any) -> None:
+        """Replace the parameters of the source by those that `inspect.signature` finds."""
+        if any("takes_fields" in str(each.value) for each in func.decorators):
+            found = inspect.signature(getattr(warpchain, func.name)).parameters.values()
+            func.parameters = Parameters(
+                *(
+                    Parameter(
+                        each.name,
+                        annotation=str(each.annotation),
+                        kind=ParameterKind(each.kind.description),
+                        default=None if each.default is each.empty else repr(each.default),
+                    )
+                    for each in found
+                )
+            )
 
 
 def in_site(path: str) -> str:

@@ -31,12 +31,17 @@ from warpchain.version import FORMAT_VERSION
 
 if TYPE_CHECKING:
     import h5py
+    import xarray
 
 _SIGNATURE: Final = b"\x89HDF\r\n\x1a\n"
 _CHECKSUM: Final = "warpchain SHA-256 of {:016d} bytes: {}"
 _PREFIX: Final = b"warpchain SHA-256 of "
 _HEAD: Final = 2**16
 """Number of bytes at the beginning of a file that hold its checksum and its kind."""
+_DIMS: Final = {"t": "time", "f": "frame_time", "n": "joint", "2": "axis", "3": "room_axis"}
+"""Letter or size in a shape → name of the dimension."""
+_LABELS: Final = {"axis": ["x", "y"], "room_axis": ["x", "y", "z"]}
+"""Coordinates of dimensions that are not numbered."""
 _FIXED: Final[dict[str, Any]] = {"libver": ("v108", "v108"), "track_order": True}
 """Version bounds without which equal content would not give equal bytes; they also leave out times."""
 
@@ -72,6 +77,11 @@ class Stored:
     def digested(self) -> list[object]:
         """What a file depends on; the wording of meanings it does not."""
         return [self.unit, self.shape, list(self.keys)]
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """Names of the dimensions."""
+        return tuple(_DIMS[size] for size in self.shape.split())
 
     def path(self, name: str) -> str:
         """Where a file keeps the field of this name."""
@@ -114,14 +124,49 @@ def write_fields(
             if stored.shape:  # a NaN has many bit patterns, and the pattern may depend on the batch
                 value = np.where(np.isnan(value), np.nan, value).astype(joints if "n" in stored.shape else np.float64)
             if np.size(value):
-                put(group, f"{stored.path(name)}/{key}".removesuffix("/"), value, stored.unit, meaning)
+                dims = tuple(dim.removeprefix("frame_") for dim in stored.dims)
+                put(group, f"{stored.path(name)}/{key}".removesuffix("/"), value, stored.unit, meaning, dims)
 
 
-def put(group: "h5py.Group", path: str, value: Any, unit: str, meaning: str) -> "h5py.Dataset":
-    """Write one dataset with its unit and meaning."""
+def put(
+    group: "h5py.Group", path: str, value: Any, unit: str, meaning: str, dims: tuple[str, ...] = ()
+) -> "h5py.Dataset":
+    """Write one dataset with its unit and meaning; a dimension whose name it does not have has a coordinate beside it.
+
+    A dimension of several datasets of a group is that of the first; coordinates are what netCDF and xarray read.
+    """
     dataset = group.create_dataset(path, data=value)
-    dataset.attrs["unit"], dataset.attrs["description"] = unit, meaning
+    dataset.attrs["units"], dataset.attrs["description"] = unit, meaning
+    for place, dim in enumerate(dims):
+        if dataset.name.endswith(f"/{dim}"):
+            dataset.make_scale(dim)
+            continue
+        if dim not in dataset.parent:
+            labels = np.array(_LABELS[dim], object) if dim in _LABELS else np.arange(dataset.shape[place], dtype="<i4")
+            dataset.parent.create_dataset(dim, data=labels).make_scale(dim)
+        dataset.dims[place].attach_scale(dataset.parent[dim])
     return dataset
+
+
+def dataset_of(values: Mapping[str, Any], kept: Mapping[str, Stored]) -> "xarray.Dataset":
+    """Arrays and numbers of `kept` fields, see `stored_fields`, as a data set with coordinates, units and meanings.
+
+    Arrays without numbers are left out; a dictionary is a variable for each key.
+    """
+    import xarray
+
+    found: dict[str, Any] = {}
+    for name, stored in kept.items():
+        for key, meaning in (stored.keys or {"": stored.described}).items():
+            value = values[name][key] if key else values[name]
+            if np.size(value):
+                notes = {"units": stored.unit, "description": meaning}
+                found[f"{name}_{key}".removesuffix("_")] = stored.dims, value, notes
+    coords: dict[str, Any] = {name: found.pop(name) for name in ("time", "frame_time") if name in found}
+    for dims, value, _ in found.values():
+        for dim, size in zip(dims, np.shape(value), strict=True):
+            coords.setdefault(dim, (dim, _LABELS.get(dim, np.arange(size))))
+    return xarray.Dataset(found, coords)
 
 
 def read_fields(group: "h5py.Group", kept: Mapping[str, Stored], links: int) -> dict[str, Any]:

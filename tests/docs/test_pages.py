@@ -3,15 +3,18 @@
 import importlib.util
 import json
 import re
+import tomllib
 from pathlib import Path
 from types import ModuleType
 
 import pytest
+import yaml
 
 import warpchain
 from tests.docs.code_blocks import PAGES, ROOT, name_of
 from tests.support.same_walks import GOLDEN, processor
 from warpchain.inputs.methods import METHODS
+from warpchain.version import VERSION
 
 
 @pytest.fixture(scope="module")
@@ -31,6 +34,7 @@ def test_reference_is_that_of_the_code(generator: ModuleType) -> None:
     for name, text in pages.items():
         committed = (generator.FOLDER / name).read_text(encoding="utf-8")
         assert committed == text, f"{name} is out of date; run python docs/generate_reference.py"
+    assert generator.STUB.read_text(encoding="utf-8") == generator.stub(), "run python docs/generate_reference.py"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
@@ -77,3 +81,15 @@ def test_the_table_of_integrators_has_them_all() -> None:
     """Who registers another one describes it there."""
     section = (ROOT / "docs/methods.md").read_text(encoding="utf-8").partition("\n## Integrators\n")[2]
     assert re.findall(r"^\| `(\w+)` \|", section.partition("\n#")[0], re.MULTILINE) == [*METHODS]
+
+
+def test_metadata_for_archives_are_those_of_the_package() -> None:
+    """codemeta.json and CITATION.cff have name, version, licence, keywords and paper of pyproject.toml."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    meta = json.loads((ROOT / "codemeta.json").read_text(encoding="utf-8"))
+    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert meta["version"] == cited["version"] == VERSION and meta["name"] == project["name"]
+    assert meta["keywords"] == cited["keywords"] == project["keywords"]
+    assert meta["license"].endswith(f"/{project['license']}") and cited["license"] == project["license"]
+    paper = project["urls"]["Paper"]
+    assert meta["referencePublication"]["@id"] == paper == f"https://doi.org/{cited['references'][0]['doi']}"

@@ -2,6 +2,7 @@
 
 import math
 from itertools import combinations
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,13 +10,18 @@ import pytest
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
+from matplotlib.text import Text
 
 from tests.support.made_tilting_walks import make_tilting_walk
 from tests.support.made_walks import made_setup, make_unreleased, make_walk
 from warpchain.chain.sprocket_motion import sprocket_places
+from warpchain.inputs.parameters import preset
+from warpchain.inputs.scene import Scene
 from warpchain.pictures.animation import Film
 from warpchain.pictures.chain import link_outlines
-from warpchain.pictures.walk_figures import film_strip, kinds_of
+from warpchain.pictures.labels import differences
+from warpchain.pictures.style import on_paper, save_figure
+from warpchain.pictures.walk_figures import draw, film_strip, kinds_of
 from warpchain.status import Status
 
 RADIUS = 4.2e-3
@@ -38,8 +44,40 @@ def test_height_and_speed_are_the_series() -> None:
     height, speed = walk.plot().axes
     np.testing.assert_array_equal(height.lines[0].get_xydata(), np.stack([walk.time, walk.center[:, 1]], axis=1))
     np.testing.assert_array_equal(speed.lines[0].get_xydata(), np.stack([walk.time, walk.center_velocity[:, 0]], 1))
-    assert height.get_shared_x_axes().joined(height, speed) and height.get_title(loc="left") == "30 links, 15 Hz"
+    assert height.get_shared_x_axes().joined(height, speed)
+    assert height.get_title(loc="left") == "30 links, 15 Hz, preset soft, drawn values"
     assert "/ m" in height.get_ylabel() and "/ (m/s)" in speed.get_ylabel() and "/ s" in speed.get_xlabel()
+
+
+def test_titles_name_what_differs_from_the_defaults() -> None:
+    """Parameters by symbol and unit, the scene in words, many of them cut off; the defaults are not named."""
+    usual = vars(Scene()) | vars(preset("paper"))
+    assert differences(usual, "paper") == []
+    changed = usual | {"floor_friction": 0.1, "slope": 3.0, "charm_mass": 0.002}
+    assert differences(changed, "paper") == ["slope 3°", "charm mass 0.002 kg", "μ_fc = 0.1"]
+    assert differences(vars(preset("soft")), "soft") == ["preset soft"]
+    many = usual | {name: 0.123 for name in ("phase", "clearance", "tilt", "yaw_rate", "gravity")}
+    assert len(differences(many, "paper")) == 5 and differences(many, "paper")[-1] == "…"
+
+
+@pytest.mark.parametrize("kind", ["film_strip", "height_and_speed", "energy", "tilt"])
+@pytest.mark.parametrize("width", [60, 85, 180])
+def test_texts_of_figures_on_paper_can_be_read(kind: Any, width: float, tmp_path: Path) -> None:
+    """A figure has the width asked for, texts of at least 6 pt and titles on the paper; a PDF has the same bytes."""
+    with on_paper(width) as inches:
+        for name in ("one", "two"):
+            figure = draw(make_tilting_walk() if kind == "tilt" else make_walk(), kind, width=inches)
+            save_figure(figure, tmp_path / f"{name}.pdf")
+        assert (tmp_path / "one.pdf").read_bytes() == (tmp_path / "two.pdf").read_bytes()
+        assert figure.get_figwidth() == pytest.approx(width / 25.4)
+        figure.draw_without_rendering()
+        seen = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text()]
+        assert min(text.get_fontsize() for text in seen) >= 6 - 1e-6 and len(seen) > 5
+        paper = figure.bbox.padded(1.0)
+        titles = [axes.title for axes in figure.axes] + [axes._left_title for axes in figure.axes]
+        for text in (text for text in titles if text.get_text()):
+            box = text.get_window_extent()
+            assert paper.contains(*box.min) and paper.contains(*box.max), text
 
 
 def test_refusals() -> None:

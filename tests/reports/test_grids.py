@@ -123,7 +123,7 @@ def test_further_axes_are_panels(tmp_path: Path) -> None:
     grid = {name: list(range(1, 1 + count)) for name, count in counts.items()}
     figure = make_sweep(tmp_path / "many", sweep(grid, samples=1), lambda walk: 1.0 + walk.index).plot()
     assert len(panels(figure)) == MOST_PANELS
-    assert isinstance(figure, Figure) and figure.get_suptitle() == f"{MOST_PANELS} of 30 panels"
+    assert isinstance(figure, Figure) and figure.get_suptitle().endswith(f"{MOST_PANELS} of 30 panels")
 
 
 # Maps

@@ -3,7 +3,9 @@
 import inspect
 import io
 import re
+import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pandas
@@ -90,7 +92,64 @@ def test_notebooks_complete_the_names():
         (warpchain.simulate, "skin", "links"),
     ):
         names = inspect.signature(function).parameters
-        assert name in names and missing not in names
+        assert name in names and missing not in names and "settings" not in names
+
+
+def test_signatures_are_readable():
+    """Help shows types and defaults as a user writes them, in lines, without what checks the values."""
+    text = str(inspect.signature(warpchain.walk))
+    for shown in ("links: int = 60", "mu_fc: float = 0.27", "floor: Floor = 'flat'", "method: str = 'standard'"):
+        assert shown in text
+    assert "record_before: float | None = None" in text and "setup: Setup | None" in text
+    for function in (warpchain.walk, warpchain.sweep, warpchain.simulate):
+        text = str(inspect.signature(function))
+        assert not re.search("FieldInfo|Annotated|Ellipsis|Undefined", text) and max(map(len, text.split("\n"))) <= 100
+    names = inspect.signature(warpchain.simulate).parameters
+    assert names["method"].default == "rkf78" and names["tolerance"].default == 1e-6
+
+
+CALLS = """
+import numpy as np
+
+import warpchain
+
+warpchain.walk(links=np.int64(60), mu_fc=0.3, tolerance=None, floor=[[0, 0], [1, 0.1]], start="spinning")
+result = warpchain.sweep(links=[40, 60], frequency={"from": 5, "to": 10, "step": 1}, samples=3, out="folder")
+print(result.dx, result.phase_drawn, result.blocks["a"].status, result.shape)
+warpchain.walk(frequncy=15)
+warpchain.walk(links="many")
+warpchain.sweep(sampels=3, out="folder")
+warpchain.simulate("paper", soften_pile=True)
+print(result.dxx, result.blocks["a"].dxx, warpchain.load_walk("walk.h5").dxx)
+"""
+"""The lines from the ninth on have mistakes."""
+
+
+@pytest.mark.slow
+def test_type_checkers_know_the_keywords(tmp_path):
+    """mypy refuses unknown keywords, wrong types and unknown columns, and takes what walk and sweep take."""
+    pytest.importorskip("mypy")
+    (tmp_path / "calls.py").write_text(CALLS, encoding="utf-8")
+    root = Path(__file__).parents[2]
+    command = [
+        sys.executable,
+        "-m",
+        "mypy",
+        "--strict",
+        "--config-file",
+        root / "pyproject.toml",
+        tmp_path / "calls.py",
+    ]
+    found = subprocess.run(command, cwd=root, capture_output=True, text=True)
+    errors = re.findall(r"calls\.py:(\d+): error: .*\[([\w-]+)\]", found.stdout)
+    expected = [
+        ("9", "call-arg"),
+        ("10", "arg-type"),
+        ("11", "call-arg"),
+        ("12", "call-arg"),
+        *[("13", "attr-defined")] * 3,
+    ]
+    assert errors == expected, found.stdout + found.stderr
 
 
 def test_parameter_sets(tmp_path):
@@ -172,15 +231,34 @@ def test_a_terminal_shows_a_bar(tmp_path, monkeypatch):
     assert "1 of 1 walks" in text and "1 time_limit" in text
 
 
+@pytest.mark.parametrize("compiled", [0, 2])
+def test_compiling_is_told_once_where_output_is_piped(compiled, tmp_path, monkeypatch, capsys):
+    """A walk and a sweep say that they wait for kernels if any are compiled, and nothing if all are there."""
+
+    def load(wanted, on_compile):
+        list(wanted)
+        for _ in range(compiled):
+            on_compile()
+
+    monkeypatch.setattr("warpchain.walks.scheduler.load_kernels", load)
+    text = "compiling kernels for this machine"
+    warpchain.sweep(grid={"links": [30]}, samples=1, scene=SHORT, preset="soft", out=tmp_path / "shown")
+    assert capsys.readouterr().err.count(text) == min(compiled, 1)
+    warpchain.walk(links=30, preset="soft", **SHORT)
+    assert capsys.readouterr().err.count(text) == min(compiled, 1)
+    warpchain.walk(links=30, preset="soft", **SHORT, on_progress=lambda progress: None)
+    assert capsys.readouterr().err == ""
+
+
 def test_a_notebook_shows_a_line(tmp_path, monkeypatch):
     """In the output of the cell, of sweeps and of walks, which are silent in a terminal."""
     screen = type("OutStream", (io.StringIO,), {"__module__": "ipykernel.iostream"})()
     monkeypatch.setattr(sys, "stdout", screen)
     warpchain.sweep(grid={"links": [30]}, samples=1, scene=SHORT, preset="soft", out=tmp_path / "shown")
     lines = screen.getvalue().split("\r")
-    assert "compiling kernels" in lines[1] and "[##########] 1 of 1 walks" in lines[-1] and "1 time_limit" in lines[-1]
+    assert "[##########] 1 of 1 walks" in lines[-1] and "1 time_limit" in lines[-1]
     warpchain.walk(links=30, preset="soft", **SHORT)
-    assert "compiling kernels" in screen.getvalue().splitlines()[1]
+    assert "steps" in screen.getvalue().splitlines()[-1]
     monkeypatch.setattr(sys, "stdout", Terminal())
     monkeypatch.setattr(sys, "stderr", Terminal())
     warpchain.walk(links=30, preset="soft", **SHORT)

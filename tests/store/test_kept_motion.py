@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray
 
 import warpchain
 from tests.run.test_sweep_run import TINY, brief_setup, data_of, outcome, outcomes
@@ -13,7 +14,7 @@ from warpchain.chain.keep import Keep
 from warpchain.engine.batch import CAPACITY_SAMPLES
 from warpchain.inputs.validation import InputError, InputWarning
 from warpchain.reports.sweep_page import write_report
-from warpchain.results.sweep_result import load
+from warpchain.results.sweep_result import load, merge
 from warpchain.run.sweep_run import sweep
 from warpchain.walks.scheduler import run_setups
 
@@ -129,6 +130,20 @@ def test_only_chosen_samples_are_kept(kept: Path) -> None:
     ):
         with pytest.raises(InputError, match=message):
             result.series(**at)
+
+
+def test_xarray_reads_motions_of_a_merged_file(kept: Path, tmp_path: Path) -> None:
+    """The whole file opens as one tree; the kept motions have named dimensions and the numbers of the folder."""
+    merge(kept, tmp_path / "all.h5")
+    merge(tmp_path / "all.h5", tmp_path / "again.h5")
+    assert (tmp_path / "all.h5").read_bytes() == (tmp_path / "again.h5").read_bytes()
+    block = next(iter(load(kept).blocks.values()))
+    place = int(np.flatnonzero(block.kept)[0])
+    walk = block.walk_motion(tuple(map(int, np.unravel_index(place, block.shape))))
+    with xarray.open_datatree(tmp_path / "all.h5") as tree:
+        assert not any("phony" in str(name) for node in tree.subtree for name in node.dims)
+        motion = next(node[f"motion/{place}"] for node in tree.subtree if "motion" in node.children)
+        assert motion["series/center"].dims == ("time", "axis") and (motion["series/center"] == walk.center).all()
 
 
 def test_damage_to_a_motion_is_seen(kept: Path, tmp_path: Path) -> None:

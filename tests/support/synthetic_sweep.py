@@ -21,7 +21,7 @@ import numpy as np
 from warpchain.results.sweep_result import load
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
-from warpchain.store.shards import Shard, stamp, write_shard
+from warpchain.store.shards import CRATE, Shard, stamp, write_shard
 from warpchain.sweeps.plan import Sweep, load_sweep
 from warpchain.walks.rows import STORED_COLUMNS, Rows, missing_rows, quantity_of
 
@@ -91,7 +91,7 @@ def content(directory: Path) -> dict[str, bytes]:
     return {
         str(path.relative_to(directory)): path.read_bytes()
         for path in directory.rglob("*")
-        if path.is_file() and path.name not in ("lock", "log.txt")
+        if path.is_file() and path.name not in ("lock", "log.txt", CRATE)
     }
 
 

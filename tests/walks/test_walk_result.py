@@ -6,6 +6,7 @@ from pathlib import Path
 
 import h5py
 import pytest
+import xarray
 
 from tests.support.made_walks import assert_same, make_unreleased, make_walk
 from warpchain.hdf5_files import Format, Stored, hdf5_image
@@ -36,6 +37,24 @@ def test_round_trip(make: Callable[[], WalkResult], tmp_path: Path) -> None:
     walk.save(tmp_path / "walk.h5")
     assert_same(load_walk(tmp_path / "walk.h5"), walk)
     assert [path.name for path in tmp_path.iterdir()] == ["walk.h5"]
+
+
+def test_xarray_reads_a_walk(tmp_path: Path) -> None:
+    """The file of a walk opens as a tree without unnamed dimensions; the walk itself gives the same numbers."""
+    walk = make_walk()
+    walk.save(tmp_path / "walk.h5")
+    with xarray.open_datatree(tmp_path / "walk.h5") as tree:
+        assert not any("phony" in str(name) for node in tree.subtree for name in node.dims)
+        joints, data = tree["frames/joints"], walk.to_xarray()
+        assert joints.dims == ("time", "joint", "axis") and list(joints.axis.values) == ["x", "y"]
+        assert (joints.values == walk.frame_joints).all() and (joints.time == walk.frame_time).all()
+        assert (tree["series/center"].sel(axis="y") == walk.center[:, 1]).all()
+        assert tree["series/kinetic_energy"].attrs["units"] == "J"
+    assert data.frame_joints.dims == ("frame_time", "joint", "axis") and data.attrs["status"] == walk.status.label
+    assert data.energy_residual == walk.energy["residual"] and (data.center.values == walk.center).all()
+    table = walk.to_pandas()
+    assert (table.index == walk.time).all() and (table["center_velocity_x"] == walk.center_velocity[:, 0]).all()
+    assert make_unreleased().to_pandas().empty and "time" not in make_unreleased().to_xarray().dims
 
 
 def test_foreign_files_are_refused(tmp_path: Path) -> None:

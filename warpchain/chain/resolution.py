@@ -3,14 +3,12 @@
 Keyword arguments, the command line and YAML files all go through `resolve`, which raises only `InputError`.
 """
 
-import inspect
-from collections.abc import Callable, Container, Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, Final, TypeVar
+from typing import Final
 
 from warpchain.chain.setup import Setup, State
 from warpchain.inputs.distributions import TABLE, Seed, draw, random_generator
-from warpchain.inputs.fields import SECTIONS
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset as parameter_preset
 from warpchain.inputs.scene import OF_LINKS, Scene
@@ -18,7 +16,8 @@ from warpchain.inputs.unit_slips import check_units
 from warpchain.inputs.validation import InputError, checked, validated
 
 Values = Mapping[str, object]
-F = TypeVar("F", bound=Callable[..., object])
+MAY_BE_NONE: Final = ("links", "frequency", "start", "method", "tolerance")
+"""Keywords of a walk whose None is the default."""
 OF_THE_WALK: Final = (
     *("walk_limit", "stop_time", "distance_limit", "floor", "slope"),
     *("charm_mass", "charm_inertia", "charm_radius", "charm_link", "stiff_joint", "joint_friction_factor"),
@@ -64,26 +63,3 @@ def continued(state: State, sections: Mapping[str, Values]) -> Setup:
     if scene.plane == "fixed" and not state.is_placed_as_in(setup):  # a moving sprocket may have left it in the floor
         setup.floor.check_above(state.position, state.parameters.link_length, "start")
     return replace(setup, start=replace(state, setup=replace(setup, start=None)))
-
-
-def takes_fields(*sections: str, without: Container[str] = (), beside: Iterable[str] = ()) -> Callable[[F], F]:
-    """Let the signature of a function name the fields that its ``**settings`` take, for notebooks to complete.
-
-    These are the fields of some `SECTIONS`, `without` those that it does not take, and what it takes `beside` them.
-    """
-
-    def named(function: F) -> F:
-        signature = inspect.signature(function)
-        *own, settings = signature.parameters.values()
-        types: dict[str, Any] = dict.fromkeys(beside, Any)
-        for section in sections:
-            types |= {name: field.annotation for name, field in SECTIONS[section].model_fields.items()}
-        fields = [
-            inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=..., annotation=kind)
-            for name, kind in types.items()
-            if name not in signature.parameters and name not in without
-        ]
-        function.__signature__ = signature.replace(parameters=[*own, *fields, settings])  # type: ignore[attr-defined]
-        return function
-
-    return named

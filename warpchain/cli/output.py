@@ -172,14 +172,20 @@ def write_walk(result: WalkResult, folder: Path) -> Iterator[Path]:
     yield from draw_figures(result, folder, ["film_strip"])
 
 
-def draw_figures(walk: WalkResult, folder: Path, kinds: Iterable[FigureWord]) -> Iterator[Path]:
-    """Draw figures into a folder; yield the path of each, and say on stderr which a walk has nothing for, and why."""
+def draw_figures(
+    walk: WalkResult, folder: Path, kinds: Iterable[FigureWord], suffix: str = "png", width: float | None = None
+) -> Iterator[Path]:
+    """Draw figures, of a width [inches] if it is given, into a folder, in files of a suffix; yield the path of each.
+
+    Standard error says which a walk has nothing for, and why.
+    """
     from warpchain.pictures.style import save_figure
+    from warpchain.pictures.walk_figures import draw
 
     for kind in kinds:
-        path = folder / f"{kind}.png"
+        path = folder / f"{kind}.{suffix}"
         try:
-            figure = walk.plot(kind)
+            figure = draw(walk, kind, width=width)
         except ValueError as error:
             print(one_line(f"{path}: not drawn; {error}"), file=sys.stderr)
         else:

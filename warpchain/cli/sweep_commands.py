@@ -1,9 +1,11 @@
 """The commands for sweeps: sweep, compile, info, plot, report and merge."""
 
 import contextlib
+import re
 import sys
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
@@ -117,14 +119,13 @@ def compile_kernels(
     folder of the cache. A kernel serves only the versions of warpchain, Warp and Python that compiled it, and
     processors or GPUs of the same kind.
     """
-    from warpchain.run.progress_bar import changing_line
+    from warpchain.run.progress_bar import COMPILING, changing_line
     from warpchain.run.sweep_run import compile_sweep
     from warpchain.sweeps.sweep_file import shipped_sweeps
 
     for source in sources or map(Path, shipped_sweeps()):
         with changing_line() as show:
-            show(f"{source}: compiling kernels")
-            planned = compile_sweep(source, device)
+            planned = compile_sweep(source, device, partial(show, f"{source}: {COMPILING}", True))
         print(f"{planned.name}: kernels compiled")
 
 
@@ -154,6 +155,13 @@ def plot(
         str | None, option("NAME", "Column of a sweep to draw: dx, walk_time, bounces, hold_time ... Default: dx.")
     ] = None,
     kind: Annotated[FigureWord | None, typer.Option(help=_KIND)] = None,
+    width: Annotated[
+        str | None,
+        option("WIDTH", "Width on paper, such as 85mm for a column: texts have 6 pt at least. Default: as suits."),
+    ] = None,
+    format: Annotated[
+        Literal["png", "pdf", "svg"], typer.Option(help="Format of the files. Default: png.", show_default=False)
+    ] = "png",
 ) -> None:
     """Draw all figures of a sweep or of a saved walk.
 
@@ -163,11 +171,13 @@ def plot(
     from warpchain.cli.output import draw_figures, saved
     from warpchain.files import make_folder
     from warpchain.inputs.validation import InputError, printable
+    from warpchain.pictures.style import on_paper
     from warpchain.pictures.walk_figures import kinds_of
     from warpchain.reports.sweep_figures import figures
     from warpchain.results.walk_result import WalkResult
 
     path, *others = paths
+    paper = None if width is None else _millimetres(width)
     if others:
         from warpchain.results.sweep_result import load
 
@@ -175,24 +185,38 @@ def plot(
     else:
         found = saved(path, "use the folder of a sweep, a merged file, or the file of a saved walk")
     folder = folder or (path.parent if path.is_file() else path)
-    if isinstance(found, WalkResult):
-        if quantity is not None:
-            raise InputError("--quantity: not possible for a saved walk; remove it, or use the folder of a sweep")
-        drawn = draw_figures(found, folder, kinds_of(found) if kind is None else (kind,))
-    else:
-        if kind is not None:
-            raise InputError("--kind: not possible for a sweep; remove it, or use the file of a saved walk")
-        pictures = list(figures(found, quantity or "dx"))
-        if not pictures:
-            name = path if quantity is None else f"--quantity: {quantity}"
-            raise InputError(f"{name}: no walk at rest has a value, or no axis has several; use another --quantity")
-        drawn = (picture.save(folder) for picture in pictures)
-    make_folder(folder)
+    is_walk = isinstance(found, WalkResult)
+    if is_walk and quantity is not None:
+        raise InputError("--quantity: not possible for a saved walk; remove it, or use the folder of a sweep")
+    if not is_walk and kind is not None:
+        raise InputError("--kind: not possible for a sweep; remove it, or use the file of a saved walk")
     count = 0
-    for count, drawing in enumerate(drawn, 1):  # noqa: B007
-        print(printable(str(drawing)))
+    with on_paper(paper) as inches:
+        if isinstance(found, WalkResult):
+            kinds = kinds_of(found) if kind is None else (kind,)
+            drawn = draw_figures(found, folder, kinds, format, inches)
+        else:
+            pictures = list(figures(found, quantity or "dx", inches))
+            if not pictures:
+                name = path if quantity is None else f"--quantity: {quantity}"
+                problem = "no walk at rest has a value, or no axis has several"
+                raise InputError(f"{name}: {problem}; use another --quantity")
+            drawn = (picture.save(folder, format) for picture in pictures)
+        make_folder(folder)
+        for count, drawing in enumerate(drawn, 1):  # noqa: B007
+            print(printable(str(drawing)))
     if not count:
         raise typer.Exit(FAILED)
+
+
+def _millimetres(text: str) -> float:
+    """A width on paper [mm], given in mm, cm or in; an `InputError` if it is none."""
+    from warpchain.inputs.validation import InputError, shown
+
+    found = re.fullmatch(r"(\d+(?:\.\d*)?) ?(mm|cm|in|)", text.strip())
+    if found is None:
+        raise InputError(f"--width: expected a width such as 85mm, got {shown(text)}; use mm, cm or in")
+    return float(found[1]) * {"mm": 1.0, "cm": 10.0, "in": 25.4, "": 1.0}[found[2]]
 
 
 def report(

@@ -137,7 +137,7 @@ def walk(
             seed=number,
             frame_interval=interval,
             record_joint_forces=record_joint_forces,
-            on_progress=lambda progress: show(walk_progress_text(progress)),
+            on_progress=lambda progress: show(walk_progress_text(progress), progress.phase == "compile"),
         )
     paths: list[Path] = []
     try:

@@ -1,7 +1,7 @@
 """Chooses and loads kernels by device, features and number of links; batches and `compile` call this."""
 
 import threading
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 
 import warp as wp
@@ -54,12 +54,20 @@ def step_kernel(device: Device, features: Features, threads: int) -> wp.Kernel:
     return _loaded[device, features, threads]
 
 
-def load_kernels(wanted: Iterable[tuple[Device, Features, int]]) -> None:
-    """Load kernels by device, features and threads of a block, on a CPU 1; compile those that are not in the cache."""
+def load_kernels(wanted: Iterable[tuple[Device, Features, int]], on_compile: Callable[[], None] = lambda: None) -> None:
+    """Load kernels by device, features and threads of a block, on a CPU 1; compile those that are not in the cache.
+
+    Before each that is compiled `on_compile` is called, by any thread.
+    """
 
     def load(key: tuple[Device, Features, int], entry: wp.Kernel) -> None:
         device, features, threads = key
-        load_checked(entry.module, device.warp, lambda: step_module(features, threads, _registers(device, threads)))
+
+        def make() -> wp.Module:
+            on_compile()
+            return step_module(features, threads, _registers(device, threads))
+
+        load_checked(entry.module, device.warp, make)
 
     with _loading:
         entries = {

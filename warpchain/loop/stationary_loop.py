@@ -12,7 +12,7 @@ length ℓ: T_e t + N n = F − ρ v² (t + ℓ²/12 t'').
 """
 
 from dataclasses import dataclass
-from typing import Annotated, Final, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +20,12 @@ from numpy.typing import NDArray
 from warpchain.chain.link_values import mean_value
 from warpchain.chain.setup import Setup
 from warpchain.chain.softened_joints import SOFT
-from warpchain.hdf5_files import Stored, stored_fields
+from warpchain.hdf5_files import Stored, dataset_of, stored_fields
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.parameters import Parameters
+
+if TYPE_CHECKING:
+    import xarray
 
 BEFORE_RELEASE: Final = "before_release"
 """Name of the motion before the release, among the arrays of a walk and in its file."""
@@ -68,6 +71,10 @@ class BeforeRelease:
         """One line."""
         span = -float(self.frame_time[0]) if len(self.frame_time) else 0.0
         return f"<BeforeRelease: {span:.3g} s, {len(self.time)} instants, {len(self.frame_time)} frames>"
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """The arrays as a data set with named coordinates, units and meanings, as `WalkResult.to_xarray`."""
+        return dataset_of(vars(self), LOOP_FIELDS)
 
 
 LOOP_FIELDS: Final[dict[str, Stored]] = stored_fields(BeforeRelease)

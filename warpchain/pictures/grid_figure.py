@@ -57,15 +57,21 @@ class Panel(NamedTuple):
 
 
 def draw_grid(
-    blocks: "Mapping[str, CellStatistics]", quantity: str, x: str | None = None, figure: AnyFigure | None = None
+    blocks: "Mapping[str, CellStatistics]",
+    quantity: str,
+    x: str | None = None,
+    figure: AnyFigure | None = None,
+    title: str = "",
+    width: float | None = None,
 ) -> AnyFigure:
     """Draw a quantity over the grids of one block or several.
 
     Lines have bars of one standard error; a single line has lighter ones of one standard deviation, too. Open symbols
     are means of survivors, with an upright triangle at the lower bound of the whole mean where there is one. A red
     cross on the x axis, or a dot in a map, says that walks failed there; a ring in a map is a mean of survivors.
-    `blocks`: name of each → the statistics of its cells; the name of the quantity is for labels; all else is as of
-    `SweepResult.plot`. A `NothingToShow` says that no block has an axis of several values, or that there is no mean.
+    `blocks`: name of each → the statistics of its cells. The name of the quantity is for labels, the title says what
+    all walks have in common, the width of a new figure is in inches, and all else is as of `SweepResult.plot`. A
+    `NothingToShow` says that no block has an axis of several values, or that there is no mean.
     """
     if figure is not None:
         style.checked_figure(figure)
@@ -77,9 +83,11 @@ def draw_grid(
     are_lines = not any(panel.is_map for panel in panels)
     alike = len({panel[:3] for panel in panels}) == 1
     columns = len(panels) if len(panels) <= 3 else min(4, math.ceil(len(panels) ** 0.5))
-    width, height = _PANEL_SIZES[columns]
-    beside = 1.3 if any(panel.along for panel in panels) else 0.0
-    size = max(4.2, beside + width * columns), (0.3 if beside else 0.6) + height * -(-len(panels) // columns)
+    columns = style.columns_on(width, columns)
+    wide, height = _PANEL_SIZES[columns]
+    beside = 1.3 if any(panel.along for panel in panels) and (width is None or width >= 4) else 0.0
+    size = width or max(4.2, beside + wide * columns), 0.25 * bool(title) + (0.3 if beside else 0.6)
+    size = size[0], size[1] + height * min(1.0, size[0] / (beside + wide * columns)) * -(-len(panels) // columns)
     owner = style.InlineFigure(figsize=size, layout="constrained") if figure is None else figure
     areas, _ = panel_grid(owner, len(panels), columns, sharex=alike, sharey=alike or are_lines)
     palettes = _palettes(panels)
@@ -99,14 +107,15 @@ def draw_grid(
         if not (alike or are_lines) or axes in areas[::columns]:
             axes.set_ylabel(labels.quantity_label(panel.along.name) if panel.is_map and panel.along else label)
     if left_out:
-        owner.suptitle(f"{len(panels)} of {len(panels) + left_out} panels", fontsize="medium", color=RED)
+        title = ", ".join([*[title] * bool(title), f"{len(panels)} of {len(panels) + left_out} panels"])
+    title = style.head(owner, title, bool(beside))
     if maps:
         owner.colorbar(image, ax=maps, label=label).outline.set_visible(False)
     low = min((axes.dataLim.y0 for axes in lines), default=0.0)
     high = max((axes.dataLim.y1 for axes in lines), default=0.0)
-    if 0 <= low < 0.5 * high:
-        lines[0].set_ylim(0.0, 1.05 * high)
-    _draw_legends(owner, areas, panels, palettes)
+    for axes in lines if low >= 0 else ():  # as in the figure of the paper
+        axes.set_ylim(0.0, 1.05 * high)
+    _draw_legends(owner, areas, panels, palettes, bool(beside), title)
     return owner
 
 
@@ -195,13 +204,14 @@ def _draw_lines(axes: Axes, panel: Panel, palette: Mapping[Any, str]) -> None:
     colors = [palette[value] for value in panel.along.values] if panel.along else [BLUE]
     shifts = np.zeros(count) if is_numeric else (np.arange(count) - (count - 1) / 2) * 0.7 / count
     places = values if is_numeric else np.arange(len(values))
+    order = list(palette.values())
     for number, (shift, color) in enumerate(zip(shifts, colors, strict=True)):
         mean = cells.mean[number]
         if panel.along is None:
             axes.errorbar(places, mean, cells.sd[number], fmt="none", ecolor=(color, _LIGHT), elinewidth=8.0)
-        error, line = cells.standard_error[number], "o-" if is_numeric else "o"
-        look: dict[str, Any] = {"markersize": 3.5, "linewidth": 1.2, "color": color, "ecolor": (color, _DEEP)}
-        axes.errorbar(places + shift, mean, error, fmt=line, elinewidth=3.5, **look)
+        error, look = cells.standard_error[number], _look(order.index(color) if order else 0, len(order))
+        look |= {"color": color, "ecolor": (color, _DEEP)} | ({} if is_numeric else {"linestyle": ""})
+        axes.errorbar(places + shift, mean, error, elinewidth=3.5, **look)
         partial, bounds = cells.of_survivors[number], cells.at_least[number]
         style.mark_survivors(axes, places + shift, mean, partial, bounds, color)
     failed = np.flatnonzero(cells.failed.any(axis=0))
@@ -222,6 +232,12 @@ def _draw_lines(axes: Axes, panel: Panel, palette: Mapping[Any, str]) -> None:
             axes.set_xticks(values, texts)  # one for each number, if they are few and not too close
             axes.xaxis.set_minor_locator(NullLocator())
     tidy(axes, grid="y")
+
+
+def _look(number: int, count: int) -> dict[str, Any]:
+    """Symbol and line of a curve among some; of many, whose colours go from dark to light, all are alike."""
+    place = number if count <= MOST_LINES else 0
+    return {"marker": style.MARKERS[place], "linestyle": style.STROKES[place], "markersize": 3.5, "linewidth": 1.2}
 
 
 def _unevenness(places: AnyArray) -> float:
@@ -253,16 +269,21 @@ def _draw_map(axes: Axes, panel: Panel, limits: tuple[float, float]) -> Any:
 
 
 def _draw_legends(
-    owner: AnyFigure, areas: Sequence[Axes], panels: Sequence[Panel], palettes: Mapping[str, Mapping[Any, str]]
+    owner: AnyFigure,
+    areas: Sequence[Axes],
+    panels: Sequence[Panel],
+    palettes: Mapping[str, Mapping[Any, str]],
+    beside: bool,
+    head: str,
 ) -> None:
-    """One legend of all panels; if their lines are of several axes, each panel has one of its own, too."""
+    """One legend of all panels, with a text at its head; if lines are of several axes, each panel has one, too."""
     look: dict[str, Any] = {"frameon": False, "fontsize": "small"}
-    dot: dict[str, Any] = {"marker": "o", "markersize": 3.5}
     handles: list[Line2D | Patch] = []
     title = None
     for name, palette in palettes.items():
         texts = zip(palette.values(), short_texts(list(palette)), strict=True)
-        lines = [Line2D([], [], color=color, label=text, **dot) for color, text in texts]
+        looks = [_look(number, len(palette)) for number in range(len(palette))]
+        lines = [Line2D([], [], color=c, label=text, **own) for (c, text), own in zip(texts, looks, strict=True)]
         if len(palettes) == 1:
             handles, title = [*lines], with_unit(math_symbol(name), unit_text(name))
         for axes, panel in zip(areas, panels, strict=True):
@@ -284,7 +305,6 @@ def _draw_legends(
         any(panel.cells.of_survivors.any() for panel in panels),
         any(np.isfinite(panel.cells.at_least).any() for panel in panels if not panel.is_map),
     )
-    beside = any(panel.along for panel in panels if not panel.is_map)
     place: Any = {"loc": "outside right upper", "ncols": 1} if beside else {"loc": "outside upper right", "ncols": 2}
     if handles:
-        owner.legend(handles=handles, title=title, **look, **place)
+        owner.legend(handles=handles, title="\n".join(filter(None, (head, title))) or None, **style.LEGEND, **place)

@@ -1,14 +1,16 @@
 """Texts on figures and in tables: numbers, units, quantities, cells, walks excluded from means; titles."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.inputs.distributions import TABLE
 from warpchain.inputs.fields import FIELDS, SECTION_OF
-from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.parameters import PRESETS, Parameters
+from warpchain.inputs.scene import Scene
 from warpchain.inputs.validation import DIMENSIONLESS, field_unit, short
 from warpchain.walks.cell_statistics import CellStatistics
 from warpchain.walks.walk_numbers import WalkNumbers as Walk
@@ -74,7 +76,7 @@ def axis_symbol(name: str) -> str:
 def math_symbol(name: str) -> str:
     r"""The same for a figure: ``$μ_\mathrm{fc}$``."""
     if name not in Parameters.model_fields and name not in _SYMBOLS:
-        return axis_symbol(name)
+        return quantity_name(name)
     base, _, index = axis_symbol(name).partition("_")
     return f"${base}" + (f"_\\mathrm{{{index}}}$" if index else "$")
 
@@ -150,9 +152,37 @@ def lost_note(cells: Sequence[Mapping[str, Any]]) -> str:
     return ", ".join(f"{counts[name]} of {walks} {text}" for name, text in texts.items() if counts[name])
 
 
-def setting(walk: Walk) -> str:
-    """Links and frequency, as a title."""
-    return walk.setup.described.replace(" at ", ", ", 1)
+_SELDOM: Final = ("links", "frequency", "walk_limit", "hold_limit")
+"""Fields that titles say anyway, or that matter to no figure."""
+_MOST_DIFFERENCES: Final = 4
+
+
+def differences(values: Mapping[str, Any], preset: str | None, symbol: Callable[[str], str] = axis_symbol) -> list[str]:
+    """What of a scene and parameters differs from the defaults and from Table 1, such as ``μ_fc = 0.1``, ``slope 3°``.
+
+    A difference of a preset is its name. The symbols are for plain text, or those of `math_symbol`.
+    """
+    usual = vars(Scene()) | vars(PRESETS[preset or "paper"])
+    found = [f"preset {preset}"] * (preset not in (None, "paper"))
+    for name, value in values.items():
+        if name in _SELDOM or name not in usual or value == usual[name]:
+            continue
+        unit = unit_text(name) if unit_text(name) == "°" else f" {unit_text(name)}"
+        if isinstance(value, list | tuple | dict):
+            found.append("profile as floor" if name == "floor" else f"own {quantity_name(name)}")
+        elif name in Parameters.model_fields:
+            found.append(f"{symbol(name)} = {value_text(value)}{unit}".rstrip())
+        else:
+            found.append(f"{quantity_name(name)} {value_text(value)}{unit}".rstrip())
+    return found[:_MOST_DIFFERENCES] + ["…"] * (len(found) > _MOST_DIFFERENCES)
+
+
+def setting(walk: Walk, symbol: Callable[[str], str] = axis_symbol) -> str:
+    """Links, frequency, and what else differs from the defaults, as a title; symbols as of `differences`."""
+    setup, drawn = walk.setup, TABLE if walk.seed is not None else {}
+    values = {name: value for name, value in (vars(setup.scene) | vars(setup.parameters)).items() if name not in drawn}
+    texts = [setup.described.replace(" at ", ", ", 1), *differences(values, setup.preset, symbol)]
+    return ", ".join([*texts, "drawn values"] if drawn else texts)
 
 
 def headline(walk: Walk) -> str:

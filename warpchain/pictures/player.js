@@ -150,7 +150,14 @@ class Player {
     pen.fillStyle = colorOf("ink");
     pen.font = "13px system-ui, sans-serif";
     [pen.textAlign, pen.textBaseline] = ["center", "top"];
-    for (const mark of walk.marks) pen.fillText(mark + " m", shift + (mark * 1e4 - left) * scale, height - 18);
+    // As many labels as do not touch, legible where a slope or a stair passes below them.
+    const marks = walk.marks, every = Math.ceil(60 / ((marks[1] - marks[0]) * 1e4 * scale)) || 1;
+    [pen.lineWidth, pen.strokeStyle, pen.lineJoin] = [4, colorOf("ground"), "round"];
+    for (const mark of marks.filter((_, i) => i % every === 0)) {
+      const place = [mark + " m", shift + (mark * 1e4 - left) * scale, height - 18];
+      pen.strokeText(...place);
+      pen.fillText(...place);
+    }
     if (this.clock) this.clock.textContent = (walk.time[frame] / 1e6).toFixed(3) + " s";
     if (this.slider) this.slider.value = frame;
     this.shown(this.moment);

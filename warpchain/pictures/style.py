@@ -1,23 +1,26 @@
 """Style of all figures: colours, axes and resolution; captions; and figures in notebooks, without pyplot."""
 
 import base64
+import contextlib
 import html
 import io
 import os
-from collections.abc import Callable, Iterable
+import re
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any, Final, Literal, NamedTuple
+from typing import Annotated, Any, Final, Literal, NamedTuple
 
 import numpy as np
-from matplotlib import rc_context
+from matplotlib import rc_context, rcParams
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
+from pydantic import Field
 
 from warpchain.files import write_whole
-from warpchain.inputs.validation import InputError, shown
+from warpchain.inputs.validation import InputError, checked, shown
 
 AnyFigure = Figure | SubFigure
 LINE_COLORS: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -34,6 +37,9 @@ GROUND: Final = "#E3E3E3"
 DASHES: Final[Any] = (0, (4, 3))
 DOTS: Final[Any] = (0, (1, 1.5))
 """A dashed and a dotted line, as matplotlib takes them."""
+MARKERS: Final = "osD^vP*"
+STROKES: Final[Any] = ("-", DASHES, DOTS, (0, (6, 2, 1, 2)), (0, (2, 1)), (0, (8, 3)), (0, (6, 2, 1, 2, 1, 2)))
+"""Symbols and lines of several curves, which are told apart in grey print, too."""
 
 
 class NothingToShow(InputError):  # noqa: N818 - no error of the program: the sweep was made for something else
@@ -51,22 +57,89 @@ class Picture(NamedTuple):
     figure: Figure
     blocks: frozenset[str] = frozenset()
 
-    def save(self, folder: Path) -> Path:
-        """Write the figure into a folder as a PNG named after it, and return its path; errors as of `save_figure`."""
-        path = folder / f"{self.name}.png"
+    def save(self, folder: Path, suffix: str = "png") -> Path:
+        """Write the figure into a folder, in a file named after it; return its path. Errors as of `save_figure`."""
+        path = folder / f"{self.name}.{suffix}"
         save_figure(self.figure, path)
         return path
 
 
+FORMATS: Final = ("png", "pdf", "svg")
+"""Formats of files with figures."""
+_USUAL_WIDTH: Final = 7.0
+"""Width [inches] from which on texts have their own size."""
+NARROW: Final = 6.0
+"""Width [inches] below which parts of a figure stand below one another."""
+LEAST_TEXT: Final = 0.721
+"""Least size of texts, relative to their own: the smallest then have 6 pt."""
+_MM: Final = 1 / 25.4
+
+
+@contextlib.contextmanager
+def on_paper(width: float | None) -> Iterator[float | None]:
+    """Draw for paper so wide [mm], or as wide as suits a figure if that is None; yield the width in inches.
+
+    Texts of narrow figures are smaller, but have at least 6 pt. What is drawn must also be saved in this context.
+    """
+    wide: float | None = checked(width, "width", Annotated[float, Field(ge=40, le=1000)] | None, "mm")
+    inches = None if wide is None else wide * _MM
+    size = 10.0 if inches is None else 10.0 * min(1.0, max(LEAST_TEXT, inches / _USUAL_WIDTH))
+    fonts: Any = {"font.size": size, "pdf.fonttype": 42, "svg.hashsalt": "warpchain"}  # texts of a PDF can be edited
+    with rc_context(fonts):
+        yield inches
+
+
+def columns_on(width: float | None, most: int) -> int:
+    """Columns of panels on paper of some width [inches], at most so many."""
+    return most if width is None else max(1, min(most, int(width / (2.2 * text_scale()))))
+
+
+def wrapped(text: str, figure: AnyFigure, share: float = 0.95) -> str:
+    """A title in as many lines as it takes in a share of the width of a figure; words in $ count as two letters."""
+    letters = share * figure.bbox.width / figure.dpi / (0.085 * text_scale())
+    lines = [""]
+    for part in text.split(", "):
+        longer = f"{lines[-1]}, {part}".removeprefix(", ")
+        if lines[-1] and len(re.sub(r"\$[^$]*\$", "mm", longer)) > letters:
+            lines[-1] += ","
+            longer = part
+            lines.append("")
+        lines[-1] = longer
+    return "\n".join(lines)
+
+
+LEGEND: Final[Any] = {"frameon": False, "fontsize": "small", "title_fontsize": "small", "alignment": "left"}
+"""Look of a legend of a whole figure."""
+
+
+def head(figure: AnyFigure, text: str, is_alone: bool) -> str:
+    """Write a text above a figure, where a legend may stand beside it; or return it for the title of that legend."""
+    if not is_alone and figure.bbox.width / figure.dpi < NARROW:
+        return wrapped(text, figure)
+    figure.suptitle(wrapped(text, figure, 0.7 if is_alone else 0.38), fontsize="small", x=0.01, ha="left")
+    return ""
+
+
+def text_scale() -> float:
+    """Size of texts relative to their usual one, see `on_paper`."""
+    return float(rcParams["font.size"]) / 10.0
+
+
 def save_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
-    """Write a figure as a PNG, whole or not at all; an `OSError` if it cannot be written."""
-    write_whole(path, png(figure, dpi=200))
+    """Write a figure in the format of its suffix, whole or not at all; an `OSError` if it cannot be written."""
+    suffix = Path(path).suffix
+    if suffix == ".png":
+        return write_whole(path, png(figure, dpi=200 if figure.get_figwidth() > _USUAL_WIDTH else 300))
+    content = io.BytesIO()
+    undated: Any = {"CreationDate": None} if suffix == ".pdf" else {"Date": None}
+    figure.savefig(content, format=suffix[1:], metadata=undated)
+    write_whole(path, content.getvalue())
 
 
 def tidy(axes: Axes, *, grid: Literal["x", "y", "both"] | None = None) -> None:
     """Leave out the upper and right border; draw a faint grid across one axis or both."""
     axes.spines[["top", "right"]].set_visible(False)
-    axes.tick_params(color=FAINT)
+    axes.tick_params(color=FAINT, labelsize=rcParams["font.size"])
     if grid is not None:
         axes.grid(axis=grid, color="#E6E6E6", linewidth=0.6)
         axes.set_axisbelow(True)

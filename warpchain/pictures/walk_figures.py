@@ -1,20 +1,15 @@
 """Figures of a walk: film strip, height and speed, as in the paper's Figure 5, energies, loop, angles of a plane.
 
 Figures are made without pyplot: nothing is global, no display is needed, the caller owns what is returned.
-
-Sizes of a film strip on paper are in inches: constrained layout clips labels of axes with a fixed aspect. Its texts are
-plain: formulas would take a third of the time that this figure takes, and every walk has one.
 """
 
 from collections.abc import Callable, Mapping
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.patches import Circle
-from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
@@ -22,9 +17,9 @@ from warpchain.inputs.arrays import Array
 from warpchain.inputs.figure_kinds import KINDS, FigureWord
 from warpchain.inputs.validation import InputError, shown
 from warpchain.loop.stationary_loop import StationaryLoop
-from warpchain.pictures import chain
-from warpchain.pictures.labels import setting
-from warpchain.pictures.places import center_in_room, checked_joints, circle_radii, stretches, walk_box
+from warpchain.pictures.film_strip import film_strip
+from warpchain.pictures.labels import math_symbol, setting
+from warpchain.pictures.places import stretches
 from warpchain.pictures.style import (
     BLUE,
     DASHES,
@@ -33,37 +28,27 @@ from warpchain.pictures.style import (
     GREEN,
     GROUND,
     INK,
+    NARROW,
     RED,
+    STROKES,
     InlineFigure,
     checked_figure,
     tidy,
+    wrapped,
 )
-from warpchain.status import Status
 from warpchain.walks.walk_numbers import WalkNumbers as Walk
 
 FALLEN: Final = 45.0
 """Tilt beyond which a chain has fallen over [degrees]."""
 SIMULATED: Final[dict[str, Any]] = {"color": BLUE, "linewidth": 2.2}
-BOTTOM: Final = 0.25
-"""The curvature is shown this far [m] from the lowest point, or as far as the loop is free."""
 IN_LINKS: Final = 2.0
 """The tension is shown this many links away from the sprocket: averages near it include links that touch it."""
-_WIDTH: Final = 10.0
-_HIGHEST: Final = 4.6
-_DEEPEST: Final = 8.0
-"""Width of the paper, greatest height of the side view, and of it and the view from above together."""
-_LEFT, _RIGHT, _TOP, _BELOW, _FOOT = 0.9, 0.25, 0.6, 0.85, 0.1
-"""Room for labels: beside the views, for legend and titles above them, below each row, at the foot."""
-_CLOCK: Final = 0.2
-"""Room for the times above the chains."""
-_FLOOR: Final = 0.4
-"""Height of the floor in the side view."""
-_CLOSE_UP_LINKS, _CLOSE_UP_ASPECT = 9, 1.5
-"""Width of a close-up [links], and its width over its height."""
 
 
-def draw(walk: Walk, kind: FigureWord, *, figure: Figure | None = None, ax: Axes | None = None) -> Figure:
-    """Draw a walk; arguments and errors as of `WalkResult.plot`."""
+def draw(
+    walk: Walk, kind: FigureWord, *, figure: Figure | None = None, ax: Axes | None = None, width: float | None = None
+) -> Figure:
+    """Draw a walk; arguments and errors as of `WalkResult.plot`, but for the width of a new figure [inches]."""
     if kind not in KINDS:
         raise ValueError(f"kind: unknown kind {kind!r}; use {', '.join(map(repr, KINDS))}")
     if KINDS[kind].needs_series and len(walk.time) == 0:
@@ -80,9 +65,9 @@ def draw(walk: Walk, kind: FigureWord, *, figure: Figure | None = None, ax: Axes
         _ON_AXES[kind](walk, ax)
         return ax.figure.figure if isinstance(ax.figure, SubFigure) else ax.figure
     if kind == "film_strip":
-        return film_strip(walk, figure)
+        return film_strip(walk, figure, width)
     draw_into, size = _DRAWN_BY[kind]
-    figure = InlineFigure(figsize=size, layout="constrained") if figure is None else figure
+    figure = size.paper(width) if figure is None else figure
     draw_into(walk, figure)
     return figure
 
@@ -90,6 +75,21 @@ def draw(walk: Walk, kind: FigureWord, *, figure: Figure | None = None, ax: Axes
 def kinds_of(walk: Walk) -> tuple[FigureWord, ...]:
     """The figures that a walk has, if it was recorded."""
     return tuple(word for word, kind in KINDS.items() if not kind.needs_tilt or walk.joints_lab is not None)
+
+
+class _Size(NamedTuple):
+    """Width and height of a figure [inches], and its height before it is scaled to narrow paper."""
+
+    width: float
+    height: float
+    narrow_height: float
+
+    def paper(self, width: float | None) -> Figure:
+        """A new figure of this size, or of a given width [inches] and a height that suits it."""
+        if width is None:
+            return InlineFigure(figsize=(self.width, self.height), layout="constrained")
+        height = self.narrow_height if width < NARROW else self.height
+        return InlineFigure((width, height * max(0.62, min(1.2, width / self.width))), layout="constrained")
 
 
 def _height_and_speed(walk: Walk, figure: Figure) -> None:
@@ -122,13 +122,13 @@ def _energy(walk: Walk, ax: Axes) -> None:
     which counts each cause by itself: it lies on the line if the integration conserved energy.
     """
     released, whole = walk.energy_at_release, walk.kinetic_energy + walk.gravitational_energy + walk.spring_energy
-    for name, values, color in (
-        ("kinetic", walk.kinetic_energy, BLUE),
-        ("gravitational", walk.gravitational_energy, GREEN),
-        ("joint springs", walk.spring_energy, RED),
-        ("lost since the release", released - whole, INK),
+    for name, values, color, line in (
+        ("kinetic", walk.kinetic_energy, BLUE, "-"),
+        ("gravitational", walk.gravitational_energy, GREEN, STROKES[3]),
+        ("joint springs", walk.spring_energy, RED, DOTS),
+        ("lost since the release", released - whole, INK, DASHES),
     ):
-        ax.plot(walk.time, values, label=name, color=color, linewidth=1.4, linestyle=DASHES if color == INK else "-")
+        ax.plot(walk.time, values, label=name, color=color, linewidth=1.4, linestyle=line)
     lost = released - walk.energy_at_end - walk.energy["residual"]
     ax.plot(walk.time[-1:], [lost], "o", color=INK, clip_on=False, label="sum of all losses", zorder=4)
     ax.set_ylabel("energy / J")
@@ -148,7 +148,7 @@ def _tilt(walk: Walk, figure: Figure) -> None:
     for limit in (-FALLEN, FALLEN):
         angles.axhline(limit, color=FAINT, linewidth=0.8, linestyle=DOTS)
     angles.plot(walk.time, np.degrees(walk.tilt), color=BLUE, linewidth=1.4, label="tilt, to the left")
-    angles.plot(walk.time, np.degrees(walk.yaw), color=GREEN, linewidth=1.4, label="yaw, to the left")
+    angles.plot(walk.time, np.degrees(walk.yaw), color=GREEN, linewidth=1.4, label="yaw, to the left", linestyle=DASHES)
     drift.plot(walk.time, walk.center_z, color=INK, linewidth=1.4)
     events = ((walk.fell_at, "fell over (45°)", "-"), (walk.collapsed_at, "loop collapsed", DASHES))
     for axes in (angles, drift):
@@ -168,7 +168,8 @@ def _finish(walk: Walk, *panels: Axes) -> None:
     """Title, grids, and the common axis of time up to the end of the walk."""
     for axes in panels:
         tidy(axes, grid="both")
-    panels[0].set_title(setting(walk), fontsize="medium", loc="left")
+    title = wrapped(setting(walk, math_symbol), panels[0].figure, 0.8)
+    panels[0].set_title(title, fontsize="medium", loc="left")
     panels[-1].set(xlabel="time since release $t$ / s", xlim=(0.0, float(walk.time[-1]) or None))
 
 
@@ -179,9 +180,13 @@ def _loop(walk: Walk, figure: Figure) -> None:
     """
     loop = walk.mean_loop()
     kink = loop.kink()
-    width, height = np.ptp(loop.position, axis=0)
-    share = float(np.clip(0.56 * (width + 0.08) / (height + 0.08), 0.23, 0.42))
-    left, right = np.asarray(figure.subfigures(1, 2, width_ratios=[share, 1 - share]))
+    broad, high = np.ptp(loop.position, axis=0)
+    share = float(np.clip(0.56 * (broad + 0.08) / (high + 0.08), 0.23, 0.42))
+    figure.suptitle(wrapped(setting(walk, math_symbol), figure), fontsize="medium", x=0.01, ha="left")
+    if figure.get_figwidth() < NARROW:
+        left, right = np.asarray(figure.subfigures(2, 1, height_ratios=[2, 3]))
+    else:
+        left, right = np.asarray(figure.subfigures(1, 2, width_ratios=[share, 1 - share]))
     shape = left.subplots()
     bend, pull = right.subplots(2, 1)
 
@@ -189,13 +194,16 @@ def _loop(walk: Walk, figure: Figure) -> None:
     x, y = (float(np.interp(kink.dip_at, loop.s, values)) for values in (loop.position - loop.center).T)
     _mark(shape, x, y, "kink")
     spread = 1e3 * float(loop.spread[loop.is_free].max())
-    shape.set_title(f"{setting(walk)}\njoints within {spread:.2g} mm (s.d.)", fontsize="small", loc="left")
+    shape.set_title(f"blue band: joints\n± {spread:.2g} mm (s.d.)", fontsize="small", loc="left")
     tidy(shape)
+    if figure.get_figwidth() < NARROW:
+        shape.set_xticks([0.0])
 
-    reach = 1.6 * max(BOTTOM, abs(kink.dip_at))
-    low, high = max(-reach, loop.free[0] - 0.03), min(reach, loop.free[1] + 0.03)
+    low, high = loop.free[0] - 0.03, loop.free[1] + 0.03
     _draw_line(bend, loop.curvature, loop, (loop.s >= low) & (loop.s <= high))
-    _mark(bend, kink.dip_at, kink.dip, f"kink: ${kink.dip:.1f}$ m$^{{-1}}$ at ${100 * kink.dip_at:.1f}$ cm")
+    _mark(bend, kink.dip_at, kink.dip, "kink")
+    at_kink = f"kink: ${kink.dip:.1f}$ m$^{{-1}}$ at ${100 * kink.dip_at:.1f}$ cm"
+    bend.set_title(f"grey: on the sprocket; {at_kink}", fontsize="small", loc="left")
     bend.set(xlim=(low, high), ylabel="curvature $\\kappa$ / m$^{-1}$")
 
     inset = IN_LINKS * loop.parameters.link_length
@@ -203,8 +211,8 @@ def _loop(walk: Walk, figure: Figure) -> None:
     _draw_line(pull, loop.effective_tension, loop, inside)
     carried = loop.density * loop.speed**2
     pull.set_title(f"$\\rho v^2$ = {carried:.2f} N", fontsize="small", loc="left")
-    pull.set(xlim=(loop.free[0] - 0.03, loop.free[1] + 0.03), ylabel="tension $T - \\rho v^2$ / N")
-    pull.set_xlabel("arc length $s$ from the lowest point, along the motion / m")
+    pull.set(xlim=(low, high), ylabel="tension $T - \\rho v^2$ / N")
+    pull.set_xlabel("arc length $s$ from the lowest point / m")
     pull.set_ylim(bottom=min(0.0, 1.1 * float(loop.effective_tension[inside].min())))
 
 
@@ -242,172 +250,12 @@ def _mark(axes: Axes, x: float, y: float, text: str) -> None:
     axes.annotate(text, (x, y), (8, -4), textcoords="offset points", va="top", color=INK, fontsize="small")
 
 
-def film_strip(walk: Walk, figure: Figure | None = None) -> Figure:
-    """The chain along a walk with frames, drawn to scale, and close-ups of up to four moments.
-
-    In the strip the centre of mass moves equally far from each instant to the next. Above each chain stands its time;
-    outer links are darker than inner ones. The close-ups show the first touch of the floor, the first self-contact, the
-    collapse and the end, if they happen. A sprocket that moves after the release is a circle in the chain's colour;
-    stretches of the floor with coefficients of their own are thick and have labels. A chain whose plane tilts is seen
-    from above instead, to the same scale: z grows downwards. A figure to draw into is empty; by default a new one suits
-    the walk. A `ValueError` says that the walk has no frames or broken ones.
-    """
-    joints = checked_joints(walk)
-    tilts = walk.joints_lab is not None
-    low, high = walk_box(walk, joints)
-    moments = [] if tilts else _moments(walk)
-    size = high - low
-    broad = max(size[2], 0.15 * size[0]) if tilts else 0.0
-    across = _WIDTH - _LEFT - _RIGHT
-    scale = min(across / size[0], _HIGHEST / size[1], (_DEEPEST - _FLOOR) / (size[1] + broad))
-    close_up_width = min((across + 0.1) / max(1, len(moments)), _WIDTH / 3)
-    lower = 0.5 + (scale * broad if tilts else (close_up_width - 0.1) / _CLOSE_UP_ASPECT)
-    width, height, depth, top = scale * size[0], scale * size[1] + _FLOOR + _CLOCK, _FLOOR / scale, _CLOCK / scale
-    paper = np.array([_WIDTH, _TOP + height + _BELOW + lower + _FOOT])
-    figure = InlineFigure(tuple(paper)) if figure is None else figure
-
-    def panel(left: float, bottom: float, width: float, height: float) -> Axes:
-        return figure.add_axes((left / paper[0], bottom / paper[1], width / paper[0], height / paper[1]))
-
-    left = _LEFT + (across - width) / 2
-    bottom = _FOOT + lower + _BELOW
-    side = panel(left, bottom, width, height)
-    side.set(xlim=(low[0], high[0]), ylim=(low[1] - depth, high[1] + top), xlabel="x / m", ylabel="y / m")
-    views = [(setting(walk), side, chain.SIDE)]
-    chain.draw_ground(side, walk, walk.setup.floor.line(low[0], high[0]), low[1] - depth)
-    _draw_distance(side, walk, low[1], 0.5 * depth)
-    if tilts:
-        z = (low[2] + high[2]) / 2 + np.array([0.5, -0.5]) * broad
-        above = panel(left, _FOOT + 0.5, width, scale * broad)
-        above.set(xlim=(low[0], high[0]), ylim=z, xlabel="x / m", ylabel="z / m", facecolor=GROUND)
-        above.yaxis.set_major_locator(MaxNLocator(5))
-        views.append(("from above", above, chain.ABOVE))
-    # viridis without its palest end, which can hardly be seen on white paper
-    colors = colormaps["viridis"](0.9 * walk.frame_time / (walk.frame_time[-1] or 1.0))[:, :3]
-    center = center_in_room(walk)
-    path = np.stack([np.interp(walk.frame_time, walk.time, row) for row in center.T], axis=1)
-    radius = circle_radii(walk)
-    shown = _instants(path, float(np.ptp(joints[0, :, 0])))
-    for title, axes, view in views:
-        for frame in shown:
-            chain.draw_chain(axes, joints[frame], radius, view, _link_colors(colors[frame]), edge=0.25)
-            chain.draw_sprocket(axes, walk, walk.frame_time[frame], facecolor="none", edgecolor=colors[frame])
-        chain.draw_release(axes, walk, view)
-        axes.plot(*(view @ center.T)[:2], color=INK, linewidth=1.4, linestyle=DOTS, label="centre of mass", zorder=4)
-        tidy(axes)
-        axes.set_title(title, fontsize="medium", loc="left")
-    for number, (frame, title, spot) in enumerate(moments):
-        axes = panel(_LEFT + number * close_up_width, _FOOT + 0.5, close_up_width - 0.1, lower - 0.5)
-        half = 0.5 * _CLOSE_UP_LINKS * walk.setup.parameters.link_length
-        line = walk.setup.floor.line(spot[0] - half, spot[0] + half)
-        half_height = half / _CLOSE_UP_ASPECT
-        bottom = max(spot[1] - half_height, line[:, 1].min() - 0.2 * half_height)
-        chain.draw_chain(axes, joints[frame], radius, chain.SIDE, _link_colors(colors[frame]), edge=0.6)
-        chain.draw_sprocket(axes, walk, walk.frame_time[frame], facecolor="none", edgecolor=colors[frame])
-        chain.draw_ground(axes, walk, line, min(bottom, line[:, 1].min()))
-        axes.set(xlim=line[[0, -1], 0], ylim=(bottom, bottom + 2 * half_height), yticks=[], xlabel="x / m")
-        axes.set_xticks([x for x in MaxNLocator(4).tick_values(*line[[0, -1], 0]) if abs(x - spot[0]) < 0.8 * half])
-        axes.set_title(f"{title}, {walk.frame_time[frame]:.3f} s", fontsize="medium", loc="left")
-    _write_times(side, walk.frame_time[shown], joints[shown, :, :2], colors[shown], 1.2 * radius.max(), 1 / scale)
-    style: dict[str, Any] = {"frameon": False, "ncols": 2, "borderaxespad": 0.0, "fontsize": "small"}
-    place = (1 - _RIGHT / paper[0], 1 - 0.08 / paper[1])
-    figure.legend(*side.get_legend_handles_labels(), loc="upper right", bbox_to_anchor=place, **style)
-    return figure
-
-
-def _link_colors(color: Array) -> tuple[Array, Array, Array]:
-    """Colours of inner links, of outer links and of edges, shape (3,) each."""
-    return 1 - 0.45 * (1 - color), color, 0.6 * color
-
-
-def _instants(path: Array, width: float) -> list[int]:
-    """6 to 12 frames between which the centre of mass moves equally far along its path, the first and last among them.
-
-    They are as many as stay legible with chains of this width [m] in the first frame.
-    """
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-    marks = np.linspace(0.0, way[-1], int(np.clip(1 + way[-1] / (0.6 * width), 6, 12)))[1:-1]
-    return sorted({0, *(int(np.argmin(np.abs(way - mark))) for mark in marks), len(way) - 1})
-
-
-def _write_times(axes: Axes, times: Array, joints: Array, colors: Array, gap: float, inch: float) -> None:
-    """Write times [s] above the highest joints of k chains, (k, n, 2), by a gap [m], higher where texts would touch."""
-    taken = np.array([text.get_position() for text in axes.texts]).reshape(-1, 2)
-    for moment, its_joints, color in zip(times, joints, colors, strict=True):
-        place = its_joints[np.argmax(its_joints[:, 1])] + (0.0, gap)
-        while np.any(np.all(np.abs(taken - place) < np.array([0.38, 0.13]) * inch, axis=1)):
-            place[1] += 0.02 * inch
-        taken = np.append(taken, [place], axis=0)
-        halo = [withStroke(linewidth=2.5, foreground="white")]
-        style: dict[str, Any] = {"color": 0.7 * color, "fontsize": "small", "path_effects": halo}
-        axes.text(place[0], place[1], f"{moment:.2f} s", ha="center", va="bottom", zorder=6, **style)
-
-
-def _draw_distance(axes: Axes, walk: Walk, low: float, depth: float) -> None:
-    """The distance walked, if there is one, so far [m] below a slope, or below the lowest place of another floor."""
-    if not np.isfinite(walk.dx):
-        return
-    slope = walk.setup.scene.slope
-    x = walk.center[-1, 0] - np.array([walk.dx * np.cos(np.radians(slope)), 0.0])
-    floor = walk.setup.floor.heights(x)
-    y = (floor if slope != 0 else low) - depth + 0 * x
-    arrow = {"arrowstyle": "<|-|>", "color": INK, "shrinkA": 0, "shrinkB": 0}
-    axes.annotate("", (x[1], y[1]), (x[0], y[0]), arrowprops=arrow, zorder=4)
-    axes.plot([x, x], [floor, y - 0.6 * depth], color=INK, linewidth=0.8, zorder=4)
-    box = {"facecolor": GROUND, "edgecolor": "none", "pad": 2.0}
-    text = f"Δx = {'x / cos α = ' * (slope != 0)}{walk.dx:.3f} m"
-    axes.text(x.mean(), y.mean(), text, rotation=-slope, ha="center", va="center", bbox=box, zorder=6)
-
-
-def _moments(walk: Walk) -> list[tuple[int, str, Array]]:
-    """At most four frames in order of time, no frame twice, with what happens there and where, (2,)."""
-    joints, radius = walk.frame_joints, circle_radii(walk).max()
-    above = walk.setup.floor.distances(joints.reshape(-1, 2)).reshape(joints.shape[:-1])
-    last = len(joints) - 1
-    found: dict[int, tuple[str, Array]] = {}
-    touching = np.flatnonzero(above.min(axis=1) < 1.02 * radius)
-    if touching.size:
-        frame = int(touching[0])
-        found[frame] = "first touch", joints[frame, np.argmin(above[frame])]
-    for title, moment, spot_of in (
-        ("first self-contact", walk.self_contact_at, _meeting),
-        ("collapse", walk.collapsed_at, _sharpest_bend),
-    ):
-        if not np.isnan(moment):
-            frame = min(int(np.searchsorted(walk.frame_time, moment)), last)
-            found[frame] = title, spot_of(joints[frame])
-    middle = np.median(joints[last, :, 0])
-    spot = np.array([middle, walk.setup.floor.heights(middle)])
-    half = _CLOSE_UP_LINKS * walk.setup.parameters.link_length / 2
-    if (np.abs(joints[last] - spot) < half).all(axis=1).sum() < _CLOSE_UP_LINKS / 2:  # it is in the air, or in a pit
-        spot = joints[last, np.argmin(above[last])]
-    found[last] = "rest" if walk.status is Status.AT_REST else "end", spot
-    return [(frame, *found[frame]) for frame in sorted(found)]
-
-
-def _meeting(joints: Array) -> Array:
-    """Where two joints at least 3 links apart are closest, (2,)."""
-    count = len(joints)
-    apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
-    distances = np.linalg.norm(joints[:, None] - joints, axis=-1)
-    distances[np.minimum(apart, count - apart) < 3] = np.inf
-    return np.asarray(joints[[*np.unravel_index(np.argmin(distances), distances.shape)]].mean(axis=0))
-
-
-def _sharpest_bend(joints: Array) -> Array:
-    """The joint at which the chain turns most over three links, (2,)."""
-    step = joints - np.roll(joints, 1, axis=0)
-    direction = np.arctan2(step[:, 1], step[:, 0])
-    turn = np.angle(np.exp(1j * (np.roll(direction, -2) - np.roll(direction, 1))))
-    return np.asarray(joints[np.argmax(np.abs(turn))])
-
-
-_DRAWN_BY: Final[Mapping[str, tuple[Callable[[Walk, Figure], None], tuple[float, float]]]] = {
-    "height_and_speed": (_height_and_speed, (6.4, 5.0)),
-    "loop": (_loop, (10.0, 6.4)),
-    "energy": (lambda walk, figure: _energy(walk, figure.subplots()), (6.4, 4.0)),
-    "tilt": (_tilt, (6.4, 5.0)),
+_DRAWN_BY: Final[Mapping[str, tuple[Callable[[Walk, Figure], None], _Size]]] = {
+    "height_and_speed": (_height_and_speed, _Size(6.4, 5.0, 5.0)),
+    "loop": (_loop, _Size(10.0, 6.4, 8.0)),
+    "energy": (lambda walk, figure: _energy(walk, figure.subplots()), _Size(6.4, 4.0, 4.0)),
+    "tilt": (_tilt, _Size(6.4, 5.0, 5.0)),
 }
-"""Each figure of `KINDS` but the film strip, which has a size of its own: what draws it, and its size [inches]."""
+"""Each figure of `KINDS` but the film strip, which has a size of its own: what draws it, and its size."""
 _ON_AXES: Final = {"energy": _energy}
 """Those with one pair of axes draw into given ones, too."""

@@ -24,14 +24,18 @@ from warpchain.pictures.style import (
     FAINT,
     GREEN,
     INK,
+    LEGEND,
     LINE_COLORS,
     RED,
     InlineFigure,
     NothingToShow,
     Picture,
+    columns_on,
+    head,
     mark_survivors,
     panel_grid,
     survivor_handles,
+    text_scale,
     tidy,
 )
 from warpchain.results.block_result import BlockResult
@@ -45,8 +49,8 @@ _OTHERS: Final = (*zip((BLUE, *LINE_COLORS[3:6]), "^vP*", strict=True), *[(INK, 
 """Colour and marker of further blocks of the same start."""
 
 
-def figures(result: SweepResult, quantity: str = "dx") -> Iterator[Picture]:
-    """Every figure that the sweep has the walks for, the paper's Figure 6 first.
+def figures(result: SweepResult, quantity: str = "dx", width: float | None = None) -> Iterator[Picture]:
+    """Every figure that the sweep has the walks for, the paper's Figure 6 first; of a width [inches] if that is given.
 
     What no special figure shows has one of its grid: one for all blocks that vary one quantity, and one for each set of
     several axes. A column other than ``dx`` has just these; an `InputError` says that there is none of that name.
@@ -54,7 +58,7 @@ def figures(result: SweepResult, quantity: str = "dx") -> Iterator[Picture]:
     statistics, shown = result.cell_statistics(quantity), set[str]()
     for draw in SWEEP_FIGURES if quantity == "dx" else ():
         with suppress(NothingToShow):
-            picture = draw(result)
+            picture = draw(result, width)
             shown |= picture.blocks
             yield picture
     groups: dict[frozenset[str], list[str]] = {}
@@ -64,7 +68,9 @@ def figures(result: SweepResult, quantity: str = "dx") -> Iterator[Picture]:
             groups.setdefault(frozenset(varied if len(varied) > 1 else ()), []).append(name)
     for names in groups.values():
         with suppress(NothingToShow):
-            figure = draw_grid({name: statistics[name] for name in names}, quantity_of(quantity))
+            cells = {name: result.blocks[name].named_sets(statistics[name]) for name in names}
+            title = result.setting(names)
+            figure = draw_grid(cells, quantity_of(quantity), title=title, width=width)
             assert isinstance(figure, Figure)
             axes = list(dict.fromkeys(axis for name in names for axis in _varied(result.blocks[name])))
             over, words = f"against_{'_and_'.join(axes)}", " and ".join(map(quantity_name, axes))
@@ -86,7 +92,7 @@ def _is_series(block: BlockResult) -> bool:
     return few and set(_varied(block)) <= {"links", "frequency", "start"} and "frequency" not in block.drawn
 
 
-def figure6(result: SweepResult) -> Picture:
+def figure6(result: SweepResult, width: float | None = None) -> Picture:
     """Distance walked against frequency with a panel for each number of links, as in Figure 6.
 
     A dot is the mean, a box the range of one standard deviation, a bar the range of two. Walks that start at rest are
@@ -119,8 +125,8 @@ def figure6(result: SweepResult) -> Picture:
             "Figure 6 needs walks at rest over links and frequency; use such a block, or finish the sweep"
         )
     gap = float(np.diff(frequencies).min()) if len(frequencies) > 1 else 1.0
-    columns = {1: 1, 2: 2, 4: 2}.get(len(cells), 3)
-    size = max(4.2, 3.1 * columns), 1.0 + 2.6 * -(-len(cells) // columns)
+    columns = columns_on(width, {1: 1, 2: 2, 4: 2}.get(len(cells), 3))
+    size = width or max(4.2, 3.1 * columns), 1.25 + 2.6 * text_scale() * -(-len(cells) // columns)
     figure = InlineFigure(figsize=size, layout="constrained")
     used, empty = panel_grid(figure, len(cells), columns, sharex=True)
     for (links, series), axes in zip(sorted(cells.items()), used, strict=True):
@@ -128,10 +134,10 @@ def figure6(result: SweepResult) -> Picture:
             # Boxes of several series stand side by side about their frequency.
             frequency, mean, sd, partial, at_least = np.array(each).T
             x = frequency + gap * (number - (len(series) - 1) / 2) * 0.7 / len(series)
-            color, width = looks[label]["color"], gap * min(0.36, 0.6 / len(series))
+            color, box = looks[label]["color"], gap * min(0.36, 0.6 / len(series))
             axes.vlines(x, mean - 2 * sd, mean + 2 * sd, color=color, linewidth=1.2)
-            axes.bar(x, 2 * sd, width, mean - sd, color="white", zorder=2.1)
-            axes.bar(x, 2 * sd, width, mean - sd, facecolor=(color, 0.2), edgecolor=color, zorder=2.2)
+            axes.bar(x, 2 * sd, box, mean - sd, color="white", zorder=2.1)
+            axes.bar(x, 2 * sd, box, mean - sd, facecolor=(color, 0.2), edgecolor=color, zorder=2.2)
             axes.plot(x, mean, linestyle="", markersize=4.5, zorder=3, **looks[label])
             mark_survivors(axes, x, mean, partial > 0, at_least, color)
         axes.set_title(f"$n$ = {links}", fontsize="medium", loc="left")
@@ -141,6 +147,7 @@ def figure6(result: SweepResult) -> Picture:
         used[0].set_xticks(frequencies, [f"{frequency:g}" for frequency in frequencies])
     used[0].set_xlim(frequencies[0] - 0.6 * gap, frequencies[-1] + 0.6 * gap)
     used[0].set_ylim(bottom=min(0.0, 1.05 * float(np.nanmin(rows[:, 1] - 2 * np.nan_to_num(rows[:, 2])))))
+    title = head(figure, result.setting([*result.blocks]), bool(empty))
     figure.supxlabel(labels.quantity_label("frequency"), fontsize="medium")
     figure.supylabel(f"{quantity_text('dx')} / m", fontsize="medium")
     handles: list[Any] = [Line2D([], [], linestyle="", label=label, **look) for label, look in looks.items()]
@@ -152,8 +159,8 @@ def figure6(result: SweepResult) -> Picture:
     if empty:
         empty[-1].legend(handles=handles, loc="center", frameon=False)
     else:
-        columns = 2 if figure.get_figwidth() < 8 else 4
-        figure.legend(handles=handles, loc="outside upper center", ncols=columns, frameon=False, fontsize="small")
+        columns = columns_on(width, 2)
+        figure.legend(handles=handles, loc="outside upper right", ncols=columns, title=title, **LEGEND)
     caption = "Distance walked against the frequency of the sprocket, as in the paper's Figure 6: mean, box of one and "
     blocks = {each.name for each in result.blocks.values() if _is_series(each) and "frequency" in _varied(each)}
     return Picture("distance", caption + "bar of two standard deviations.", figure, frozenset(blocks))
@@ -224,7 +231,7 @@ def _half_interval(samples: Array, groups: AnyArray) -> Array:
     return np.asarray(stdtrit(count - 1, 0.5 * (1 + CONFIDENCE)) * error)
 
 
-def sensitivity(result: SweepResult) -> Picture:
+def sensitivity(result: SweepResult, width: float | None = None) -> Picture:
     """Sobol' indices of the distance with a panel for each cell; errors as of `sensitivities`.
 
     All panels have the quantities in the same order, by the mean of their total indices, the greatest at the top.
@@ -235,8 +242,8 @@ def sensitivity(result: SweepResult) -> Picture:
         for name, total in zip(cell.names, cell.indices[1].tolist(), strict=True):
             totals.setdefault(name, []).append(total)
     names = sorted(totals, key=lambda name: -float(np.mean(totals[name])))
-    columns = min(len(cells), 3)
-    size = max(4.2, 2.4 + 3.2 * columns), 0.9 + (0.6 + 0.36 * len(names)) * -(-len(cells) // columns)
+    columns = columns_on(width, min(len(cells), 3))
+    size = width or max(4.2, 2.4 + 3.2 * columns), 0.9 + (0.6 + 0.36 * len(names)) * -(-len(cells) // columns)
     figure = InlineFigure(figsize=size, layout="constrained")
     used, _ = panel_grid(figure, len(cells), columns, sharex=True)
     for axes, cell in zip(used, cells, strict=True):
@@ -266,5 +273,5 @@ def sensitivity(result: SweepResult) -> Picture:
     return Picture("sensitivity", caption, figure)
 
 
-SWEEP_FIGURES: Final[tuple[Callable[[SweepResult], Picture], ...]] = (figure6, sensitivity)
+SWEEP_FIGURES: Final[tuple[Callable[[SweepResult, float | None], Picture], ...]] = (figure6, sensitivity)
 """Figures of the distance walked beside those of the grid: each draws what it can, or raises `NothingToShow`."""

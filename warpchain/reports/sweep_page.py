@@ -27,6 +27,7 @@ from warpchain.results.block_result import BlockResult
 from warpchain.results.sweep_result import SweepResult, load
 from warpchain.results.walk_result import WalkResult
 from warpchain.status import Status
+from warpchain.store.crate import runs
 from warpchain.version import VERSION
 from warpchain.walks.landmarks import FAULTS
 
@@ -68,6 +69,9 @@ def write_report(folder: AnyPath, path: AnyPath, *, animation_of: int | None = N
     resolved = yaml.safe_dump(result.sweep, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
     note = "Values are in SI units; gaussian and uniform are what samples draw. <code>warpchain parameters</code> "
     origin = [[name, f"{value}"] for name, value in result.notes().items() if name != "sweep"]
+    for number, run in enumerate(runs(folder) if Path(folder).is_dir() else (), 1):
+        times = f"{run.get('startTime')} to {run.get('endTime', 'an unknown end')}"
+        origin.append([f"run {number}", f"{run.get('name')}; {times}; {run.get('description')}"])
     again = "<p>With the text under Sweep in a file: <code>warpchain sweep FILE.yaml -o DIR</code></p>"
     sections = {
         "Figures": "\n".join(_picture(each.figure, each.caption) for each in figures(result)),
@@ -190,7 +194,10 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[str]], *, right: bool = 
     """A table of texts in HTML, to the right or left; without a head if that is empty; bad rows stand out."""
 
     def cells(tag: str, texts: Sequence[str]) -> str:
-        return "".join(f'<{tag} style="text-align:{side}">{escape(text)}</{tag}>' for text in texts)
+        return "".join(
+            f'<{tag}{" class=failed" * (name == "failed")} style="text-align:{side}">{escape(text)}</{tag}>'
+            for name, text in zip(head, texts, strict=True)
+        )
 
     side = "right" if right else "left"
     top = f"<thead><tr>{cells('th', head)}</tr></thead>" if any(head) else ""

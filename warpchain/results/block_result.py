@@ -3,7 +3,7 @@
 import math
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
@@ -31,6 +31,10 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
+    from warpchain.typed import Columns
+else:
+    Columns = object
+
 RANDOMISATION: Final = "randomisation"
 _NUMBERED: Final = {
     "sample": "number of the sample in its cell",
@@ -39,12 +43,14 @@ _NUMBERED: Final = {
 }
 """Coordinates that number something → their meaning."""
 
+_MOST_NAMED: Final = 3
+"""Most quantities of a parameter set that its name has."""
 _Variables = dict[str, tuple[tuple[str, ...], AnyArray, dict[str, Any]]]
 """Name → axes, values and attributes, as xarray takes them."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class BlockResult:
+class BlockResult(Columns):
     """Results of one block of a sweep, as arrays of shape `shape` with the axes `dims`.
 
     Every column is an attribute, e.g. `block.dx` and `block.status`. Columns are those of
@@ -86,12 +92,14 @@ class BlockResult:
         """Number of values of each axis, then the number of samples."""
         return self.columns["index"].shape
 
-    def __getattr__(self, name: str) -> AnyArray:
-        """A column."""
-        columns: dict[str, AnyArray] = self.__dict__.get("columns", {})
-        if name not in columns:
-            raise AttributeError(f"{name}: unknown column; use one of {', '.join(columns)}", name=name, obj=self)
-        return columns[name]
+    if not TYPE_CHECKING:  # a type checker knows the columns, and what is none
+
+        def __getattr__(self, name: str) -> AnyArray:
+            """A column."""
+            columns = self.__dict__.get("columns", {})
+            if name not in columns:
+                raise AttributeError(f"{name}: unknown column; use one of {', '.join(columns)}", name=name, obj=self)
+            return columns[name]
 
     def __dir__(self) -> list[str]:
         """Attributes, columns among them."""
@@ -284,6 +292,22 @@ class BlockResult:
         is_bounded = name == "dx" and (status == Status.DISTANCE_LIMIT).any()
         farthest = self._farthest() if is_bounded else np.array(np.nan)
         return CellStatistics.of(self.axes, unit, column, status, self.block.groups, farthest)
+
+    def named_sets(self, cells: CellStatistics) -> CellStatistics:
+        """The statistics of some cells, with parameter sets named by their values, as figures show them."""
+        from warpchain.pictures.labels import math_symbol, short_texts, unit_text
+
+        if POINT not in self.axes:
+            return cells
+        units = {name: unit_text(name) for name in self.block.points}
+        texts = [
+            [f"{math_symbol(name)} = {text} {units[name]}".rstrip() for text in short_texts(values)]
+            for name, values in self.block.points.items()
+        ]
+        names = [", ".join(parts) for parts in zip(*texts[:_MOST_NAMED], strict=True)]
+        if len(texts) > _MOST_NAMED or len(set(names)) < len(names):
+            names = [f"{number}: {name}" for number, name in enumerate(names)]
+        return replace(cells, axes=cells.axes | {POINT: np.array(names)})
 
     def _farthest(self) -> NDArray[np.float64]:
         """Distance [m] that walks which ended by it had come, in each cell; NaN where the floor may rise ahead.

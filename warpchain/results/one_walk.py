@@ -9,6 +9,7 @@ from pydantic import Field
 from warpchain.chain.keep import FRAME_INTERVAL, LONGEST_INTERVAL, Keep
 from warpchain.chain.setup import Setup
 from warpchain.engine.devices import gpu_turn
+from warpchain.engine.machine import made_by
 from warpchain.inputs.validation import InputError, checked
 from warpchain.kernels.methods.method import find_method
 from warpchain.results.walk_result import WalkResult
@@ -47,9 +48,8 @@ def run_walk(
     keep = Keep.asked(interval, earlier, record_joint_forces, setup.options.record_interval)
     report = on_progress or (lambda progress: None)
     with gpu_turn([setup.options.device]):
-        report(Progress("compile", 0.0, 0.0, 0))
-        compile_kernels([setup])
-        started = time.perf_counter()
+        compile_kernels([setup], on_compile=lambda: report(Progress("compile", 0.0, 0.0, 0)))
+        started, started_at = time.perf_counter(), time.strftime("%Y-%m-%dT%H:%M:%S%z")
         (((_, run),),) = run_setups([setup], keeps=[keep], watch=lambda run: report(run.progress()))
         return WalkResult(
             **vars(run.outcome()),
@@ -57,5 +57,6 @@ def run_walk(
             setup=setup,
             seed=seed,
             versions=package_versions(),
+            provenance=made_by([setup.options.device]) | {"date": started_at},
             wall_time=time.perf_counter() - started,
         )

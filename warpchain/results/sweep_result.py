@@ -8,21 +8,23 @@ are dimension scales. Units and meanings are attributes of every dataset; the re
 status are attributes of the file. A single block is in the root group, which
 `xarray.open_dataset(path, engine="h5netcdf")` opens; several blocks are in groups of their names (`group=`). The
 recorded motions of a block are in its group `motion`, in the format of a saved walk. The name of a walk's group is the
-position of the walk in a flat column.
+position of the walk in a flat column. `xarray.open_datatree(path)` opens everything.
 """
 
 import json
 import os
 import time
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
+from warpchain.chain.setup import Setup
 from warpchain.files import AnyPath, FileKind, checked_output, clear_parts, given_path, write_whole
 from warpchain.hdf5_files import SWEEP_FILE, Format, hdf5_image, kind_of_hdf5, reading_hdf5
 from warpchain.inputs.arrays import AnyArray
@@ -34,13 +36,36 @@ from warpchain.store.shards import read_manifest, stamp, stored_sweep
 from warpchain.sweeps.plan import Sweep
 from warpchain.walks.cell_statistics import CellStatistics
 from warpchain.walks.rows import COLUMNS, STORED_COLUMNS, derived_columns, drawn_column, quantity_of
-from warpchain.walks.walk_numbers import MOTION
+from warpchain.walks.walk_numbers import MOTION, read_motion, write_motion
 
 if TYPE_CHECKING:
     import h5py
     import pandas
     import xarray
     from matplotlib.figure import Figure, SubFigure
+
+    from warpchain.typed import Columns
+
+    class _OnlyBlock(Columns):
+        """What a sweep with one block has of it, to type checkers."""
+
+        axes: dict[str, AnyArray]
+        drawn: tuple[str, ...]
+        columns: dict[str, AnyArray]
+        dims: tuple[str, ...]
+        shape: tuple[int, ...]
+        is_there: NDArray[np.bool_]
+        kept: NDArray[np.bool_]
+        inaccurate: NDArray[np.bool_]
+        faults: dict[str, NDArray[np.bool_]]
+        meaning: Callable[[str], str]
+        series: Callable[..., WalkResult]
+        statistics: Callable[..., CellStatistics]
+        design: Callable[[], xarray.DataArray]
+        setup_at: Callable[[tuple[int, ...]], Setup]
+        kept_motions: Callable[[Iterable[int]], Iterator[tuple[int, h5py.Group]]]
+else:
+    _OnlyBlock = object
 
 MERGED: Final = Format.of("warpchain sweep result", COLUMNS, MOTION)
 REMEDY: Final = "merge the folders again, or fetch another copy of the file"
@@ -50,7 +75,7 @@ WANTED: Final = "use the folder of a sweep or a merged file; a saved walk is for
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class SweepResult:
+class SweepResult(_OnlyBlock):
     """Results of a sweep, as far as it has run; `load` and `warpchain.sweep` return it.
 
     If the sweep has a single block, all attributes of the block are also attributes of the result: `result.dx`.
@@ -80,13 +105,15 @@ class SweepResult:
         """Seed of the sweep."""
         return int(self.sweep["seed"])
 
-    def __getattr__(self, name: str) -> Any:
-        """An attribute of the only block."""
-        blocks: dict[str, BlockResult] = self.__dict__.get("blocks", {})
-        if len(blocks) == 1:
-            return getattr(next(iter(blocks.values())), name)
-        problem = f"{name}: unknown attribute; with several blocks use blocks[…] with one of {', '.join(blocks)}"
-        raise AttributeError(problem, name=name, obj=self)
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """An attribute of the only block."""
+            blocks = self.__dict__.get("blocks", {})
+            if len(blocks) == 1:
+                return getattr(next(iter(blocks.values())), name)
+            problem = f"{name}: unknown attribute; with several blocks use blocks[…] with one of {', '.join(blocks)}"
+            raise AttributeError(problem, name=name, obj=self)
 
     def __dir__(self) -> list[str]:
         """Attributes, those of the only block among them."""
@@ -163,7 +190,11 @@ class SweepResult:
         return located(list(self.blocks.values()), index)
 
     def plot(
-        self, quantity: str = "dx", x: str | None = None, figure: "Figure | SubFigure | None" = None
+        self,
+        quantity: str = "dx",
+        x: str | None = None,
+        figure: "Figure | SubFigure | None" = None,
+        width: float | None = None,
     ) -> "Figure | SubFigure":
         """Draw the mean of a quantity over the grids of all blocks, with its standard error.
 
@@ -172,6 +203,7 @@ class SweepResult:
             x: the axis along x; None: the frequency if it has at least three values, otherwise the longest axis of
                 numbers.
             figure: an empty figure to draw into; None: a new one.
+            width: width of a new figure [mm], e.g. 85 for a column of a paper; texts then have at least 6 pt.
 
         Returns:
             The figure.
@@ -180,8 +212,24 @@ class SweepResult:
             InputError: the column or axis does not exist, no axis has several values, or no walk has the quantity.
         """
         from warpchain.pictures.grid_figure import draw_grid
+        from warpchain.pictures.style import on_paper
 
-        return draw_grid(self.cell_statistics(quantity), quantity_of(quantity), x=full_name(x), figure=figure)
+        found = {name: self.blocks[name].named_sets(cells) for name, cells in self.cell_statistics(quantity).items()}
+        with on_paper(width) as inches:
+            title = self.setting([*found])
+            return draw_grid(found, quantity_of(quantity), full_name(x), figure=figure, title=title, width=inches)
+
+    def setting(self, blocks: Sequence[str]) -> str:
+        """What the walks of some blocks have in common that differs from the defaults, and how many they are."""
+        from warpchain.pictures.labels import differences, math_symbol
+
+        given = [block for block in self.sweep["blocks"] if block["name"] in blocks]
+        alike = [differences(block["scene"] | block["parameters"], block.get("preset"), math_symbol) for block in given]
+        common = [text for text in alike[0] if all(text in others for others in alike)]
+        samples = sorted({self.blocks[name].shape[-1] for name in blocks})
+        failed = sum(int(self.blocks[name].statistics().failed.sum()) for name in blocks)
+        many = f"{'–'.join(map(str, samples[:: max(1, len(samples) - 1)]))} sample{'s' * (samples != [1])} in each cell"
+        return ", ".join([*common, many, *[f"{failed:,} walks failed"] * (failed > 0)])
 
     def to_xarray(self) -> "xarray.Dataset | xarray.DataTree":
         """The only block as a Dataset, or several blocks as a DataTree with one child each."""
@@ -355,7 +403,8 @@ def _fill(file: "h5py.File", whole: SweepResult) -> None:
         for name, (dims, values, notes) in {**coordinates, **variables}.items():
             _put(group, name, values, notes, () if dims == (name,) else dims)
         for place, motion in block.kept_motions(np.flatnonzero(block.kept)):
-            group.copy(motion, group.require_group("motion"), str(place))
+            copied = group.create_group(f"motion/{place}", track_order=True)
+            write_motion(copied, read_motion(motion, 0), np.float32)  # HDF5 copies no names of dimensions
 
 
 def _put(group: "h5py.Group", name: str, values: AnyArray, notes: Mapping[str, Any], dims: Sequence[str]) -> None:

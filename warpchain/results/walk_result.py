@@ -4,6 +4,7 @@ A saved walk has the groups `series` (time series), `frames` (joint positions), 
 (physical parameters with their symbols) and, if it was recorded, `before_release`. Every dataset has its unit and
 meaning. The attributes `setup`, `seed` and `versions`, in JSON, suffice to repeat the walk. Shards and merged files of
 sweeps store the motion of a walk in the same groups. The fields are those of `warpchain.walks.walk_numbers`.
+All dimensions have names and coordinates, so that `xarray.open_datatree(path)` reads the file.
 """
 
 import json
@@ -16,7 +17,17 @@ import numpy as np
 
 from warpchain.chain.setup import Setup, State
 from warpchain.files import write_whole
-from warpchain.hdf5_files import SWEEP_FILE, WALK_FILE, Format, hdf5_image, put, read_fields, reading_hdf5, write_fields
+from warpchain.hdf5_files import (
+    SWEEP_FILE,
+    WALK_FILE,
+    Format,
+    dataset_of,
+    hdf5_image,
+    put,
+    read_fields,
+    reading_hdf5,
+    write_fields,
+)
 from warpchain.inputs.fields import SECTIONS
 from warpchain.inputs.figure_kinds import FigureWord
 from warpchain.inputs.parameters import Parameters
@@ -25,10 +36,12 @@ from warpchain.loop.stationary_loop import LOOP_FIELDS
 from warpchain.status import Status
 from warpchain.walks.landmarks import MOST_ENERGY_ERROR
 from warpchain.walks.restart import state_at
-from warpchain.walks.walk_numbers import NUMBERS, STORED, WalkNumbers, read_motion, write_motion
+from warpchain.walks.walk_numbers import MOTION, NUMBERS, STORED, WalkNumbers, read_motion, write_motion
 
 if TYPE_CHECKING:
     import h5py
+    import pandas
+    import xarray
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -57,6 +70,7 @@ class WalkResult(WalkNumbers):
     series have a row at every multiple of `record_interval` and at the end; at an impact, velocities and energies lie
     between the values before and after. Frames are taken at the ends of steps. `setup` is the complete definition of
     the walk, `seed` the seed of its sample (None: nothing was sampled), and `versions` names the software.
+    `provenance` names command, date, system, processor or GPU and driver; it is empty for a walk recorded by a sweep.
     `before_release` is the motion on the sprocket just before the release, None if it was not recorded.
 
     Check `status` before you use `dx`, which is NaN unless the chain came to rest.
@@ -88,7 +102,12 @@ class WalkResult(WalkNumbers):
         return state_at(self.setup, t, self.walk_time if is_released else np.nan)
 
     def plot(
-        self, kind: FigureWord = "height_and_speed", *, figure: "Figure | None" = None, ax: "Axes | None" = None
+        self,
+        kind: FigureWord = "height_and_speed",
+        *,
+        figure: "Figure | None" = None,
+        ax: "Axes | None" = None,
+        width: float | None = None,
     ) -> "Figure":
         """Draw the walk.
 
@@ -98,6 +117,7 @@ class WalkResult(WalkNumbers):
                 plane.
             figure: an empty matplotlib figure to draw into; None: a new one, which a notebook shows.
             ax: axes to draw `energy` into, the only figure with a single pair of axes.
+            width: width of a new figure [mm], e.g. 85 for a column of a paper; texts then have at least 6 pt.
 
         Returns:
             The figure; if `ax` is given, the figure of `ax`.
@@ -106,9 +126,11 @@ class WalkResult(WalkNumbers):
             ValueError: the kind is unknown, the walk lacks the data of this figure (frames, `before_release`,
                 energies), or `ax` is not possible for the kind.
         """
+        from warpchain.pictures.style import on_paper
         from warpchain.pictures.walk_figures import draw
 
-        return draw(self, kind, figure=figure, ax=ax)
+        with on_paper(width) as inches:
+            return draw(self, kind, figure=figure, ax=ax, width=inches)
 
     def animate(self, path: str | os.PathLike[str], *, fps: float = 30.0, slow: float = 4.0) -> None:
         """Write an animation of the walk; the suffix of `path` sets the format: .gif, .mp4 or .html.
@@ -160,9 +182,32 @@ class WalkResult(WalkNumbers):
                 **_setup_as_dict(self.setup),
                 "seed": self.seed,
                 "versions": self.versions,
+                "provenance": self.provenance,
             }
         )
         return plain
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Numbers, time series and frames as a data set with named coordinates, units and meanings.
+
+        Its dimensions are `time`, `frame_time`, `joint` and `axis`, and `room_axis` if the plane tilts. What a number
+        has by key is named as in `energy_residual`; status, setup, seed and versions are attributes. The motion
+        `before_release` has a data set of its own, `walk.before_release.to_xarray()`.
+        """
+        return dataset_of(vars(self), STORED).assign_attrs(self._notes())
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """The time series as a table with a row for each time; x and y have a column each, such as `center_x`."""
+        import pandas
+
+        columns: dict[str, Any] = {}
+        for name in (name for name, each in MOTION.items() if each.shape in ("t", "t 2") and name != "time"):
+            values = getattr(self, name)
+            if values.ndim == 1:
+                columns |= {name: values} if len(values) == len(self.time) else {}
+            else:
+                columns |= {f"{name}_{axis}": values[:, place] for place, axis in enumerate("xy")}
+        return pandas.DataFrame(columns, pandas.Index(self.time, name="time"))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the walk to an HDF5 file, whole or not at all; an older file of that name is replaced.
@@ -172,11 +217,20 @@ class WalkResult(WalkNumbers):
         """
         write_whole(path, hdf5_image(_FORMAT, self._fill))
 
+    def _notes(self) -> dict[str, str]:
+        """Attributes of a file or a data set: how the walk ended, and how to make it again."""
+        return {
+            "status": self.status.label,
+            "status_sentence": self.status.sentence,
+            "setup": json.dumps(_setup_as_dict(self.setup), allow_nan=False),
+            "seed": json.dumps(self.seed),
+            "versions": json.dumps(self.versions),
+            "provenance": json.dumps(self.provenance),
+        }
+
     def _fill(self, file: "h5py.File") -> None:
         """Fill an empty file."""
-        file.attrs["status"], file.attrs["status_sentence"] = self.status.label, self.status.sentence
-        file.attrs["setup"] = json.dumps(_setup_as_dict(self.setup), allow_nan=False)
-        file.attrs["seed"], file.attrs["versions"] = json.dumps(self.seed), json.dumps(self.versions)
+        file.attrs.update(self._notes())
         write_fields(file, vars(self), NUMBERS)
         write_motion(file, vars(self))
         if self.setup.start is not None:
@@ -214,6 +268,7 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
             setup=setup,
             seed=json.loads(file.attrs["seed"]),
             versions=json.loads(file.attrs["versions"]),
+            provenance=json.loads(file.attrs.get("provenance", "{}")),
             **read_fields(file, NUMBERS, setup.scene.links),
             **read_motion(file, setup.scene.links),
         )
@@ -229,9 +284,14 @@ def write_state(file: "h5py.File", state: State) -> None:
     put(file, f"{_GROUP}/time", state.time, "s", "time since the release")
     for name, (unit, meaning) in _STATE.items():
         if (values := getattr(state, name)) is not None:
-            put(file, f"{_GROUP}/{name}", values, unit, meaning)
+            put(file, f"{_GROUP}/{name}", values, unit, meaning, _numbered(name, values))
     for name, values in state.memory.items():
-        put(file, f"{_GROUP}/memory/{name}", values, "1", "what else the walk had then")
+        put(file, f"{_GROUP}/memory/{name}", values, "1", "what else the walk had then", _numbered(name, values))
+
+
+def _numbered(name: str, values: Any) -> tuple[str, ...]:
+    """Names of dimensions that have no meaning but for `State`, different for each array."""
+    return tuple(f"{name.rpartition('/')[2]}_{place}" for place in range(np.ndim(values)))
 
 
 def read_state(file: "h5py.File", setup: Setup) -> State | None:
@@ -240,8 +300,8 @@ def read_state(file: "h5py.File", setup: Setup) -> State | None:
         return None
     group, memory = file[_GROUP], {}
 
-    def remember(name: str, node: object) -> None:
-        if hasattr(node, "dtype"):
+    def remember(name: str, node: Any) -> None:
+        if hasattr(node, "dtype") and not node.is_scale:
             memory[name] = np.array(node)
 
     if "memory" in group:

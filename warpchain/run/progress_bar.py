@@ -9,12 +9,13 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from datetime import timedelta
+from typing import Protocol
 
 from warpchain.walks.walk_phases import Progress
 
 LINE_EVERY = 60.0
 """Time [s] between two lines of progress where there is neither a terminal nor a notebook."""
-COMPILING = "compiling kernels; later runs find them ready"
+COMPILING = "compiling kernels for this machine, which takes 10 to 30 s; later runs find them ready"
 
 
 @dataclass
@@ -57,23 +58,35 @@ def counts_text(progress: SweepProgress) -> str:
     return ", ".join(texts + [f"{progress.inaccurate} inaccurate"] * (progress.inaccurate > 0))
 
 
+class Show(Protocol):
+    """Shows a text, see `changing_line`."""
+
+    def __call__(self, text: str, urgent: bool = False) -> None:
+        """Show it."""
+
+
 @contextlib.contextmanager
-def changing_line(in_terminals: bool = True, every: float = math.inf) -> Iterator[Callable[[str], None]]:
+def changing_line(in_terminals: bool = True, every: float = math.inf) -> Iterator["Show"]:
     """Yield a function that shows a text in the place of the one before.
 
-    Without a terminal and a notebook it prints a line on standard error, so often [s], by default never.
+    Without a terminal and a notebook it prints a line on standard error, so often [s], by default never, and at once if
+    the text is urgent and a new one.
     """
     in_notebook = type(sys.stdout).__module__.startswith("ipykernel")
     stays = not in_notebook and not (in_terminals and sys.stderr.isatty())
     stream, last, shown = sys.stdout if in_notebook else sys.stderr, time.monotonic(), False
+    told = set[str]()
 
-    def show(text: str) -> None:
+    def show(text: str, urgent: bool = False) -> None:
         nonlocal last, shown
-        if not stays:
+        if urgent and stays and text not in told:
+            print(text, file=stream, flush=True)
+            told.add(text)
+        elif not stays:
             room = shutil.get_terminal_size((120, 24)).columns - 1
             print(f"\r{text[:room]:{room}}", end="", file=stream, flush=True)
             shown = True
-        elif time.monotonic() - last >= every:
+        elif time.monotonic() - last >= every and not urgent:
             print(text, file=stream, flush=True)
             last = time.monotonic()
 

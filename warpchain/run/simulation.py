@@ -2,23 +2,26 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Never, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from warpchain.chain.resolution import takes_fields
 from warpchain.chain.setup import State
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import gpu_turn
 from warpchain.engine.tallies import LOST
 from warpchain.inputs.arrays import Array, checked_array
+from warpchain.inputs.keywords import takes_fields
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene, check_links_on_gpu
 from warpchain.inputs.validation import InputError, checked, plain, shown, validated
 from warpchain.status import Status
+
+if TYPE_CHECKING:
+    from warpchain.typed import SolverFields
 
 LONGEST = 1e9
 """Durations of this length and longer are refused [s]."""
@@ -62,7 +65,7 @@ class Trajectory:
         return f"<Trajectory of {self.position.shape[1]} links, {len(self.time)} instants: {self.status.label}>"
 
 
-@takes_fields("options", without=("soften_pile", "soften_drive"))
+@takes_fields("options", without=_UNSOFTENED, method="rkf78")
 def simulate(
     parameters: State | Parameters | str,
     position: Array | None = None,
@@ -72,11 +75,7 @@ def simulate(
     times: Sequence[float] | Array | None = None,
     floor: Any = None,
     gravity: bool = True,
-    self_contact: bool = True,
-    method: str = "rkf78",
-    tolerance: float | None = None,
-    device: str = "cpu",
-    **settings: Any,
+    **settings: "Unpack[SolverFields[Never]]",
 ) -> Trajectory:
     """Integrate the motion of a given chain without a sprocket, e.g. to test an integrator or a measured motion.
 
@@ -104,9 +103,7 @@ def simulate(
     Raises:
         InputError: A value is refused, before anything is computed. It is a ``ValueError``.
     """
-    chosen: dict[str, object] = {"method": method, "device": device, "self_contact": self_contact}
-    if tolerance is not None:
-        chosen["tolerance"] = tolerance
+    chosen = {"method": "rkf78"} | {name: value for name, value in settings.items() if value is not None}
     floor, gravity = plain(floor, "floor"), checked(gravity, "gravity", bool)
     chosen_times = None if times is None else checked_array(times, "times", "t")
     if duration is None and chosen_times is None:
@@ -116,7 +113,7 @@ def simulate(
     end: float = checked(
         0.0 if duration is None else duration, "duration", Annotated[float, Field(ge=0, lt=LONGEST)], "s"
     )
-    options = validated(Options, {**_UNSOFTENED, **settings, **chosen}, "options")
+    options = validated(Options, {**_UNSOFTENED, **chosen}, "options")
     for name in _UNSOFTENED:
         if getattr(options, name):
             raise InputError(f"options.{name}: only a walk softens its joints; remove it")
@@ -170,9 +167,7 @@ class Chains:
         velocity: Array,
         *,
         floor: bool = True,
-        method: str = "explicit",
-        device: str = "cpu",
-        **settings: Any,
+        **settings: "Unpack[SolverFields[Never]]",
     ) -> None:
         """Place W chains on the device, at time 0.
 
@@ -188,7 +183,7 @@ class Chains:
         Raises:
             InputError: A value is refused.
         """
-        options = validated(Options, {"soften_drive": False, **settings, "method": method, "device": device}, "options")
+        options = validated(Options, {"method": "explicit", "soften_drive": False, **settings}, "options")
         if options.soften_drive:
             raise InputError("options.soften_drive: these chains have no sprocket; remove it")
         floor = checked(floor, "floor", bool)

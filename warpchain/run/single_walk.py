@@ -1,42 +1,40 @@
 """`warpchain.walk`, which users and the command `walk` call to simulate one walk."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Never, Unpack
 
 from warpchain.chain.keep import FRAME_INTERVAL
-from warpchain.chain.resolution import continued, resolve, takes_fields
+from warpchain.chain.resolution import MAY_BE_NONE, continued, resolve
 from warpchain.chain.setup import DEFAULT_PRESET, Setup, State
 from warpchain.inputs.distributions import Seed
 from warpchain.inputs.fields import by_section
-from warpchain.inputs.starts import StartWord
+from warpchain.inputs.keywords import takes_fields
 from warpchain.inputs.validation import InputError, by_name, checked, shown
 from warpchain.results.one_walk import OnProgress, run_walk
 from warpchain.results.walk_result import WalkResult
 from warpchain.run.progress_bar import changing_line, walk_progress_text
 from warpchain.sweeps.block import refuse_axes
 
+if TYPE_CHECKING:
+    from warpchain.typed import WalkFields
+
 
 @takes_fields("parameters", "scene", "options")
 def walk(
     *,
-    links: int | None = None,
-    frequency: float | None = None,
     preset: str | None = None,
-    method: str | None = None,
-    tolerance: float | None = None,
-    start: StartWord | State | None = None,
     setup: Setup | None = None,
     seed: int | None = None,
     frame_interval: float | None = FRAME_INTERVAL,
     record_before: float | None = None,
     record_joint_forces: bool = False,
     on_progress: OnProgress | None = None,
-    **settings: Any,
+    **settings: "Unpack[WalkFields[Never]]",
 ) -> WalkResult:
     """Simulate one walk: hang a chain on its sprocket, spin it up, release it and follow it to rest.
 
     Args:
-        links: Number of links n; even if inner and outer links differ. None: 60.
-        frequency: Frequency of the sprocket [Hz]; None: 15.
+        links: Number of links n; even if inner and outer links differ.
+        frequency: Frequency of the sprocket [Hz].
         preset: Set of physical parameters: ``"paper"`` (Table 1) or ``"soft"`` (softer joints; with ``reference`` 15 to
             19 times fewer steps). None: ``"paper"``.
         method: Solver profile: ``"standard"``, ``"explicit"`` or ``"reference"``; or an integrator, a key of
@@ -60,8 +58,8 @@ def walk(
         record_joint_forces: Whether to record ``frame_forces`` and ``frame_moments`` of the joints with each frame
             after the release. The figure of waves needs frames every 1e-4 s or so; with 60 links they take 24 MB for
             each second of the walk.
-        on_progress: Function that is called before kernels are compiled and after each launch, several times a
-            second. None: a notebook shows a progress line.
+        on_progress: Function that is called before kernels are compiled, if any are, and after each launch, several
+            times a second. None: a notebook shows a progress line.
         settings: Any other field of :class:`Parameters`, :class:`Scene` or :class:`Options`, by its name or the
             paper's symbol, e.g. ``mu_fc``; ``warpchain parameters`` lists them.
 
@@ -71,10 +69,10 @@ def walk(
     Raises:
         InputError: A value is refused, before anything is computed. It is a ``ValueError``.
     """
-    named = {"links": links, "frequency": frequency, "method": method, "tolerance": tolerance, "start": start}
-    given = by_name({**{name: value for name, value in named.items() if value is not None}, **settings})
+    given = by_name({name: value for name, value in settings.items() if value is not None or name not in MAY_BE_NONE})
     refuse_axes(given)
     loads, seed = checked(record_joint_forces, "record_joint_forces", bool), checked(seed, "seed", Seed | None)
+    start = given.get("start")
     if isinstance(start, State) and setup is None:
         for name, value in {"preset": preset, "seed": seed}.items():
             if value is not None:
@@ -98,5 +96,6 @@ def walk(
             frame_interval=frame_interval,
             record_before=record_before,
             record_joint_forces=loads,
-            on_progress=on_progress or (lambda progress: show(walk_progress_text(progress))),
+            on_progress=on_progress
+            or (lambda progress: show(walk_progress_text(progress), progress.phase == "compile")),
         )

@@ -10,23 +10,25 @@ import os
 import re
 import time
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final, Unpack
 
 import numpy as np
 from pydantic import Field
 
-from warpchain.chain.resolution import Values, takes_fields
+from warpchain.chain.resolution import MAY_BE_NONE, Values
 from warpchain.chain.setup import DEFAULT_PRESET, Setup
 from warpchain.engine.devices import gpu_turn, has_gpu_turn, start_device
+from warpchain.engine.machine import made_by
 from warpchain.engine.processors import free_memory, processors
 from warpchain.files import AnyPath
 from warpchain.inputs.fields import SECTION_OF, by_section
+from warpchain.inputs.keywords import takes_fields, types_of
 from warpchain.inputs.options import Options, on_gpu
 from warpchain.inputs.validation import InputError, Whole, by_name, checked, checked_path, plain, shown, validated
 from warpchain.results.sweep_result import SweepResult, load
@@ -34,22 +36,26 @@ from warpchain.run import progress_bar
 from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text
 from warpchain.run.workers import Pulse, losses_named, pulsing_threads
 from warpchain.status import Status
+from warpchain.store.crate import write_crate
 from warpchain.store.folder import SweepFolder
 from warpchain.store.shards import Part, Shard, check_numerics, opened_shard, rows_of, stamp, write_shard
 from warpchain.sweeps.block import is_axis
 from warpchain.sweeps.plan import Source, Sweep, load_sweep
-from warpchain.sweeps.sweep_file import VERSION, BlockKeys
+from warpchain.sweeps.sweep_file import VERSION, BlockKeys, SweepFile
 from warpchain.walks.landmarks import LENGTHS
 from warpchain.walks.rows import derived_columns, faults_of_columns, fill_drawn, fill_outcomes, missing_rows
 from warpchain.walks.scheduler import compile_kernels, run_setups
 from warpchain.walks.walk_phases import outcomes
 
+if TYPE_CHECKING:
+    from warpchain.typed import SweepFields
+
 Tasks = Iterator[tuple[Future[None], list[Shard]]]
 
 FILE_KEYS: Final = (*BlockKeys.model_fields, "same_samples_along", "record", "name", "seed")
 """Keys of a sweep file that are keywords."""
-OF_WALKS: Final = ("links", "frequency", "start", "method", "tolerance")
-"""Fields of which None is the default, as of `warpchain.walk`."""
+OF_FILE: Final = {name: f"{kind.removesuffix(' | None')} | None" for name, kind in types_of(SweepFile).items()}
+"""Types of the keys of a sweep file as keywords."""
 BYTES_OF_WALK = 1500
 """Memory that each walk of a sweep takes in the end, about: its row of some 700 bytes, read and put into columns."""
 SHARD_WALKS = 256
@@ -62,19 +68,18 @@ SHARDS = 32
 """Least number of shards of a sweep, about, if it has as many walks: the grain of a restart."""
 
 
-@takes_fields("scene", "parameters", "options", beside=FILE_KEYS)
+@takes_fields("scene", "parameters", "options", beside={name: (OF_FILE[name], None) for name in FILE_KEYS})
 def sweep(
     source: str | os.PathLike[str] | Mapping[str, Any] | Sweep | None = None,
     out: str | os.PathLike[str] | None = None,
     *,
     part: str | None = None,
-    device: str | None = None,
     executor: Any = None,
     workers: int | None = None,
     fresh: bool = False,
     progress: bool = True,
     on_progress: OnProgress | None = None,
-    **settings: Any,
+    **settings: "Unpack[SweepFields]",
 ) -> SweepResult:
     """Run a sweep, or resume it, and load its results.
 
@@ -117,7 +122,8 @@ def sweep(
         fresh: Delete the results of another sweep in the folder.
         progress: Show a bar in a terminal or a notebook, elsewhere a line a minute on standard error, unless
             ``on_progress`` is given.
-        on_progress: Function that is called before kernels are compiled, when the walks begin, and about every second.
+        on_progress: Function that is called before kernels are compiled, if any are, when the walks begin, and about
+            every second.
 
     Raises:
         InputError: The sweep or the folder is refused; one line with the remedy for each value. It is a ``ValueError``.
@@ -127,12 +133,14 @@ def sweep(
     if executor is not None and not hasattr(executor, "submit"):
         wanted = "one with submit, such as concurrent.futures.ProcessPoolExecutor(), or a Dask client"
         raise InputError(f"executor: expected {wanted}, got {shown(executor)}")
-    planned, folder, own, count = _checked_call(source, out, settings, device, workers, part)
+    planned, folder, own, count = _checked_call(source, out, settings, settings.pop("device", None), workers, part)
     if hasattr(executor, "get_executor"):
         count = count or sum(executor.nthreads().values())
         executor = executor.get_executor(pure=False)  # pure: a task that failed would fail again, unrun
     with progress_bar.changing_line(every=progress_bar.LINE_EVERY if progress else math.inf) as show:
-        report = on_progress or (lambda seen: show(progress_bar.progress_text(seen)) if progress else None)
+        report = on_progress or (
+            lambda seen: show(progress_bar.progress_text(seen), seen.compiling) if progress else None
+        )
         _run_in_folder(planned, folder, executor, count, fresh, own, report)
     return load(folder)
 
@@ -147,7 +155,7 @@ def _checked_call(
         return planned if device is None else on_device(planned, device)
 
     problems, found = list[str](), list[Any]()
-    unsaid = {name for name in (*FILE_KEYS, *OF_WALKS) if given.get(name) is None}
+    unsaid = {name for name in (*FILE_KEYS, *MAY_BE_NONE) if given.get(name) is None}
     settings = {name: value for name, value in given.items() if name not in unsaid}
     replaced = {name: plain(settings[name], name) for name in ("seed", "samples") if name in settings}
     if source is not None and (others := [name for name in settings if name not in replaced]):
@@ -206,9 +214,9 @@ def _run_in_folder(
 ) -> None:
     """Run what is missing in a folder."""
     kinds = kinds_of_kernels(planned)
-    pulse, at_once = None, workers or processors()
+    pulse, at_once, on_devices = None, workers or processors(), set[str]()
     if executor is None:
-        devices = {setup.options.device for setup in kinds}
+        devices = on_devices = {setup.options.device for setup in kinds}
         if has_gpu_turn() and any(map(on_gpu, devices)):
             raise InputError("device: this thread is running a walk on a GPU; start the sweep after it has ended")
         for device in devices:
@@ -227,16 +235,16 @@ def _run_in_folder(
         progress = SweepProgress(walks=walks, done=before, before=before)
         store.log(f"{len(missing)} shards to do, {before} of {walks} walks done")
         if missing and executor is None:
-            progress.compiling = True
-            report(progress)
-            compile_kernels(kinds, walks - before)
-            progress.compiling = False
+            compile_kernels(kinds, walks - before, lambda: report(replace(progress, compiling=True)))
             executor, pulse = held.enter_context(pulsing_threads(at_once))
         if missing:
+            crated = partial(write_crate, store.directory, store.manifest, made_by(sorted(on_devices)))
+            crated()
             tasks = _tasks(planned, missing, at_once if pulse is None else 1)  # threads take turns on a GPU
             where = str(store.directory), stamp(store.directory)
             submitted = ((executor.submit(run_shards, planned, *where, tuple(task), pulse), task) for task in tasks)
             _follow(submitted, 2 * at_once, pulse or Pulse(), store, progress, report)
+            crated(is_over=True)
         counts = counts_text(progress) or "nothing to do"
         store.log(f"complete after {progress.seconds:.1f} s: {counts}")
 
@@ -247,13 +255,16 @@ def kinds_of_kernels(planned: Sweep) -> list[Setup]:
     return [setup for block in planned.blocks for setup in block.fixed_in(block.cells_along(axes))]
 
 
-def compile_sweep(source: Source, device: str | None = None) -> Sweep:
-    """Put the kernels of a sweep's walks into the cache, for a device or that of the sweep; errors as of `sweep`."""
+def compile_sweep(source: Source, device: str | None = None, on_compile: Callable[[], None] = lambda: None) -> Sweep:
+    """Put the kernels of a sweep's walks into the cache, for a device or that of the sweep; errors as of `sweep`.
+
+    If any is missing there `on_compile` is called before, perhaps several times.
+    """
     planned = load_sweep(source) if device is None else on_device(load_sweep(source), device)
     kinds = kinds_of_kernels(planned)
     for name in {setup.options.device for setup in kinds}:
         start_device(name)
-    compile_kernels(kinds, planned.walk_count)
+    compile_kernels(kinds, planned.walk_count, on_compile)
     return planned
 
 

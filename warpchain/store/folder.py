@@ -4,6 +4,7 @@
     DIR/sweep.yaml     the resolved sweep, for people and to run again
     DIR/shards/        000003.h5 holds the rows of some walks, and what is kept of their motion
     DIR/log.txt        what the runs of the sweep did, with times
+    DIR/ro-crate-metadata.json  where and when it was run, for archives, see `warpchain.store.crate`
     DIR/lock           locked by the process that runs the sweep, see `warpchain.store.folder_lock`
 
 None of these is a symbolic link when a sweep is run: nothing is written or deleted outside of the folder. A damaged
@@ -195,7 +196,7 @@ def _clear(folder: Path) -> None:
     if others := [path for path in there if path not in own]:
         raise InputError(f"{others[0]}: no sweep has written this; move it out of this folder")
     with naming(folder):
-        for path in (*own, folder / "sweep.yaml", folder / "log.txt"):
+        for path in (*own, folder / "sweep.yaml", folder / "log.txt", folder / shards.CRATE):
             path.unlink(missing_ok=True)
 
 

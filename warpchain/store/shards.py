@@ -41,7 +41,9 @@ if TYPE_CHECKING:
 
 Part = tuple[int, int]
 """Number of a part of a sweep, and number of parts."""
-OWN: Final = (SWEEP_FILE, "sweep.yaml", "shards", "log.txt")
+CRATE: Final = "ro-crate-metadata.json"
+"""Where and when the sweep was run, see `warpchain.store.crate`."""
+OWN: Final = (SWEEP_FILE, "sweep.yaml", "shards", "log.txt", CRATE)
 """What a sweep has in its folder, beside the lock."""
 MANIFEST: Final = Format.of("warpchain sweep")
 SHARD: Final = Format.of("warpchain shard", STORED_COLUMNS, MOTION, dict(ROW_KEYS.fields or {}))

@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike, NDArray
 from warpchain.chain.floor import slope_points
 from warpchain.chain.setup import Setup
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.validation import InputError
 
 RELEASE: Final = {
     "center_x": "x of the centre of mass",
@@ -46,10 +45,9 @@ def bounces(time: Array, velocity: Array, setup: Setup) -> dict[str, Array]:
     """`WalkResult.bounce_table` from times and velocities of the centre of mass.
 
     Gravity and floor alone push the centre: J = m Δv + m g Δt, and a velocity between two samples is linear in time.
+    Whether something sticks shows if all contacts have one normal, and friction has one direction.
     """
     scene, parameters = setup.scene, setup.parameters
-    if scene.plane == "tilting" or scene.floor != "flat":
-        raise InputError("bounces: expected a fixed plane and a flat floor or a slope; use such a walk")
     free = time >= (scene.release[-1][0] if scene.release else 0.0)  # of a sprocket that moves on after the release
     time, speed = time[free], np.abs(velocity).max(initial=0.0)
     mass = setup.link_values.total_mass
@@ -65,7 +63,8 @@ def bounces(time: Array, velocity: Array, setup: Setup) -> dict[str, Array]:
         for part in parts
     ]
     table = np.array([(*row, np.nan)[: len(BOUNCE)] for row in rows]).reshape(-1, len(BOUNCE))
-    return dict(zip(BOUNCE, table.T, strict=True))
+    columns = BOUNCE if scene.plane == "fixed" and scene.floor == "flat" else BOUNCE[:-1]
+    return dict(zip(columns, table.T[: len(columns)], strict=True))
 
 
 def energy_error(at_release: ArrayLike, residual: ArrayLike) -> NDArray[np.float64]:

@@ -132,15 +132,20 @@ def most_worlds(one: Batch) -> int:
     return max(1, min(filling, one.device.free_memory // 2 // one.bytes))
 
 
-def compile_kernels(setups: Sequence[Setup], walks: int | None = None) -> None:
-    """Load the kernels of all walks, or of one of each kind and their number; what is missing is compiled at once."""
+def compile_kernels(
+    setups: Sequence[Setup], walks: int | None = None, on_compile: Callable[[], None] = lambda: None
+) -> None:
+    """Load the kernels of all walks, or of one of each kind and their number; what is missing is compiled at once.
+
+    Before that `on_compile` is called, by any thread and perhaps several times; not if nothing is missing.
+    """
     wanted: set[tuple[str, Features, int]] = set()
     for places in _groups(setups, len(setups) if walks is None else walks):
         device, links = setups[places[0]].options.device, max(setups[place].scene.links for place in places)
         features = {each for place in places for each in phase_features(setups[place]).values()}
         wanted |= {(device, each, block_threads(links) if on_gpu(device) else 1) for each in features}
     with gpu_turn(device for device, _, _ in wanted):
-        load_kernels((start_device(device), features, size) for device, features, size in wanted)
+        load_kernels(((start_device(device), features, size) for device, features, size in wanted), on_compile)
 
 
 Prepared = tuple[int, Setup, Keep, Motion | None]

@@ -6,7 +6,7 @@ them.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
@@ -73,6 +73,7 @@ class WalkNumbers(Outcome):
     ]
     frame_axes: Annotated[Array, Stored("1", "x and y axes of the plane in the laboratory frame", "f 2 3", _FIXED)]
     before_release: BeforeRelease | None = None
+    provenance: dict[str, str] = field(default_factory=dict)
 
     @property
     def sprocket_center(self) -> Array | None:
@@ -114,14 +115,12 @@ class WalkNumbers(Outcome):
         return average_loop(self.setup, self.before_release, self.sprocket_center)
 
     def bounce_table(self) -> dict[str, Array]:
-        """The bounces off a flat or sloping floor: columns of equal length, for example for `pandas.DataFrame`.
+        """The bounces off the floor: columns of equal length, for example for `pandas.DataFrame`.
 
         `start` and `end` of contact [s], to a sample; `impulse_x`, `impulse_y` of the floor on the chain [N s];
-        `sticks_at` [s], the first sample until which not all that touched slid one way (NaN: all did). A walk without
-        series, or that was never released, has none.
-
-        Raises:
-            InputError: the plane tilts, or the floor is a profile.
+        `sticks_at` [s], the first sample until which not all that touched slid one way (NaN: all did). A profile has
+        several normals and a tilting plane slides in two directions: their tables have no `sticks_at`. A walk without
+        series, or that was never released, has no bounces.
         """
         return bounces(self.time, self.center_velocity, self.setup)
 
