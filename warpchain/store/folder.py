@@ -43,7 +43,7 @@ _PART: Final = re.compile(r"\.(?:sweep|\d{6,})\.[0-9a-f]{8}\.part\.(?:yaml|h5)")
 _YAML_HEAD: Final = """\
 # The sweep of this folder with all its values. A copy with more samples adds them to this folder; a copy that is
 # changed otherwise needs another folder.
-# It names the method that was run: for the one that suits another device, give a copy of it method: standard.
+# It names the method that was run. For the default method of another device, set method: standard in a copy.
 """
 
 
