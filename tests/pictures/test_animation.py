@@ -106,7 +106,7 @@ def test_a_film_that_was_not_written_to_its_end_is_not_kept(
     ffmpeg.chmod(0o755)
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", SimpleNamespace(get_ffmpeg_exe=lambda: str(ffmpeg)))
     path.write_bytes(b"old")
-    with pytest.raises(OSError, match=r"^.*walk\.mp4: cannot be written \(ffmpeg ended early\); see to the disk$"):
+    with pytest.raises(OSError, match=r"^.*walk\.mp4: cannot be written \(ffmpeg ended early\); check the disk$"):
         animate(make_walk(), path, fps=10, slow=1)
     assert path.read_bytes() == b"old" and len(list(tmp_path.iterdir())) == 2
     assert capfd.readouterr().err == ""
