@@ -1,4 +1,4 @@
-"""The arrows between wings and modules, and what the repository may hold; the rules stand in docs/architecture.md."""
+"""The imports between subpackages, and what the repository may hold; docs/architecture.md has the rules."""
 
 import ast
 import graphlib
@@ -39,9 +39,9 @@ STOREYS = (
     ("kernels/types",),
     ("kernels/layout", "kernels/codes", "kernels/hooks"),
 )
-"""Wings, from top to bottom: imports go downwards only."""
+"""Subpackages, from top to bottom: imports go downwards only."""
 KERNELS_FOR_ALL = {"kernels/codes", "kernels/features", "kernels/layout", "kernels/methods"}
-"""Wings of kernels/ that hold data; all others are for engine/ alone …"""
+"""Subpackages of kernels/ that hold data; all others are for engine/ alone …"""
 LAUNCHERS = {"warpchain.engine.batch", "warpchain.engine.devices"}
 """… which launches kernels."""
 GPU_OR_NOT = "warpchain.engine.devices"
@@ -83,15 +83,17 @@ def real_graph() -> dict[str, set[str]]:
     return graph
 
 
-def wing_of(module: str) -> str:
-    """Wing of a module, kernels/NAME of one in kernels/; ends with no letter for the package itself and its kernels."""
-    _, wing, inner, *_ = [*module.split("."), "", ""]
-    return f"kernels/{inner}" if wing == "kernels" else wing
+def subpackage_of(module: str) -> str:
+    """Subpackage of a module, kernels/NAME for one in kernels/; empty or kernels/ for the two packages themselves."""
+    _, part, inner, *_ = [*module.split("."), "", ""]
+    return f"kernels/{inner}" if part == "kernels" else part
 
 
 def arrows() -> set[tuple[str, str]]:
-    """Imports between wings."""
-    pairs = {(wing_of(name), wing_of(target)) for name, targets in real_graph().items() for target in targets}
+    """Imports between subpackages."""
+    pairs = {
+        (subpackage_of(name), subpackage_of(target)) for name, targets in real_graph().items() for target in targets
+    }
     return {(own, other) for own, other in pairs if own != other and not {own, other} & {"", "kernels/"}}
 
 
@@ -104,14 +106,14 @@ def tracked() -> list[str]:
     return listing.split("\0")[:-1]
 
 
-def test_every_module_has_a_wing() -> None:
+def test_every_module_has_a_subpackage() -> None:
     """The package finds its kernels at the top level; each module stands on a storey, and its package is installed."""
     assert len(HOST) > 50 and len(KERNELS) > 30
     assert (
         Path(warpchain.kernels.__file__) == ROOT / "kernels/__init__.py" and not (ROOT / "warpchain/kernels").exists()
     )
-    known = {wing for storey in STOREYS for wing in storey} | {"", "__main__", "kernels/"}
-    assert {wing_of(name) for name in MODULES} <= known
+    known = {part for storey in STOREYS for part in storey} | {"", "__main__", "kernels/"}
+    assert {subpackage_of(name) for name in MODULES} <= known
     text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     listed = set(re.findall(r'^    "(warpchain[\w.]*)",$', text, flags=re.MULTILINE))
     packages = {name for name, path in MODULES.items() if path.name == "__init__.py"}
@@ -124,8 +126,8 @@ def test_there_are_no_symbolic_links() -> None:
 
 
 def test_imports_go_downwards() -> None:
-    """No wing imports one above it, none what is not for it, and there is no circle."""
-    level = {"__main__": -1} | {wing: number for number, storey in enumerate(STOREYS) for wing in storey}
+    """No subpackage imports one above it, none what is not for it, and there is no circle."""
+    level = {"__main__": -1} | {part: number for number, storey in enumerate(STOREYS) for part in storey}
     for own, other in arrows():
         assert level[other] > level[own], f"{own} imports {other}: not downwards"
         assert other != "bench" or own == "cli", f"{own} imports {other}: only cli may"
@@ -146,7 +148,7 @@ def test_a_study_takes_public_names_only(path: Path) -> None:
 
 
 def test_the_drawing_shows_the_arrows() -> None:
-    """Arrows between wings in docs/architecture.md are those of the code, no more and no fewer."""
+    """Arrows between subpackages in docs/architecture.md are those of the code, no more and no fewer."""
     text = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
     drawn = set()
     for block in re.findall(r"```mermaid\n(.*?)```", text, flags=re.DOTALL):

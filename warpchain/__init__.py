@@ -26,7 +26,7 @@ What they return, take and raise:
 
     WalkResult       one walk: status, distance, energies, time series, frames; `plot`, `animate`, `save`
     SweepResult      a sweep: arrays with named axes and units
-    State            a chain at one instant, from which a walk goes on: `WalkResult.state`, `State.of_joints`
+    State            a chain at one instant, from which a walk continues: `WalkResult.state`, `State.of_joints`
     Trajectory       the motion of a given chain
     Parameters       physical parameters of a chain, its sprocket and the floor
     Status           how a walk ended, with a sentence that says what to try

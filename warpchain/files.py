@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all, and what a new file may replace.
+"""Writes files completely or not at all, and refuses to replace anything but regular files.
 
 A file takes the place of nothing or of a regular file, never of a folder, device, FIFO, socket or symbolic link. A link
 is refused, not followed: a folder of unknown origin could point it at any file. Links in the path to it are followed.

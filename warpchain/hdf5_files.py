@@ -1,4 +1,4 @@
-"""HDF5 files of results: equal content gives equal bytes, and a checksum tells of damage.
+"""HDF5 files of results: equal content gives equal bytes, and a checksum detects damage.
 
 The first attribute of a file, `checksum`, holds the length of the file and the SHA-256 of all its bytes but these 64
 digits:

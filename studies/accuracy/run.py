@@ -42,7 +42,9 @@ def compare(new: warpchain.SweepResult, base: warpchain.SweepResult) -> None:
     distances, bounces = cells(new, "dx"), cells(new, "bounces")
     base_distances, base_bounces = cells(base, "dx"), cells(base, "bounces")
     if distances.keys() != base_distances.keys():
-        raise warpchain.InputError(f"{new.name} and {base.name}: other cells; give sweeps of the same blocks and grids")
+        raise warpchain.InputError(
+            f"{new.name} and {base.name}: other cells; use sweeps with the same blocks and grids"
+        )
     rows = []
     for name, b in base_distances.items():
         a = distances[name][: len(b)]

@@ -24,7 +24,7 @@ DIGITS = 4  # Significant digits that are kept
 def reduced(result: SweepResult) -> Numbers:
     """The numbers of one sweep."""
     if result.name not in SWEEPS:
-        raise InputError(f"{result.name}: no sweep of this page; give folders of {', '.join(SWEEPS)}")
+        raise InputError(f"{result.name}: not a sweep of this page; use folders of {', '.join(SWEEPS)}")
     if result.missing_count:
         raise InputError(f"{result.name}: {result.missing_count} walks are missing; run the sweep to its end")
     content: Numbers = {
@@ -69,7 +69,7 @@ def effects_of(result: SweepResult, block: Block, name: str, table: Cells) -> Nu
     else:
         reference = further.REFERENCES[name]
     if reference not in (values := block.axes[name].tolist()):
-        raise InputError(f"{name}: {reference} is not among {values}; give a sweep that has it")
+        raise InputError(f"{name}: expected {reference} among {values}; use a sweep that has it")
     return {"reference": reference, "values": values_of(table, name, reference)}
 
 

@@ -26,7 +26,7 @@ def make(folders: Annotated[list[Path] | None, typer.Argument()] = None, out: Pa
     sweeps = {sweep.name: sweep for sweep in map(warpchain.load, folders or ())}
     known |= {name: reduced(sweep) for name, sweep in sweeps.items()}
     if missing := [name for name in SWEEPS if name not in known]:
-        raise warpchain.InputError(f"{missing[0]}: no numbers of this sweep; give its folder")
+        raise warpchain.InputError(f"{missing[0]}: no numbers of this sweep; pass its folder")
     text = text_of({name: known[name] for name in SWEEPS})
     if folders:
         (out / RESULTS).write_text(text, encoding="utf-8")

@@ -28,11 +28,11 @@ def walks_by_cell(parts: Sequence[SweepResult], names: Sequence[str] = COLUMNS) 
     found: dict[Cell, list[dict[str, Array]]] = {}
     for number, part in enumerate(parts):
         if axes := [block.axes for block in part.blocks.values() if set(block.axes) != {"links", "frequency"}]:
-            raise InputError(f"{part.name}: axes are {', '.join(axes[0])}; give a sweep of links and frequency")
+            raise InputError(f"{part.name}: expected links and frequency, got {', '.join(axes[0])}; use such a sweep")
         if settings_of(part) != settings_of(parts[0]):
             raise InputError(f"{part.name}: other settings than the parts before; reduce it alone")
         if part.sweep["seed"] in [other.sweep["seed"] for other in parts[:number]]:
-            raise InputError(f"{part.name}: walks of another part, the seed is the same; leave one out")
+            raise InputError(f"{part.name}: repeats the seed of another part; remove one")
         for block in part.blocks.values():
             for place, at in of_cells(block):
                 walks = {name: block.columns[name][place] for name in names}

@@ -33,7 +33,7 @@ def reduced(result: SweepResult) -> Iterator[dict[str, float | str]]:
     for content in result.sweep["blocks"]:
         name, block = content["name"], result.blocks[content["name"]]
         if not {"links", "frequency"} <= block.axes.keys():
-            raise InputError(f"block {name}: no axes links and frequency; give a folder of the sweep scaling")
+            raise InputError(f"block {name}: expected axes links and frequency; use a folder of the sweep scaling")
         if np.any(block.columns["status"] < 0):
             raise InputError(f"block {name}: walks are missing; run the sweep to its end")
         for place, at in common.of_cells(block):

@@ -90,7 +90,7 @@ def draw_kinks(result: warpchain.SweepResult) -> Figure:
                 scene = walk.setup.scene
                 kinks.setdefault(scene.links, {}).setdefault(scene.frequency, []).append(walk.mean_loop().kink())
     if not kinks:
-        raise warpchain.InputError(f"{result.name}: no frames before a release; give a folder of the sweep kink")
+        raise warpchain.InputError(f"{result.name}: no frames before a release; use a folder of the sweep kink")
     figure = Figure(figsize=(9.6, 3.6), layout="constrained")
     panels = figure.subplots(1, 3)
     for axes, name, label, scale in (

@@ -20,7 +20,7 @@ def reduced(folder: str, needed: str) -> tuple[warpchain.SweepResult, list[dict[
     """A sweep, and rows: what each tap does, over the cells."""
     result, found = warpchain.load(folder), []
     if not {"fixed", needed} <= result.blocks.keys():
-        raise warpchain.InputError(f"{folder}: no blocks fixed and {needed}; give a folder of the page's sweep")
+        raise warpchain.InputError(f"{folder}: no blocks fixed and {needed}; use a folder of the page's sweep")
     fixed = result.blocks["fixed"].statistics()
     settings = {each["name"]: each["scene"] for each in result.sweep["blocks"]}
     for name, block in result.blocks.items():

@@ -60,7 +60,7 @@ def corner(answer: video.Posterior) -> Figure:
 
 
 def line_figure(line: video.FrictionLine) -> Figure:
-    """Way against lift, with the friction line; crosses were not fitted."""
+    """Displacement against height gain, with the friction line; crosses were not fitted."""
     figure, used = Figure(figsize=(5.2, 3.4), layout="constrained"), line.time <= line.end
     axes = figure.subplots()
     for chosen, style in ((used, "o"), (~used, "x")):
@@ -68,7 +68,7 @@ def line_figure(line: video.FrictionLine) -> Figure:
     ends = 1e3 * np.array([0, line.height_gain[used].max()])
     axes.plot(ends, line.friction * ends, color=RED, label=f"$μ$ = {line.friction:.4f} ± {line.error:.4f}")
     axes.legend(frameon=False)
-    tidy(axes, grid="both", xlabel="lift $y - y_0 + g t^2/2$ / mm", ylabel="way $x - x_0$ / mm")
+    tidy(axes, grid="both", xlabel="height gain $y - y_0 + g t^2/2$ / mm", ylabel="displacement $x - x_0$ / mm")
     return figure
 
 

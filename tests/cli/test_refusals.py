@@ -19,7 +19,7 @@ ESCAPE = "\x1b]0;owned\x07\x1b[2J"
 
 REFUSED = {
     "walk -o new --links 61": "scene.links: expected an even number, got 61",
-    "walk --set clearance": "--set: 'clearance' gives no value",
+    "walk --set clearance": "--set: expected NAME=VALUE, got 'clearance'",
     "walk --set scene.gravity=1": "--set 'scene.gravity': unknown name; move it to parameters",
     "walk --set mu_fc=0.3 --set floor_friction=0.3": "parameters.floor_friction: given twice on the command line;",
     "walk -o new --device cuda:98": "options.device: cuda:98 is not available on this machine",
@@ -30,10 +30,10 @@ REFUSED = {
     "walk extra": "Got unexpected extra argument(s) (extra); see warpchain walk --help",
     "walk -o walk.h5": "walk.h5: cannot be written (Not a directory); use a folder that exists",
     f"walk -o {'x' * 300}": "xxx",
-    "walk --like walk.h5 --seed 3": "--seed: given together with --like",
+    "walk --like walk.h5 --seed 3": "--seed: not possible with --like",
     "walk --like walk.h5 --index 3": "--index: not possible for walk.h5, a single walk; remove it",
     "plot text.h5": "text.h5: not an HDF5 file",
-    "plot walk.h5 --quantity dx": "--quantity: a saved walk has no columns",
+    "plot walk.h5 --quantity dx": "--quantity: not possible for a saved walk",
     "plot walk.h5 -o text.h5": "text.h5: cannot be written (File exists); use a folder",
     "animate nowhere.h5": "nowhere.h5: cannot be read (No such file or directory)",
     "animate walk.h5 -o nowhere/walk.gif": "nowhere/walk.gif: cannot be written",
@@ -50,7 +50,7 @@ REFUSED = {
     "sweep --new new.yaml --seed 0": "--new: not possible with other arguments; remove them",
     "sweep tiny.yaml -o new --gpus 2 --workers 3": "--workers: not possible with --gpus; remove one",
     "sweep tiny.yaml -o new --gpus 2 --device cpu": "--device: cpu is not possible with --gpus; use cuda",
-    "bench --links 61": "bench.links: 61 is odd",
+    "bench --links 61": "bench.links: expected an even number, got 61",
     "bench --device cuda:99 --links 2000": "bench.links: expected at most 1024 on a GPU, got 2000; use fewer",
 }
 """Arguments → how the line of refusal begins."""
@@ -96,7 +96,7 @@ def test_names_of_files_are_printed_without_control_characters(command: Command,
     assert (answer.status, answer.out, answer.err) == (0, "a\\x1b[31mb.json\n", "")
     assert (tmp_path / "a\x1b[31mb.json").exists()
     answer = command("sweep", "--new", "a\x1b[31mb.json")
-    assert (answer.status, answer.out) == (2, "") and "a\\x1b[31mb.json exists" in answer.err
+    assert (answer.status, answer.out) == (2, "") and "a\\x1b[31mb.json already exists" in answer.err
 
 
 def test_a_folder_cannot_hide_its_name(command: Command, tmp_path: Path) -> None:

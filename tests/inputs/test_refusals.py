@@ -80,7 +80,7 @@ STILL = [0.1, 0, 0, 0]
     ("settings", "message"),
     [
         ({"links": 60.5}, "scene.links: expected an integer, got 60.5"),
-        ({"start": "elipse"}, "scene.start: expected 'rest', 'spinning' or 'ellipse', got 'elipse'"),
+        ({"plane": "tiltng"}, "scene.plane: expected 'fixed' or 'tilting', got 'tiltng'"),
         ({"floor": "hilly"}, "scene.floor: expected flat or points, got 'hilly'; use e.g. [[0, 0], [1, 0.1]]"),
         ({"floor": [[0, 0], [1]]}, "scene.floor[1][1]: missing; set a value"),
         ({"floor": [[0, 0, 0.1], [1, 0]]}, "scene.floor[0][3]: missing; set a value"),

@@ -143,13 +143,15 @@ def test_what_is_no_request(content: bytes, status: int, server: LiveServer) -> 
             assert b" 413 " in line.recv(100)
     else:
         assert ask(server, "/walk", content)[0] == status
-    assert messages(ask(server, "/walk", {"links": 31})[1])[-1]["error"].startswith("scene.links: 31 is odd")
+    assert messages(ask(server, "/walk", {"links": 31})[1])[-1]["error"].startswith(
+        "scene.links: expected an even number, got 31"
+    )
 
 
 @pytest.mark.parametrize(
     ("asked", "told"),
     [
-        ({"links": 31}, "scene.links: 31 is odd"),
+        ({"links": 31}, "scene.links: expected an even number, got 31"),
         ({"links": 10**9}, "scene.links: expected at most 400 on a live page, got 1000000000"),
         ({"links": "many"}, "scene.links: expected an integer, got 'many'"),
         ({"frequency": -1}, "scene.frequency: expected at least 0 Hz, got -1"),
@@ -163,12 +165,12 @@ def test_what_is_no_request(content: bytes, status: int, server: LiveServer) -> 
         ({"preset": "none"}, "preset: "),
         ({"preset": {}}, "preset: "),
         ({"seed": -1}, "seed: "),
-        ({"slope": 10, "floor": [[0, 0], [1, 0]]}, "scene.slope: 10.0 of a floor that is a profile"),
-        ({"index": 3, "preset": None}, "index: 3 of no sweep"),
+        ({"slope": 10, "floor": [[0, 0], [1, 0]]}, "scene.slope: not possible with a profile"),
+        ({"index": 3, "preset": None}, "index: no sweep is open"),
         ({"push": []}, "push: "),
         ({"push": [[0.1, 0, 0.1]]}, "push[0]"),
         ({"push": [[0.1, 99, 0.1, 0]]}, "push: expected a link of 0 to 39, got 99"),
-        ({"push": [[99.0, 0, 0.1, 0]]}, "t: 99 s is not in the walk"),
+        ({"push": [[99.0, 0, 0.1, 0]]}, "t: expected 0 to "),
         ({"push": "x"}, "push: "),
     ],
 )
@@ -235,7 +237,7 @@ def test_samples_are_those_of_the_library(server: LiveServer) -> None:
     ):
         assert ask(server, "/samples", {"setups": [FIRST], "first": 0, "count": 1} | wrong)[0] == 400
     _, text = ask(server, "/samples", {"setups": [FIRST | {"links": 31}], "first": 0, "count": 1})
-    assert messages(text)[-1]["error"].startswith("scene.links: 31 is odd")
+    assert messages(text)[-1]["error"].startswith("scene.links: expected an even number, got 31")
 
 
 def test_what_is_pushed_goes_on_from_its_state(server: LiveServer) -> None:

@@ -86,7 +86,7 @@ def test_refusals() -> None:
         (make_unreleased(), "height_and_speed", r"walk: it has no time series\. The chain did not circulate"),
         (make_unreleased(), "film_strip", r"no frames; it was not released\. The chain did not circulate"),
         (make_unreleased(), "loop", "ended before its release; see its status"),
-        (make_walk(), "pie", "kind: 'pie' is unknown"),
+        (make_walk(), "pie", "kind: unknown kind 'pie'"),
         (make_walk(), "tilt", "walk: its plane is fixed"),
     ):
         with pytest.raises(ValueError, match=problem):

@@ -235,7 +235,7 @@ def test_what_a_walk_does_not_have_is_in_no_mean(tmp_path: Path, command: Comman
 def test_every_grid_has_a_figure(tmp_path: Path, grid: dict[str, Any], names: list[str]) -> None:
     """What no special figure shows has a figure of its grid; all can be drawn."""
     pictures = list(figures(make_sweep(tmp_path, sweep(grid), flawed)))
-    assert [picture.name for picture in pictures] == names
+    assert [picture.name for picture in pictures if picture.name.startswith("distance")] == names
     for picture in pictures:
         picture.figure.savefig(tmp_path / "picture.png", dpi=40)
 

@@ -159,7 +159,7 @@ def test_walk_is_run_again(folder: Path, tmp_path: Path, monkeypatch: pytest.Mon
     assert asked == [load_sweep(result.sweep).walk(5).setup]
     text = document.texts["one-walk"]
     assert f"Walk 5 (block ellipse, n = 120, ν = 20 Hz, sample 0), run again for this page: Δx = {dx:.4f} m" in text
-    assert "The sweep has the same, to the bit." in text
+    assert "The sweep has the same, bit for bit." in text
     assert len(document.images) == 2
     (player,) = document.frames
     assert player.startswith("<!DOCTYPE html>") and "getElementById" in player

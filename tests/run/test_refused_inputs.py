@@ -66,7 +66,7 @@ REFUSED: dict[Callable[..., object], list[tuple[dict[str, Any], str]]] = {
         ({"toleranze": 1e-3}, r"options\.toleranze: unknown name; did you mean options\.tolerance\?"),
         ({"links": 8}, r"options\.links: not possible here; move it to scene"),
         ({"skin": -1.0, "tolerance": 1.0}, r"options\.\w+: .* \(and 1 more\)"),
-        ({"soften_pile": True}, r"options\.soften_pile: only a walk has phases .*"),
+        ({"soften_pile": True}, r"options\.soften_pile: only a walk softens its joints; remove it"),
         ({"soften_drive": True}, r"options\.soften_drive: only a walk .*"),
         ({"parameters": {"link_length": 1.0}}, r"preset: unknown preset .*; use one of paper, soft"),
         ({"position": "abc"}, r"position: expected an array of numbers; use one of shape \(n, 3\)"),
@@ -115,7 +115,7 @@ REFUSED: dict[Callable[..., object], list[tuple[dict[str, Any], str]]] = {
         ({"parameters": SOFT}, "parameters: expected Parameters of each of 2 chains, got .*"),
         ({"position": PAIR["position"] - [0.0, 0.2, 0.0]}, "position: link . starts .* m inside the floor; raise .*"),
         ({"position": PAIR["position"] * [2.0, 2.0, 1.0]}, "position: the loop is not closed: .*; let links meet"),
-        ({"floor": [[-1, 0], [1, 0]]}, "floor: expected true or false; .*"),
+        ({"floor": [[-1, 0], [1, 0]]}, "floor: expected true or false, got .*"),
         ({"soften_drive": True}, r"options\.soften_drive: .*"),
     ],
 }

@@ -164,7 +164,7 @@ def test_parameter_sets(tmp_path):
     words = warpchain.sweep(
         points={"method": ["explicit", "explicit"]}, links=30, samples=1, **SHORT, out=tmp_path / "words"
     )
-    with pytest.raises(InputError, match=r"method: its values are words, .*; take to_xarray"):
+    with pytest.raises(InputError, match=r"method: its values are words, .*; use to_xarray"):
         words.design()
     data = result.to_xarray()
     assert data.floor_friction.dims == ("point",) and (data.floor_friction == table["mu_fc"]).all()
@@ -204,9 +204,9 @@ def test_all_errors_are_told_at_once(tmp_path):
     ("keywords", "begin"),
     [
         ({}, "sweep.samples: missing"),
-        ({"samples": 1, "grid": {"links": [28]}}, "sweep.grid.links[0]: 28 links do not reach round"),
-        ({"samples": 1, "same_samples_along": ["links"]}, "sweep.same_samples_along: 'links' is no axis"),
-        ({"preset": "soft", "links": 60, "source": {"version": 1}}, "preset, links: given together with a source"),
+        ({"samples": 1, "grid": {"links": [28]}}, "sweep.grid.links[0]: 28 links do not reach around"),
+        ({"samples": 1, "same_samples_along": ["links"]}, "sweep.same_samples_along: 'links' is not an axis"),
+        ({"preset": "soft", "links": 60, "source": {"version": 1}}, "preset, links: not possible with a source"),
         ({"samples": 1, "start": ...}, "sweep.scene.start: expected"),
         ({"samples": 1, "part": "3/2"}, "part: expected k/N"),
         ({"samples": 1, "grid": {"device": ["cpu", "cuda"]}, "device": "cpu"}, "sweep.grid: method is "),

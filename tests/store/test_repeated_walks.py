@@ -93,9 +93,9 @@ def test_a_walk_that_is_not_named_is_refused(command: Command, folder: Path, lin
 def test_numbers_that_say_no_walk_are_refused(folder: Path) -> None:
     """A number beside values of axes or a sample, or a truth value."""
     result = warpchain.load(folder)
-    with pytest.raises(InputError, match="frequency: given together with index"):
+    with pytest.raises(InputError, match="frequency: not possible with index"):
         result.walk(0, frequency=3.0)
-    with pytest.raises(InputError, match="sample: given together with index"):
+    with pytest.raises(InputError, match="sample: not possible with index"):
         result.walk(0, sample=1)
     with pytest.raises(InputError, match="index: expected an integer, got True"):
         result.walk(True)

@@ -10,7 +10,9 @@ import warpchain
 from tests.support.made_walks import make_unreleased
 from warpchain import WalkResult
 from warpchain.chain.resolution import resolve
-from warpchain.walks.landmarks import bounces
+from warpchain.kernels.events import tallies, tilting
+from warpchain.pictures.walk_figures import FALLEN
+from warpchain.walks.landmarks import PAUSE, bounces
 
 
 @pytest.fixture(scope="module")
@@ -88,6 +90,12 @@ def test_bounces_of_a_walk_are_those_that_kernels_count(walk: WalkResult) -> Non
 def test_walks_without_bounces_have_none() -> None:
     """One that was never released has an empty table."""
     assert all(len(column) == 0 for column in make_unreleased().bounce_table().values())
+
+
+def test_constants_that_kernels_have_too_are_the_same() -> None:
+    """The pause between two bounces, and the tilt at which a chain has fallen over."""
+    assert float(tallies.BOUNCE_PAUSE) == PAUSE
+    assert float(tilting.FALLEN) == pytest.approx(np.sin(np.radians(FALLEN)), abs=1e-15)
 
 
 @pytest.mark.parametrize(

@@ -45,7 +45,7 @@ def test_energies_go_into_axes_of_the_caller() -> None:
         assert walk.plot("energy", ax=axes) is own and len(axes.lines) == 5
     with pytest.raises(ValueError, match="ax: film_strip has several axes"):
         walk.plot("film_strip", ax=axes)
-    with pytest.raises(ValueError, match="ax: given together with figure"):
+    with pytest.raises(ValueError, match="ax: not possible with figure"):
         walk.plot("energy", ax=axes, figure=own)
     with pytest.raises(ValueError, match="it has no time series"):
         make_unreleased().plot("energy")

@@ -13,6 +13,7 @@ from scipy.optimize import minimize
 import warpchain
 from tests.oracle_model.motion_equations import gravitational_energy, kinetic_energy
 from warpchain import InputError, State, WalkResult
+from warpchain.kernels.cpu import stage_rows
 from warpchain.walks.walk_numbers import MOTION, NUMBERS
 
 SPUN = {"links": 36, "frequency": 15.0, "start": "spinning"}
@@ -80,7 +81,7 @@ def test_a_state_of_the_rest_is_that_of_the_walk(fall: WalkResult, tmp_path: Pat
 def test_a_perturbed_state_is_another_walk_with_a_ledger_of_its_own(
     settings: Mapping[str, Any], tmp_path: Path
 ) -> None:
-    """Δx changes, energy counts from the perturbed state, clock and events go on; it is repeated to the bit as well."""
+    """Δx changes, energy counts from the perturbed state, clock and events go on; it is repeatable bit for bit."""
     whole = warpchain.walk(**settings)
     state = whole.state(0.4 * whole.walk_time)
     perturbed = replace(state, velocity=1.01 * state.velocity)
@@ -193,7 +194,7 @@ def test_a_chain_on_an_outline_falls_to_rest() -> None:
     ("joints", "problem"),
     [
         (RING * 1000, "joints: the loop is not closed, or lengths are not in m"),
-        (outline(11, LENGTH), "joints: 11 is odd"),
+        (outline(11, LENGTH), "joints: expected an even number, got 11"),
         (RING[:, :1], r"joints: expected shape .*, got \(12, 1\)"),
         (RING * np.nan, "joints: holds a number that is not finite"),
         ("ring", "joints: not an array"),
@@ -209,8 +210,8 @@ def test_outlines_that_are_no_chain_are_refused(joints: Any, problem: str) -> No
 @pytest.mark.parametrize(
     ("settings", "problem"),
     [
-        ({"links": 12, "clearance": 0.1}, "links, clearance: given together with a state"),
-        ({"seed": 1}, "seed: given together with a state"),
+        ({"links": 12, "clearance": 0.1}, "links, clearance: not possible with a state"),
+        ({"seed": 1}, "seed: not possible with a state"),
         ({"walk_limit": 0.1}, "walk_limit: 0.1 s is before the state"),
         ({"floor": [[-1, 0.5], [1, 0.5]]}, r"start: link \d+ starts 0\.\d+ m inside the floor; raise"),
     ],
@@ -236,3 +237,11 @@ def test_a_state_keeps_its_floor_in_simulate() -> None:
     assert (y + x * math.tan(math.radians(10))).min() > 0 > y.min()
     with pytest.raises(InputError, match=r"position: link \d+ starts .* inside the floor"):
         warpchain.simulate(replace(state, position=state.position - [0, 0.3, 0]), duration=0.1, floor=True)
+
+
+def test_a_state_of_other_rows_is_refused(fall: WalkResult, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What kernels with other rows of memory kept is not read as if it were ours; all rows of the memory count."""
+    state = fall.state(0.3)
+    monkeypatch.setattr(stage_rows, "STAGES", stage_rows.STAGES + 1)
+    with pytest.raises(InputError, match="made with other kernels"):
+        warpchain.walk(start=state)

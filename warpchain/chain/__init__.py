@@ -1,1 +1,1 @@
-"""What a chain and its walk are: a checked setup, what follows from it, states, floors, start shapes."""
+"""Definitions of chains and walks: checked setups, states, floors and start shapes; no device is needed."""

@@ -1,4 +1,4 @@
-"""The floor of a walk and its kinds: flat, an endless slope, or a profile given by points.
+"""The floor of a walk: flat, an infinite slope, or a profile given by points.
 
 No other module knows the kinds. A new one is a branch of `FloorField` in `warpchain.inputs.compound_fields`, a subclass
 of `Floor`, a line of `floor_from`.
@@ -24,7 +24,7 @@ ENDLESS: Final = 1e9
 
 
 class Floor:
-    """A floor, as all else knows it: points joined by straight lines, which go on beyond the first and the last point.
+    """A floor: points joined by straight lines, of which the first and the last extend to infinity.
 
     Nothing hangs over. Another kind of floor is a subclass with a body of its own and all that asks for the points. The
     body is a name among the `BODIES` of `warpchain.kernels.contacts.fixed_body`, of two points a slope; points are x

@@ -1,4 +1,4 @@
-"""Which part of the motion of a walk is kept: said once, from the arguments of a call or a sweep to the device."""
+"""`Keep`, which part of a walk's motion is recorded; made from arguments, it is passed down to the device."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

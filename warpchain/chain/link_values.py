@@ -1,4 +1,4 @@
-"""What each link and joint of a chain has of its own: two kinds of links in turn, values for each, or a rule.
+"""Properties of each link and joint of a chain: two kinds of links in turn, values for each, or a rule.
 
 A link of a chain of two kinds has its kind's mass and inertia; all circles are alike, and all joints have the same
 friction. `Scene` may give values for each link instead (`link_masses` …), let masses grow along the chain, hang a charm
@@ -20,7 +20,7 @@ from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import OF_LINKS, Scene
 
 LEAST_INERTIA: Final = 0.5
-"""Part of its rotary inertia that a link must keep under multiplied loads."""
+"""Part of its rotary inertia that a link must keep under scaled loads."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Measured outlines: joints that were seen in a picture, made those of a chain of links of one length."""
+"""Fits measured joints to a chain of links of one length; `State.of_joints` calls this."""
 
 from typing import Final
 

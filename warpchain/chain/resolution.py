@@ -1,4 +1,4 @@
-"""The one door through which a user's values come in: scene, options and parameters of a walk, checked together.
+"""Resolves a user's values to the `Setup` of a walk; scene, options and parameters are checked together.
 
 Keyword arguments, the command line and YAML files all go through `resolve`, which raises only `InputError`.
 """

@@ -1,4 +1,8 @@
-"""What one walk is: its `Setup`, and the `State` of a chain that it may begin from."""
+"""The complete definition of one walk, `Setup`, and a chain at one instant, `State`.
+
+Every walk is computed from a `Setup`: single walks make one from keywords, sweeps make one per sample, and a result
+keeps the one that it was computed from. Users take a `State` from a walk, or make one of measurements.
+"""
 
 import hashlib
 import math
@@ -42,12 +46,11 @@ FARTHEST_UNSAID: Final = 1e-3
 
 @dataclass(frozen=True)
 class Setup:
-    """Everything that says what one walk is, checked and complete.
+    """All values that define one walk, checked and complete; `walk(setup=…)` repeats the walk bit for bit.
 
-    `preset` is the name of the one that the parameters started from. Without a `start` the walk begins as the scene
-    says; with one, the scene has values that matter before the release from the walk that the state was taken from.
-
-    What follows from these values alone is a property, and is computed once.
+    Users read it as `walk.setup`. `preset` names the preset that the parameters started from. Without a `start` the
+    walk begins as the scene defines; with one, values of the scene before the release are those of the state's walk.
+    Quantities that follow from these values alone, such as `loop_speed`, are properties.
     """
 
     preset: str
@@ -63,7 +66,7 @@ class Setup:
 
     @cached_property
     def link_values(self) -> LinkValues:
-        """What each link and joint of the chain has of its own."""
+        """Masses, radii and friction of each link and joint."""
         own = link_values([self.scene], [self.parameters])
         return LinkValues(*(values[0] for values in vars(own).values()))
 
@@ -240,29 +243,30 @@ class Setup:
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class State:
-    """A chain of n links at one instant, which `walk(start=…)` and `simulate` go on from.
+    """A chain of n links at one instant, from which `walk(start=state)` and `simulate(state)` continue.
 
-    `WalkResult.state` takes one from a walk, `State.of_joints` makes one of a measured outline, `State.of_links` of any
-    motion. `dataclasses.replace(state, velocity=1.001 * state.velocity)` is a perturbed one. While nothing is changed
-    the walk that begins from it is the rest of the first one to the bit. With another position, velocity or plane the
-    chain goes on with the clock, the softness of the joints, the counters and the noted events of its walk; its energy
-    ledger begins anew.
+    `WalkResult.state` takes a state from a walk, `State.of_joints` makes one from measured joints, and `State.of_links`
+    from any positions and velocities. `dataclasses.replace(state, velocity=1.001 * state.velocity)` perturbs it. A walk
+    from an unchanged state continues its walk bit for bit. If position, velocity or plane were changed, the walk
+    continues with the time, the softness of the joints, the counters and the events of the first walk, but with a new
+    energy balance.
 
     Attributes:
-        position: x, y [m] and θ [rad] of each link's centre, (n, 3). Link i's right end meets link i + 1's left end,
-            the last link's the first one's. Links 0, 2, … are inner ones. If the plane tilts, places are in the plane.
-            Δx and `distance_limit` count from x = 0.
-        velocity: their rates [m/s, m/s, rad/s], (n, 3).
-        setup: of its walk: parameters of the chain, scene, options.
-        time: since the release [s]; 0 unless it is a state of a walk.
-        origin: origin of the plane's coordinates in the room [m], (3,); None if the plane is fixed, like the next two.
-        axes: directions of x and y of the plane in the room, (2, 3).
-        plane_rates: speed [m/s] across the plane at its origin, and its turning rates [rad/s] about x and y, (3,).
-        memory: what else the walk had at that instant; only the package reads it.
+        position: x, y [m] and θ [rad] of each link's centre of mass, shape (n, 3). The right end of link i meets the
+            left end of link i + 1, and that of the last link meets link 0. Links 0, 2, … are inner links. If the plane
+            tilts, x and y are coordinates in the plane. Δx and `distance_limit` are measured from x = 0.
+        velocity: rates of change of `position` [m/s, m/s, rad/s], shape (n, 3).
+        setup: setup of its walk: parameters of the chain, scene and options.
+        time: time since the release [s]; 0 unless the state is that of a walk.
+        origin: origin of the plane's coordinates in the laboratory frame [m], shape (3,); None if the plane is fixed.
+        axes: directions of the plane's x and y in the laboratory frame, shape (2, 3); None if the plane is fixed.
+        plane_rates: velocity of the plane's origin across the plane [m/s], and angular velocities of the plane about
+            its x and y [rad/s], shape (3,); None if the plane is fixed.
+        memory: further variables that a bitwise restart needs; only the package reads them.
 
     Raises:
-        InputError: an array has another shape, holds no finite numbers or places more than 10 km away, or the loop is
-            not closed.
+        InputError: an array has another shape or values that are not finite, a position is more than 10 km away, or
+            the loop is not closed.
     """
 
     position: Array
@@ -308,15 +312,16 @@ class State:
     def of_links(
         cls, position: ArrayLike | None, velocity: ArrayLike | None, parameters: Parameters | str = DEFAULT_PRESET
     ) -> "State":
-        """The state of links whose centres, angles and rates are known, see the attributes.
+        """Make a state from the positions and velocities of all links.
 
         Args:
-            position: (n, 3); n at least 4, and even unless inner and outer links are equal.
-            velocity: (n, 3).
-            parameters: of the chain, or the name of a preset.
+            position: x, y [m] and θ [rad] of each link, shape (n, 3), as described for the class; n is at least 4, and
+                even unless inner and outer links are equal.
+            velocity: rates of change of `position`, shape (n, 3).
+            parameters: physical parameters of the chain, or the name of a preset.
 
         Raises:
-            InputError: as of the class; or the number of links is refused.
+            InputError: the number of links is refused, or an array, as described for the class.
         """
         places = checked_array(position, "position", "n", 3)
         rates = checked_array(velocity, "velocity", len(places), 3)
@@ -326,13 +331,14 @@ class State:
     def of_joints(
         cls, joints: ArrayLike, velocity: ArrayLike | None = None, parameters: Parameters | str = DEFAULT_PRESET
     ) -> "State":
-        """The state of a chain whose joints were measured; they move as little as fits links of one length.
+        """Make a state from measured joints, which are moved as little as possible to fit links of one length.
 
         Args:
-            joints: x, y of each joint in order around the loop [m], (n, 2); joint i ends link i, and links 0, 2, … are
-                inner ones. y = 0 is the floor. n is at least 4, and even unless inner and outer links are equal.
-            velocity: their rates [m/s], (n, 2); None: at rest.
-            parameters: of the chain, or the name of a preset.
+            joints: x and y of each joint in order around the loop [m], shape (n, 2); joint i is at the end of link i,
+                and links 0, 2, … are inner links. y = 0 is the floor. n is at least 4, and even unless inner and outer
+                links are equal.
+            velocity: velocities of the joints [m/s], shape (n, 2); None: at rest.
+            parameters: physical parameters of the chain, or the name of a preset.
 
         Raises:
             InputError: two neighbours are not about a link length apart: the loop is not closed, or lengths are in
@@ -376,7 +382,7 @@ class State:
 
     @property
     def joints(self) -> Array:
-        """Joints x, y [m], (n, 2), as the end of link i; if the plane tilts, in the plane."""
+        """x and y of the joint at the end of each link [m], shape (n, 2); if the plane tilts, in its coordinates."""
         return circles_of(self.position, self.parameters.link_length)[self.links :]
 
 

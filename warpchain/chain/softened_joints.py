@@ -1,4 +1,4 @@
-"""Joints that a walk softens, on the sprocket and in the pile: constants of the numerics, which no preset changes.
+"""Properties of softened joints, on the sprocket and after a collapse; they are numerical constants, not presets.
 
 The kernels in `warpchain.kernels.events.softening` go from a chain's own joints over these softly; loops on softened
 joints and their averages count with them.

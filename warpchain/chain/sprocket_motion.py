@@ -1,6 +1,6 @@
-"""The sprocket after the release, if it does not vanish at once: where it goes, and how fast it turns.
+"""The prescribed motion of the sprocket after the release (`release` of a scene): position and frequency.
 
-It starts at rest; between the rows of its motion it goes on monotone cubics (PCHIP), without overshoot.
+It starts at rest; between the rows of its motion it follows monotone cubics (PCHIP), without overshoot.
 """
 
 from typing import Final

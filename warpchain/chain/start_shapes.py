@@ -1,4 +1,4 @@
-"""Closed chains of rigid links laid along a curve, at rest or circulating; walks begin from them.
+"""Lays closed chains of rigid links along a curve, at rest or circulating, as initial states of walks.
 
 Joints must close the loop to rounding: at k = 1e9 N/m an opening of 0.1 mm holds 5 J. So Newton's method solves for the
 joints' places on the curve together with the curve's size. The circulating velocities are the exact rigid motion along
@@ -151,10 +151,10 @@ def lay_chains(
         s[:, 0] = phase * period
         ends, along, growth = curve.points(np.concatenate([s, (s[:, 0] + period)[:, np.newaxis]], axis=1), size)
         chord = ends[..., 1:] - ends[..., :-1]
-        residual = (chord * chord).sum(0) - length**2
-        to_here = -2 * (chord * along[..., :-1]).sum(0)
-        to_following = 2 * (chord * along[..., 1:]).sum(0)
-        to_size = 2 * (chord * (growth[..., 1:] - growth[..., :-1])).sum(0)
+        residual = _dot(chord, chord) - length**2
+        to_here = -2 * _dot(chord, along[..., :-1])
+        to_following = 2 * _dot(chord, along[..., 1:])
+        to_size = 2 * _dot(chord, growth[..., 1:] - growth[..., :-1])
         # The first joint moves with the period; the last chord ends on it one period later.
         to_size[:, 0] += to_here[:, 0] * phase * curve.period_growth
         to_size[:, -1] += to_following[:, -1] * (1 + phase) * curve.period_growth
@@ -177,8 +177,14 @@ def lay_chains(
     size_rate = rates[:, -1:]
     along_rates = np.concatenate([1.0 + start * curve.period_growth * size_rate, rates[:, :-1]], axis=1)
     joint_rate = along_rates * along + size_rate * growth
-    joint_rate *= (speed / np.sqrt((joint_rate * joint_rate).sum(0)).mean(-1))[:, np.newaxis]
+    joint_rate *= (speed / np.sqrt(_dot(joint_rate, joint_rate)).mean(-1))[:, np.newaxis]
     return *links_between(np.moveaxis(joints, 0, -1), np.moveaxis(joint_rate, 0, -1)), fits
+
+
+def _dot(first: Array, second: Array) -> Array:
+    """Scalar products of vectors (2, …)."""
+    products: Array = first[0] * second[0] + first[1] * second[1]
+    return products
 
 
 def _evenly_spaced(pace: Callable[[Array, Array], Array], s: Array, size: Array) -> Array:

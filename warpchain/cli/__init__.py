@@ -1,1 +1,1 @@
-"""What a user types and sees: the command `warpchain`."""
+"""The command line `warpchain`: commands, options and output."""

@@ -39,7 +39,10 @@ def parameters(
         str, option("NAME", "Preset whose values are shown: paper (Table 1 of the paper) or soft.")
     ] = "paper",
 ) -> None:
-    """List all parameters, scene fields and options, with symbols, units, values, bounds and meanings."""
+    """List all parameters, scene fields and options.
+
+    The list has symbols, units, values, bounds and meanings.
+    """
     from warpchain.cli.output import print_table
     from warpchain.inputs.fields import FIELDS, SECTION_OF, SECTIONS, SYMBOL_OF, dotted_name
     from warpchain.inputs.options import Options
@@ -95,7 +98,7 @@ def bench(
     ] = None,
     as_json: Annotated[bool, JSON] = False,
 ) -> None:
-    """Measure the time and the error of a step of each method, and walks per second.
+    """Measure the speed and the errors of each method.
 
     Steps are attempted steps of one chain in free flight (4000 chains on a GPU), with Table 1's values and the
     method's default tolerance. Errors are the largest errors of a link's position and velocity after 1 ms, compared

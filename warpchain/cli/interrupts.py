@@ -1,4 +1,4 @@
-"""Ctrl-C ends a command at any moment, also where Python loses the exception that it makes.
+"""Ends a command by Ctrl-C at any moment, also where Python would lose the exception.
 
 Python drops a KeyboardInterrupt that is raised in a callback of its own, such as that of a weak reference or a
 `__del__`: it prints "Exception ignored in" and goes on. Libraries may also turn it into an error of theirs.

@@ -1,4 +1,4 @@
-"""The command of the live page."""
+"""The command `live`, which serves or exports the live page."""
 
 import os
 import sys
@@ -21,9 +21,10 @@ def live(
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")] = True,
     export: Annotated[Path | None, output("DIR", _EXPORT, "--export")] = None,
 ) -> None:
-    """Serve an interactive page to this machine only, until Ctrl-C: sliders change the walk of a chain.
+    """Serve an interactive page until Ctrl-C.
 
-    The page shows the walk while it is computed, random samples, pushed links, and the code that repeats the walk.
+    Sliders change the walk of a chain. The page is served to this machine only. It shows the walk while it is
+    computed, random samples, pushed links, and the code that repeats the walk.
     """
     from warpchain.inputs.validation import InputError, printable
 

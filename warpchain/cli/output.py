@@ -1,4 +1,4 @@
-"""What commands print and write: tables, and the folder of a walk with its record and its figures."""
+"""Output of commands: tables, and the folder of a walk with its record and figures."""
 
 import itertools
 import json

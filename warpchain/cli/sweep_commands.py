@@ -1,4 +1,4 @@
-"""The commands of the command line that are about sweeps: sweep, compile, info, plot, report, merge."""
+"""The commands for sweeps: sweep, compile, info, plot, report and merge."""
 
 import contextlib
 import re
@@ -50,7 +50,7 @@ def sweep(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Run a sweep, many walks over a grid of values; rerun the command to resume it."""
+    """Run or resume a sweep: many walks over a grid of values."""
     from warpchain.inputs.validation import InputError, printable
     from warpchain.sweeps.sweep_file import write_new_sweep
 
@@ -113,7 +113,7 @@ def compile_kernels(
     sources: Annotated[list[Path] | None, argument("[FILE.yaml]...", _FILES)] = None,
     device: Annotated[str | None, option("NAME", _DEVICE)] = None,
 ) -> None:
-    """Compile the kernels of sweeps into Warp's cache, for machines or users that cannot write there.
+    """Compile the kernels of sweeps into Warp's cache.
 
     The sweeps that come with warpchain have the kernels of walks with default settings. WARP_CACHE_PATH names the
     folder of the cache. A kernel serves only the versions of warpchain, Warp and Python that compiled it, and
@@ -130,12 +130,12 @@ def compile_kernels(
 
 
 def info(
-    directories: Annotated[list[Path], argument("DIR...", "Folder of a sweep, or of each part; merged files, too.")],
+    directories: Annotated[list[Path], argument("DIR...", "Folder of a sweep, or of each part, or merged files.")],
     as_json: AsJson = False,
 ) -> None:
-    """Show how far a sweep is and what it has found so far.
+    """Show the progress and the results of a sweep.
 
-    Of a merged file the checksum is compared first.
+    For a merged file, the checksum is checked first.
     """
     from warpchain.cli.output import print_sweep
     from warpchain.results.sweep_result import load
@@ -146,9 +146,11 @@ def info(
 def plot(
     paths: Annotated[
         list[Path],
-        argument("PATH...", "Folder of a sweep, or of each part, or of a saved walk; or the file of either."),
+        argument("PATH...", "Folder of a sweep, of each part, or of a saved walk; or their files."),
     ],
-    folder: Annotated[Path | None, output("DIR", "Folder of the figures. Default: that of the first PATH.")] = None,
+    folder: Annotated[
+        Path | None, output("DIR", "Folder for the figures. Default: the folder of the first PATH.")
+    ] = None,
     quantity: Annotated[
         str | None, option("NAME", "Column of a sweep to draw: dx, walk_time, bounces, hold_time ... Default: dx.")
     ] = None,
@@ -231,9 +233,10 @@ def report(
     ] = None,
     device: Annotated[str | None, option("NAME", f"Device on which the walk is run again: {_DEVICE}")] = None,
 ) -> None:
-    """Write the report of a sweep as one HTML page, optionally with an animated walk.
+    """Write a sweep as one HTML page.
 
-    The page has figures, tables, parameters, provenance and failed walks, and needs no other files.
+    The page has figures, tables, parameters, provenance, failed walks and, with --walk, an animated walk. It needs no
+    other files.
     """
     from warpchain.inputs.validation import InputError, printable
     from warpchain.reports.sweep_page import write_report
@@ -246,10 +249,13 @@ def report(
 
 
 def merge(
-    directories: Annotated[list[Path], argument("DIR...", "Folder of a sweep, or of each part; merged files, too.")],
-    path: Annotated[Path, argument("FILE.h5", "The file to write.", parser=output_path)],
+    directories: Annotated[list[Path], argument("DIR...", "Folder of a sweep, or of each part, or merged files.")],
+    path: Annotated[Path, argument("FILE.h5", "File to write.", parser=output_path)],
 ) -> None:
-    """Put the results of a folder, or of all parts of a sweep, into one file, which xarray opens."""
+    """Merge parts of a sweep into one HDF5 file.
+
+    xarray opens the file, and all commands that read a folder of a sweep read it as well.
+    """
     from warpchain.inputs.validation import printable
     from warpchain.results.sweep_result import merge as merge_shards
 

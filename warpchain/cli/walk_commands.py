@@ -1,4 +1,4 @@
-"""The commands about single walks: walk, animate, and the figures of a saved walk."""
+"""The commands for single walks: walk and animate."""
 
 import json
 import sys
@@ -161,7 +161,7 @@ def animate(
     fps: Annotated[float, option("NUMBER", "Pictures per second; in HTML the browser decides. Default: 30.")] = 30.0,
     slow: Annotated[float, option("NUMBER", "Playing time per simulated time. Default: 4.")] = 4.0,
 ) -> None:
-    """Write an animation of a saved walk: GIF, MP4 or HTML with a player."""
+    """Animate a saved walk as GIF, MP4 or HTML."""
     from warpchain.hdf5_files import WALK_FILE
     from warpchain.inputs.validation import InputError, printable
     from warpchain.results.walk_result import load_walk

@@ -1,4 +1,4 @@
-"""Words of the command line that several commands have in common: options and arguments."""
+"""Options and arguments that several commands share."""
 
 from pathlib import Path
 from typing import Any

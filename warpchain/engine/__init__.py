@@ -1,1 +1,1 @@
-"""Chains on a device. Nothing else launches kernels."""
+"""Chains on a device; only this subpackage launches kernels."""

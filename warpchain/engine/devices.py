@@ -1,4 +1,4 @@
-"""Devices: starting one, what differs between a CPU and a GPU, and turns on a GPU."""
+"""Starting a device, the differences between CPU and GPU, and turns of threads on a GPU."""
 
 import concurrent.futures
 import contextlib
@@ -18,7 +18,7 @@ from warpchain.engine.kernel_cache import cache_refusal
 from warpchain.inputs.options import FIBERS, on_gpu
 from warpchain.inputs.validation import InputError
 
-CONNECTIONS = "32"  # queues between host and GPU; with fewer than streams, streams wait for one another
+CONNECTIONS = "32"  # queues between host and GPU; with fewer queues than streams, streams are serialised
 TURN_POLL = 0.2
 """Time [s] between two looks at whether a thread that waits for its turn on a GPU should stop."""
 _start_lock = threading.Lock()

@@ -1,4 +1,4 @@
-"""Streams of a device that has none: work is held back until the host waits for it.
+"""Streams for a device without streams: work is deferred until the host waits for it.
 
 What the host reads too early is then missing, as it would be on a GPU.
 """

@@ -1,4 +1,4 @@
-"""Compiled kernels in Warp's cache, compared with checksums of ours before a process loads them.
+"""Checks the checksums of compiled kernels in Warp's cache before a process loads them.
 
 Warp loads what it finds there: an object with one bit flipped computes another distance or crashes. Beside the folder
 of a module stands a file of the SHA-256 of all that is loaded from it. It is also a lock: while one process compares or

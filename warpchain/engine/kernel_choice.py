@@ -1,4 +1,4 @@
-"""The choice of kernels: by device, features and numbers of links."""
+"""Chooses and loads kernels by device, features and number of links; batches and `compile` call this."""
 
 import threading
 from collections.abc import Callable, Iterable

@@ -1,4 +1,4 @@
-"""What this process may use of the machine: processors, and memory."""
+"""Number of CPU cores and amount of memory that this process may use."""
 
 import contextlib
 import os

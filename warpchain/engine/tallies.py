@@ -1,4 +1,4 @@
-"""What a kernel tallies of each chain: names and meanings, in the order of the rows of `warpchain.kernels.layout`."""
+"""Names and meanings of the counters that kernels keep per chain, in the order of `warpchain.kernels.layout`."""
 
 from typing import Final
 

@@ -1,7 +1,7 @@
 """One chain of a batch, as the host sees it between launches: what is set before, read behind, taken out and put back.
 
 Phases of walks, recorders, experiments with given chains and `bench` work on worlds. The names of arrays, such as
-`state/time`, are those of the structs in `warpchain.kernels.types`; no other wing knows them.
+`state/time`, are those of the structs in `warpchain.kernels.types`; no other subpackage knows them.
 """
 
 import hashlib
@@ -22,6 +22,8 @@ from warpchain.inputs.arrays import Array
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import InputError
 from warpchain.kernels import layout
+from warpchain.kernels.cpu import stage_rows
+from warpchain.kernels.cpu.implicit import rigid_layout
 from warpchain.kernels.types import LOADING_TIME, Drive, State
 from warpchain.status import Status
 
@@ -54,7 +56,10 @@ _BEGINNING = _beginning()
 
 def _layout_digest() -> NDArray[np.uint8]:
     """What tells snapshots apart that kernels would read otherwise, as bytes: numbers of rows, fields of structs."""
-    rows = sorted((name, value) for name, value in vars(layout).items() if name.isupper() and isinstance(value, int))
+    rows = [
+        sorted((name, value) for name, value in vars(module).items() if name.isupper() and isinstance(value, int))
+        for module in (layout, stage_rows, rigid_layout)
+    ]
     text = repr((rows, [*State.vars], [*Drive.vars]))  # type: ignore[attr-defined, unused-ignore]
     return np.frombuffer(hashlib.sha256(text.encode()).digest(), dtype=np.uint8)
 

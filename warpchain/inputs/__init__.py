@@ -1,1 +1,1 @@
-"""What a user may say: fields, their checks, and how files and errors name them."""
+"""Fields that users can set, with their checks, and their names in files and messages."""

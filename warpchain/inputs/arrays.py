@@ -1,4 +1,4 @@
-"""Arrays: their type in annotations, and the check of those that a user gives."""
+"""Types of arrays in annotations, and the check of arrays that users pass."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""What a user may write for `method`: an integrator, or one word for an integrator with its settings.
+"""Possible values of `method`: integrators, and solver profiles, i.e. integrators with settings.
 
 The integrators are those of `warpchain.kernels`. Nothing heavy is imported here, because help texts need the names.
 """
@@ -30,3 +30,9 @@ The means of `standard` and `explicit` lie within some tenths of a per cent of t
 is the cheapest on a CPU. It means `explicit` where there is no `hybrid`, on a GPU and if the plane of the chain tilts,
 and if joint forces are recorded, which `hybrid` does not have.
 """
+
+
+def meant_by(method: object, *, can_be_rigid: bool) -> object:
+    """The method that a word means where rigid flights are possible, or where they are not: `standard` differs."""
+    is_standard = isinstance(method, str) and method == "standard"  # it is not checked yet
+    return "explicit" if is_standard and not can_be_rigid else method

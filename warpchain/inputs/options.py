@@ -6,7 +6,7 @@ from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from warpchain.inputs.methods import BURST_TOLERANCE, METHODS, METHODS_BY_NEED
+from warpchain.inputs.methods import BURST_TOLERANCE, METHODS, METHODS_BY_NEED, meant_by
 from warpchain.inputs.validation import InputError, Section, Whole, number_field, shown, suggestion, validated
 from warpchain.kernels.methods.explicit_tableaus import HYBRID
 from warpchain.kernels.methods.method import find_method, method_names
@@ -117,9 +117,8 @@ class Options(Section):
 
         `standard` then means `explicit`, as it does on a GPU: rigid flights have neither.
         """
-        if (tilts or loads) and given.get("method", "standard") == "standard":
-            given = {**given, "method": "explicit"}
-        return validated(cls, given, "options")
+        method = meant_by(given.get("method", "standard"), can_be_rigid=not (tilts or loads))
+        return validated(cls, {**given, "method": method}, "options")
 
     def beside(self, given: Mapping[str, object]) -> dict[str, object]:
         """The values of these options that stay beside some given ones.
@@ -144,8 +143,7 @@ class Options(Section):
         word, device = values.get("method", "standard"), values.get("device")
         if not isinstance(word, str):
             return values
-        if word == "standard" and isinstance(device, str) and on_gpu(device):
-            word = "explicit"
+        word = str(meant_by(word, can_be_rigid=not (isinstance(device, str) and on_gpu(device))))
         defaults = {"method": word, **METHODS_BY_NEED.get(word, {})}
         if word == HYBRID:
             defaults["tolerance"] = BURST_TOLERANCE

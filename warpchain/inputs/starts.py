@@ -1,4 +1,4 @@
-"""How a walk may start: the one table of the words for it. Help texts read it, so nothing heavy is imported here."""
+"""The table of starts. Help texts read it, so this module imports nothing heavy."""
 
 from collections.abc import Mapping
 from typing import Final, Literal, NamedTuple

@@ -1,4 +1,4 @@
-"""Values that are probably in another unit than meant: lengths in mm, masses in g.
+"""Refuses values that are probably in another unit than intended, such as lengths in mm or masses in g.
 
 Every walk and every cell of a sweep is asked about them, see `Setup.checked`. Coefficients of joints,
 such as k, b and ω_c, are left out: they are chosen over decades.

@@ -1,4 +1,4 @@
-"""What every check of a user's values shares: the error, fields with units, and refusals in one line.
+"""Shared parts of all input checks: `InputError`, fields with units, and refusals in one line.
 
 A refusal reads `path.of.field: what is wrong; what to do`. Validators raise an `InputError` that begins with the name
 of a field, or a `ValueError` about their own field; `refusals` makes lines of these and of pydantic's own errors.
@@ -254,7 +254,13 @@ _BOUNDS: Final = {
     "less_than_equal": ("at most", "le"),
     "less_than": ("less than", "lt"),
 }
-_LENGTHS: Final = {"too_long": "at most {max_length} values", "too_short": "at least {min_length} values"}
+_FORMS: Final = {
+    "string_pattern_mismatch": "text of the form {pattern}",
+    "string_too_long": "at most {max_length} characters",
+    "string_too_short": "at least {min_length} characters",
+    "too_long": "at most {max_length} values",
+    "too_short": "at least {min_length} values",
+}
 _KINDS: Final = {
     "bool_type": "true or false",
     "dict_type": "a mapping",
@@ -275,8 +281,8 @@ def _expected(problem: Mapping[str, Any], unit: str) -> str:
     if kind in _BOUNDS:
         words, limit = _BOUNDS[kind]
         return f"{words} {short(context[limit])}" + (f" {unit}" if unit != DIMENSIONLESS else "")
-    if kind in _LENGTHS:
-        return _LENGTHS[kind].format(**context)
+    if kind in _FORMS:
+        return _FORMS[kind].format(**context)
     text = _KINDS.get(kind) or str(problem["msg"]).removeprefix("Input should be ").replace("an instance of", "a")
     return text + (f" in {unit}" if unit != DIMENSIONLESS else "")
 

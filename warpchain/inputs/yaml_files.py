@@ -1,4 +1,4 @@
-"""Reading YAML files, strictly."""
+"""Reads YAML files that may be untrusted, with limits on size and depth."""
 
 import os
 import re

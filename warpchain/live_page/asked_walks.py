@@ -1,8 +1,8 @@
-"""Walks that a page asks for: set-ups in JSON become walks.
+"""Computes the walks that a live page requests in JSON.
 
 A set-up is a mapping of names of fields to values, like the keywords of `warpchain.walk`, and beside these: `preset`;
 `seed`; `index`, the number of a walk of the server's sweep, of which the other values are changed; and `push`, a list
-of `[time, link, x, y]`: an impulse [N s] on the centre of a link at a time [s] of the walk, which goes on from there.
+of `[time, link, x, y]`: an impulse [N s] on the centre of a link at a time [s] of the walk, which continues from there.
 """
 
 import json

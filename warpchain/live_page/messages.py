@@ -1,4 +1,4 @@
-"""What a live page is told of a walk: frames while it is computed, results, and lines that make it again."""
+"""Messages to a live page: frames while a walk is computed, results, and code that repeats the walk."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""The live page as text, and the page of walks that needs neither a server nor Python."""
+"""The HTML of the live page, and of the exported page that needs neither a server nor Python."""
 
 import json
 import re
@@ -21,7 +21,7 @@ FIRST: Final = {"links": 60, "frequency": 15, "start": "spinning"}
 """The first set-up on the page."""
 _EDGES: Final = [[[step / 5, -0.04 * (step - 1)], [step / 5, -0.04 * step]] for step in range(1, 9)]
 STAIRS: Final = [[-1.0, 0.0], *([x, round(y, 2)] for edge in _EDGES for x, y in edge), [2.0, -0.32]]
-"""A floor that falls in eight steps; beyond the last it goes on level."""
+"""A floor that falls in eight steps; beyond the last it is level."""
 MOST_CELLS: Final = 2000
 """Most cells of a block of a sweep on the page."""
 _HERE: Final = Path(__file__).parent

@@ -1,4 +1,4 @@
-"""The server of the live page: on 127.0.0.1, for whoever holds its token, a page and the walks that it asks for.
+"""The server of the live page; on 127.0.0.1 it serves the page and its walks to whoever has its token.
 
 A request is refused unless it names this server as its host, comes from its own page or from no page, and brings the
 token; so neither another user of the machine nor a page of another site, whatever name leads it here, gets a walk. The

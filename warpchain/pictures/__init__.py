@@ -1,4 +1,4 @@
-"""Figures and moving pictures of one walk, and of a quantity over a grid: they draw what `walks` knows."""
+"""Figures and animations of one walk, and figures of a quantity over a grid."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-"""Moving pictures of a walk: GIF, MP4, or a page with a player for the browser.
+"""Animations of a walk: GIF, MP4, or an HTML page with a player.
 
 A film shows a walk to one scale, from the side, or from a corner if its plane tilts.
 """

@@ -1,4 +1,4 @@
-"""A chain in the room and what is around it, as a viewer far away sees them.
+"""Drawing of a chain and its surroundings in the laboratory frame, as a distant viewer sees them.
 
 A view is a matrix of three orthogonal unit vectors, shape (3, 3): what points to the right in the picture, what points
 up, and what points towards the viewer. Room axes are X forward, Y up and Z = X × Y, to the right of the way the chain
@@ -51,8 +51,9 @@ def draw_chain(
 ) -> PolyCollection:
     """Draw one chain, its rearmost link first; odd links, the outer ones, cover their neighbours.
 
-    Given are joints in the room [m], (n, 3), the radius of the circles of each link [m], (n,), colours of inner links,
-    of outer links and of edges, and the width of these [points]. A halo is white, over what is behind the chain.
+    Given are joints in the laboratory frame [m], (n, 3), the radius of each link's contact circles [m], (n,), colours
+    of inner links, outer links and edges, and the width of the edges [points]. A white halo separates the chain from
+    what is behind it.
     """
     right, up, depth = view @ joints.T
     outlines = link_outlines(np.stack([right, up], axis=1), radius)

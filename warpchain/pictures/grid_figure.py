@@ -1,4 +1,4 @@
-"""A quantity over a grid of any number of axes: lines with error bars, or maps; cells without walks are gaps.
+"""Figures of a quantity over a grid with any number of axes: lines with error bars, or maps with gaps.
 
 Along x runs the frequency if it has three values or more, else the longest axis of numbers. The next longest axis gives
 the lines, or the rows of a map if both have many values; all other axes give panels.

@@ -1,4 +1,4 @@
-"""Texts on figures and in tables: numbers, units, quantities, cells, walks that are in no mean; titles."""
+"""Texts on figures and in tables: numbers, units, quantities, cells, walks excluded from means; titles."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Where a chain, its sprocket and the floor are, for pictures of all kinds; nothing heavy is imported."""
+"""Positions of chain, sprocket and floor for all figures; this module imports nothing heavy."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from warpchain.walks.walk_numbers import WalkNumbers as Walk
 
 
 def checked_joints(walk: Walk) -> Array:
-    """The joints of a walk in the room [m], shape (f, n, 3); z = 0 if its plane is fixed.
+    """Joints of a walk in the laboratory frame [m], shape (f, n, 3); z = 0 if its plane is fixed.
 
     A `ValueError` says that the walk has no frames or broken ones.
     """

@@ -1,4 +1,4 @@
-"""How all figures look: colours, axes, resolution; a figure with its caption; what a notebook shows, without pyplot."""
+"""Style of all figures: colours, axes and resolution; captions; and figures in notebooks, without pyplot."""
 
 import base64
 import contextlib

@@ -4,7 +4,7 @@ Figures are made without pyplot: nothing is global, no display is needed, the ca
 """
 
 from collections.abc import Callable, Mapping
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -64,7 +64,12 @@ def draw(
     if ax is not None:
         _ON_AXES[kind](walk, ax)
         return ax.figure.figure if isinstance(ax.figure, SubFigure) else ax.figure
-    return _DRAWN_BY[kind](walk, figure, width)
+    if kind == "film_strip":
+        return film_strip(walk, figure, width)
+    draw_into, size = _DRAWN_BY[kind]
+    figure = size.paper(width) if figure is None else figure
+    draw_into(walk, figure)
+    return figure
 
 
 def kinds_of(walk: Walk) -> tuple[FigureWord, ...]:
@@ -72,21 +77,27 @@ def kinds_of(walk: Walk) -> tuple[FigureWord, ...]:
     return tuple(word for word, kind in KINDS.items() if not kind.needs_tilt or walk.joints_lab is not None)
 
 
-def _paper(figure: Figure | None, width: float | None, usual: float, height: float) -> Figure:
-    """The figure that is given to draw into, or else a new one of a width, by default its usual size [inches]."""
-    if figure is not None:
-        return figure
-    size = (usual, height) if width is None else (width, height * max(0.62, min(1.2, width / usual)))
-    return InlineFigure(figsize=size, layout="constrained")
+class _Size(NamedTuple):
+    """Width and height of a figure [inches], and its height before it is scaled to narrow paper."""
+
+    width: float
+    height: float
+    narrow_height: float
+
+    def paper(self, width: float | None) -> Figure:
+        """A new figure of this size, or of a given width [inches] and a height that suits it."""
+        if width is None:
+            return InlineFigure(figsize=(self.width, self.height), layout="constrained")
+        height = self.narrow_height if width < NARROW else self.height
+        return InlineFigure((width, height * max(0.62, min(1.2, width / self.width))), layout="constrained")
 
 
-def _height_and_speed(walk: Walk, figure: Figure | None, width: float | None) -> Figure:
+def _height_and_speed(walk: Walk, figure: Figure) -> None:
     """Height and horizontal speed of the centre of mass against time since the release, as in Figure 5.
 
     A thin line is the height of a floor that is not flat, below the centre of mass; it is thick and has a label where
     the floor has coefficients of its own.
     """
-    figure = _paper(figure, width, 6.4, 5.0)
     height, speed = figure.subplots(2, 1, sharex=True)
     height.plot(walk.time, walk.center[:, 1], color=BLUE, linewidth=1.4)
     speed.plot(walk.time, walk.center_velocity[:, 0], color=BLUE, linewidth=1.4)
@@ -102,17 +113,9 @@ def _height_and_speed(walk: Walk, figure: Figure | None, width: float | None) ->
             height.plot(walk.time, np.where(is_above, floor, np.nan), color=color, linewidth=3.5, label=label)
             height.legend(frameon=False)
     _finish(walk, height, speed)
-    return figure
 
 
-def _energy(walk: Walk, figure: Figure | None, width: float | None) -> Figure:
-    """A figure with `_energy_on` its only axes."""
-    figure = _paper(figure, width, 6.4, 4.0)
-    _energy_on(walk, figure.subplots())
-    return figure
-
-
-def _energy_on(walk: Walk, ax: Axes) -> None:
+def _energy(walk: Walk, ax: Axes) -> None:
     """Energies of a walk against time, and what was lost by then.
 
     Lost is the energy at the release less that of the moment. The dot at the end is the sum of the ledger's losses,
@@ -133,7 +136,7 @@ def _energy_on(walk: Walk, ax: Axes) -> None:
     _finish(walk, ax)
 
 
-def _tilt(walk: Walk, figure: Figure | None, width: float | None) -> Figure:
+def _tilt(walk: Walk, figure: Figure) -> None:
     """Tilt and yaw of the plane, and lateral drift of the centre of mass, against time.
 
     Marked are the moments at which the chain was first tilted by 45°, beyond which it has fallen over, and at which
@@ -141,7 +144,6 @@ def _tilt(walk: Walk, figure: Figure | None, width: float | None) -> Figure:
     """
     if walk.joints_lab is None:
         raise ValueError("walk: its plane is fixed, so it has no tilt; run it with plane: tilting")
-    figure = _paper(figure, width, 6.4, 5.0)
     angles, drift = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     for limit in (-FALLEN, FALLEN):
         angles.axhline(limit, color=FAINT, linewidth=0.8, linestyle=DOTS)
@@ -160,7 +162,6 @@ def _tilt(walk: Walk, figure: Figure | None, width: float | None) -> Figure:
     angles.legend(frameon=False, fontsize="small")
     figure.align_ylabels()
     _finish(walk, angles, drift)
-    return figure
 
 
 def _finish(walk: Walk, *panels: Axes) -> None:
@@ -172,7 +173,7 @@ def _finish(walk: Walk, *panels: Axes) -> None:
     panels[-1].set(xlabel="time since release $t$ / s", xlim=(0.0, float(walk.time[-1]) or None))
 
 
-def _loop(walk: Walk, figure: Figure | None, width: float | None) -> Figure:
+def _loop(walk: Walk, figure: Figure) -> None:
     """The mean loop of a walk before its release, to scale, and its curvature and tension along the arc.
 
     A `ValueError` says that the time before the release was not kept, or is not enough for a mean loop.
@@ -181,7 +182,6 @@ def _loop(walk: Walk, figure: Figure | None, width: float | None) -> Figure:
     kink = loop.kink()
     broad, high = np.ptp(loop.position, axis=0)
     share = float(np.clip(0.56 * (broad + 0.08) / (high + 0.08), 0.23, 0.42))
-    figure = _paper(figure, width, 10.0, 8.0 if width is not None and width < NARROW else 6.4)
     figure.suptitle(wrapped(setting(walk, math_symbol), figure), fontsize="medium", x=0.01, ha="left")
     if figure.get_figwidth() < NARROW:
         left, right = np.asarray(figure.subfigures(2, 1, height_ratios=[2, 3]))
@@ -214,7 +214,6 @@ def _loop(walk: Walk, figure: Figure | None, width: float | None) -> Figure:
     pull.set(xlim=(low, high), ylabel="tension $T - \\rho v^2$ / N")
     pull.set_xlabel("arc length $s$ from the lowest point / m")
     pull.set_ylim(bottom=min(0.0, 1.1 * float(loop.effective_tension[inside].min())))
-    return figure
 
 
 def _draw_shape(axes: Axes, loop: StationaryLoop, sprocket_radius: float) -> None:
@@ -251,13 +250,12 @@ def _mark(axes: Axes, x: float, y: float, text: str) -> None:
     axes.annotate(text, (x, y), (8, -4), textcoords="offset points", va="top", color=INK, fontsize="small")
 
 
-_DRAWN_BY: Final[Mapping[FigureWord, Callable[[Walk, Figure | None, float | None], Figure]]] = {
-    "film_strip": film_strip,
-    "height_and_speed": _height_and_speed,
-    "loop": _loop,
-    "energy": _energy,
-    "tilt": _tilt,
+_DRAWN_BY: Final[Mapping[str, tuple[Callable[[Walk, Figure], None], _Size]]] = {
+    "height_and_speed": (_height_and_speed, _Size(6.4, 5.0, 5.0)),
+    "loop": (_loop, _Size(10.0, 6.4, 8.0)),
+    "energy": (lambda walk, figure: _energy(walk, figure.subplots()), _Size(6.4, 4.0, 4.0)),
+    "tilt": (_tilt, _Size(6.4, 5.0, 5.0)),
 }
-"""Each figure of `KINDS` draws into an empty figure, or a new one of its own size, and returns it."""
-_ON_AXES: Final[Mapping[FigureWord, Callable[[Walk, Axes], None]]] = {"energy": _energy_on}
+"""Each figure of `KINDS` but the film strip, which has a size of its own: what draws it, and its size."""
+_ON_AXES: Final = {"energy": _energy}
 """Those with one pair of axes draw into given ones, too."""

@@ -1,1 +1,1 @@
-"""A sweep, shown: figures, statistics and a page."""
+"""Figures and the HTML report of a sweep."""

@@ -1,4 +1,4 @@
-"""The report of a sweep: one HTML page that loads nothing else.
+"""The report of a sweep: one self-contained HTML page.
 
 It has figures and tables of the walks that are there, the failed walks and what to try, parameters, the sweep file and
 the software; on demand also one walk in motion. The same folder always gives the same page.
@@ -178,7 +178,7 @@ def _compared(walk: WalkResult, block: BlockResult, place: tuple[int, ...]) -> s
     if not block.is_there[place]:
         return "The sweep has not run it yet."
     if block.has_same(walk, place):
-        return "The sweep has the same, to the bit."
+        return "The sweep has the same, bit for bit."
     dx = float(block.columns["dx"][place])
     stored = f"Δx = {dx:.4f} m" if math.isfinite(dx) else Status(int(block.columns["status"][place])).label
     return f"The sweep has another result, {stored}: it was computed by other software or on another machine."

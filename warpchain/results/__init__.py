@@ -1,1 +1,1 @@
-"""What a user gets back: one walk, a sweep, and what they draw, save and run again."""
+"""Result objects of walks and sweeps, which users draw, save and repeat."""

@@ -1,4 +1,4 @@
-"""One block of a sweep as arrays with named axes."""
+"""The results of one block of a sweep as arrays with named axes; `SweepResult.blocks` holds them."""
 
 import math
 import warnings
@@ -51,20 +51,21 @@ _Variables = dict[str, tuple[tuple[str, ...], AnyArray, dict[str, Any]]]
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class BlockResult(Columns):
-    """A block of a sweep. Every column is an attribute, an array of shape `shape`: `block.dx`, `block.status`.
+    """Results of one block of a sweep, as arrays of shape `shape` with the axes `dims`.
 
-    Columns are those of `warpchain.walks.rows.COLUMNS`, and NAME_drawn for each drawn quantity. A missing walk has −1
-    in columns of integers, `status` among them, and NaN in those of floats.
+    Every column is an attribute, e.g. `block.dx` and `block.status`. Columns are those of
+    `warpchain.walks.rows.COLUMNS`, and NAME_drawn for each sampled quantity. Missing values are NaN, or −1 in integer
+    columns such as `status`.
 
     Attributes:
         name: name of the block.
-        number: its number in the sweep.
-        axes: name of each axis of the grid → its values, in order; null is None. The samples are one more axis.
-        drawn: names of the quantities that samples draw; the values are in the columns NAME_drawn.
-        columns: name → values.
-        origin: the sweep.
-        versions: of the software that began it.
-        motions: of each walk what opens the file with its kept motion, and the group in there; None if there is none.
+        number: number of the block in the sweep.
+        axes: name of each axis of the grid → its values in order; null is None. The samples are an additional axis.
+        drawn: names of the sampled quantities; their values are in the columns NAME_drawn.
+        columns: name of each column → its values.
+        origin: definition of the sweep.
+        versions: versions of the software with which the sweep was begun.
+        motions: for each walk the file and the group of its recorded motion; None if none was recorded.
     """
 
     name: str
@@ -78,7 +79,7 @@ class BlockResult(Columns):
 
     @property
     def block(self) -> Block:
-        """The block of the sweep that it is of."""
+        """Definition of this block in the sweep."""
         return self.origin.blocks[self.number]
 
     @property
@@ -131,7 +132,7 @@ class BlockResult(Columns):
 
     @property
     def kept(self) -> NDArray[np.bool_]:
-        """Whether the motion of a walk was kept and is there, shape `shape`."""
+        """Whether the motion of a walk was recorded and is available, shape `shape`."""
         return np.asarray(self.motions != None)  # noqa: E711 - of each element
 
     def kept_motions(self, places: Iterable[int]) -> "Iterator[tuple[int, h5py.Group]]":
@@ -145,20 +146,20 @@ class BlockResult(Columns):
                 yield from ((place, file[group]) for place, group in walks)
 
     def series(self, *, sample: int = 0, **at: float | str | None) -> WalkResult:
-        """One walk whose motion was kept: `series(links=60, frequency=15, sample=2).time`.
+        """Return a walk whose motion was recorded: `series(links=60, frequency=15, sample=2).time`.
 
         Args:
             sample: number of the sample.
-            at: value of each axis; of an axis with just one value it may be left out.
+            at: value of each axis; optional for an axis with a single value.
 
         Raises:
-            InputError: there is no such walk, or its motion was not kept or is not there yet.
+            InputError: the walk does not exist, or its motion was not recorded or is not available yet.
             OSError: its file cannot be read.
         """
         return self.walk_motion(self.place(sample, at))
 
     def place(self, sample: int, at: Mapping[str, float | str | None]) -> tuple[int, ...]:
-        """Place along the axes and samples of a walk, see `series`."""
+        """Position of a walk along the axes and samples; arguments are those of `series`."""
         at = by_name(at)
         if unknown := [name for name in at if name not in self.axes]:
             raise InputError(
@@ -177,7 +178,7 @@ class BlockResult(Columns):
         return (*place, sample)
 
     def setup_at(self, place: tuple[int, ...]) -> Setup:
-        """Everything that says what the walk at a place is, its draws included."""
+        """Setup of the walk at a position along the axes, including its sampled values."""
         return self.origin.walk(int(self.columns["index"][place])).setup
 
     def walk(
@@ -192,22 +193,22 @@ class BlockResult(Columns):
     ) -> WalkResult:
         """Run one walk again, with series and frames: `walk(17)`, or `walk(links=60, frequency=15, sample=2)`.
 
-        The same version on the same kind of processor repeats it to the bit.
+        The same version on the same kind of processor reproduces the walk bit for bit.
 
         Args:
-            index: number of the walk, as in the column `index`; more samples change no number. None: the walk is that
-                of the other values.
+            index: number of the walk, from the column `index`; it does not change when samples are added. None: the
+                walk is selected by `sample` and `at`.
             sample: number of the sample; None: 0.
-            frame_interval: as of `warpchain.walk`, like the next two.
-            record_before: see there.
-            record_joint_forces: see there.
-            at: value of each axis; of an axis with just one value it may be left out.
+            frame_interval: as in `warpchain.walk`.
+            record_before: as in `warpchain.walk`.
+            record_joint_forces: as in `warpchain.walk`.
+            at: value of each axis; optional for an axis with a single value.
 
         Raises:
-            InputError: there is no such walk, or a value is refused.
+            InputError: the walk does not exist, or a value is refused.
 
         Warns:
-            InputWarning: the sweep has another Δx or status of this walk.
+            InputWarning: Δx or status differ from those in the sweep.
         """
         if index is None:
             place = self.place(0 if sample is None else sample, at)
@@ -226,7 +227,7 @@ class BlockResult(Columns):
         dx, number = self.columns["dx"][place], self.columns["index"][place]
         if self.is_there[place] and not self.has_same(walk, place):
             problem = f"walk {number}: Δx is {walk.dx:g} m, and {dx:g} m in the sweep"
-            remedy = "it is repeated to the bit by the version that ran it, on the same kind of processor"
+            remedy = "use the version that ran it, on the same kind of processor, to reproduce it bit for bit"
             warnings.warn(f"{problem}; {remedy}", InputWarning, stacklevel=2)
         return walk
 
@@ -265,7 +266,7 @@ class BlockResult(Columns):
 
     @cached_property
     def faults(self) -> dict[str, NDArray[np.bool_]]:
-        """What makes walks inaccurate, a key of `warpchain.walks.landmarks.FAULTS` → whether each walk has it."""
+        """Kind of inaccuracy, a key of `warpchain.walks.landmarks.FAULTS` → whether each walk has it."""
         return rows.faults_of_columns(self.columns, {name: self.block.parameter(name) for name in LENGTHS})
 
     @property
@@ -274,14 +275,15 @@ class BlockResult(Columns):
         return np.asarray(np.any([*self.faults.values()], axis=0))
 
     def values(self, name: str = "dx") -> NDArray[np.float64]:
-        """A column as numbers, shape `shape`, those of which `statistics` are; NaN of walks that are in no mean."""
+        """A column as numbers, shape `shape`, which `statistics` averages; NaN for walks excluded from means."""
         return known_values(self.columns[name], self.columns["status"])
 
     def statistics(self, name: str = "dx") -> CellStatistics:
-        """Statistics of a column in each cell, over the walks at rest that have a number there.
+        """Statistics of a column in each cell, over the walks at rest that have a value.
 
-        NaN and −1 stand for none, such as `bounces_before_collapse` of a loop that never collapsed: such walks are in
-        no mean, and `absent` counts them. Designed samples have a standard error if they are of several randomisations.
+        Walks without a value (NaN or −1), e.g. `bounces_before_collapse` of a loop that never collapsed, are excluded
+        from means and counted in `absent`. Quasi-random designs have a standard error if there are several
+        randomisations.
 
         Raises:
             KeyError: there is no such column.
@@ -324,15 +326,16 @@ class BlockResult(Columns):
         return self.block.over_cells(("slope", "distance_limit", "floor"), limit)[..., 0]
 
     def design(self) -> "xarray.DataArray":
-        """What differs between the walks beside the axes, as one array with the names along its last axis, `quantity`.
+        """The design matrix: every value that differs between walks and is not an axis of the grid.
 
-        Values of parameter sets (`points`) and those that samples drew; NaN of a walk that is not there.
+        These are the values of parameter sets (`points`) and sampled values. Their names are along the last axis,
+        `quantity`; missing walks are NaN.
         """
         points = [*self.block.points]
         if words := [name for name, values in self.block.points.items() if isinstance(values[0], str)]:
-            raise InputError(f"{words[0]}: its values are words, and a design has numbers; take to_xarray()")
+            raise InputError(f"{words[0]}: its values are words, and a design matrix has numbers; use to_xarray()")
         if not points and not self.drawn:
-            raise InputError(f"block {self.name}: nothing differs between its walks beside axes; take to_xarray()")
+            raise InputError(f"block {self.name}: its walks differ only along the axes; use to_xarray()")
         whole = self.to_xarray().reset_coords(points)[[*points, *map(rows.drawn_column, self.drawn)]]
         array = whole.to_dataarray("quantity").astype(float).assign_coords(quantity=[*points, *self.drawn])
         return array.transpose(*self.dims, "quantity")

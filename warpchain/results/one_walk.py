@@ -1,4 +1,4 @@
-"""One walk whose setup is complete, run and recorded."""
+"""Runs and records one walk of a complete setup; `walk`, the commands and repeated walks of sweeps call this."""
 
 import time
 from collections.abc import Callable

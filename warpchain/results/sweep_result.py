@@ -1,13 +1,14 @@
 """Results of sweeps as arrays with named axes, read from a folder or from a merged file.
 
-A folder can be read while its sweep runs: walks that are not there yet are missing, and counted.
+Users call `load`, and the commands `info`, `plot`, `report` and `merge` do. A folder can be read while its sweep runs;
+walks that are not computed yet are counted as missing.
 
-A merged file is one HDF5 file with a whole sweep: columns with named axes, and the kept motions. Axes and samples are
-dimension scales; units and meanings are attributes of every dataset, and the resolved sweep, versions and counts by
-status those of the file. A single block is in the root group, which `xarray.open_dataset(path, engine="h5netcdf")`
-opens; several are in groups of their names (`group=`). The kept motions of a block are in its group `motion`, those of
-each walk in a group named by the place of the walk in a flat column, as in a saved walk. `xarray.open_datatree(path)`
-opens all of them.
+A merged file is one HDF5 file with a whole sweep: columns with named axes, and the recorded motions. Axes and samples
+are dimension scales. Units and meanings are attributes of every dataset; the resolved sweep, versions and counts by
+status are attributes of the file. A single block is in the root group, which
+`xarray.open_dataset(path, engine="h5netcdf")` opens; several blocks are in groups of their names (`group=`). The
+recorded motions of a block are in its group `motion`, in the format of a saved walk. The name of a walk's group is the
+position of the walk in a flat column. `xarray.open_datatree(path)` opens everything.
 """
 
 import json
@@ -31,7 +32,7 @@ from warpchain.inputs.validation import InputError, InputWarning, checked_path, 
 from warpchain.results.block_result import BlockResult, counted, located, status_counts
 from warpchain.results.walk_result import WalkResult
 from warpchain.store.folder import read_rows
-from warpchain.store.shards import Manifest, read_manifest, stamp, stored_sweep
+from warpchain.store.shards import read_manifest, stamp, stored_sweep
 from warpchain.sweeps.plan import Sweep
 from warpchain.walks.cell_statistics import CellStatistics
 from warpchain.walks.rows import COLUMNS, STORED_COLUMNS, derived_columns, drawn_column, quantity_of
@@ -69,18 +70,20 @@ else:
 MERGED: Final = Format.of("warpchain sweep result", COLUMNS, MOTION)
 REMEDY: Final = "merge the folders again, or fetch another copy of the file"
 TRIES, PAUSE = 100, 0.02
-"""Times that a folder is read in which shards come and go, and time [s] between them."""
+"""Number of attempts to read a folder whose shards are changing, and time between them [s]."""
 WANTED: Final = "use the folder of a sweep or a merged file; a saved walk is for plot, animate and load_walk"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class SweepResult(_OnlyBlock):
-    """What is there of a sweep. If it has just one block, everything of the block is an attribute here, too.
+    """Results of a sweep, as far as it has run; `load` and `warpchain.sweep` return it.
+
+    If the sweep has a single block, all attributes of the block are also attributes of the result: `result.dx`.
 
     Attributes:
-        blocks: name → block.
-        origin: the sweep.
-        provenance: its digest, version of the numerics, and versions of the software that began it.
+        blocks: name of each block → its results.
+        origin: definition of the sweep.
+        provenance: digest of the sweep, version of the numerics, and versions of the software that began it.
     """
 
     blocks: dict[str, BlockResult]
@@ -99,7 +102,7 @@ class SweepResult(_OnlyBlock):
 
     @property
     def seed(self) -> int:
-        """Its seed."""
+        """Seed of the sweep."""
         return int(self.sweep["seed"])
 
     if not TYPE_CHECKING:
@@ -136,7 +139,7 @@ class SweepResult(_OnlyBlock):
 
     @property
     def walk_count(self) -> int:
-        """Number of walks of the sweep, missing ones included."""
+        """Number of walks of the sweep, including missing ones."""
         return sum(block.columns["index"].size for block in self.blocks.values())
 
     @property
@@ -150,7 +153,7 @@ class SweepResult(_OnlyBlock):
 
     @property
     def inaccurate_count(self) -> int:
-        """Number of walks with faults, whatever their status."""
+        """Number of inaccurate walks of any status."""
         return sum(int(block.inaccurate.sum()) for block in self.blocks.values())
 
     def unit(self, name: str) -> str:
@@ -173,9 +176,9 @@ class SweepResult(_OnlyBlock):
         return {name: block.statistics(quantity) for name, block in blocks if quantity in block.columns}
 
     def walk(self, index: int | None = None, **words: Any) -> WalkResult:
-        """Run one walk of any block again by its number; arguments and errors are those of `BlockResult.walk`.
+        """Run one walk again; arguments and errors are those of `BlockResult.walk`.
 
-        Its other arguments, without a number, say which walk of the only block it is.
+        `index` selects a walk of any block; the other arguments select a walk of the only block.
         """
         if index is None and len(self.blocks) > 1:
             raise InputError("index: missing; pass the number of a walk, or call walk of one of the blocks")
@@ -183,7 +186,7 @@ class SweepResult(_OnlyBlock):
         return block.walk(index, **words)
 
     def located(self, index: object) -> tuple[BlockResult, tuple[int, ...]]:
-        """Block and place of the walk with a number; an `InputError` if there is none."""
+        """Block of the walk with a number, and its position there; an `InputError` if it does not exist."""
         return located(list(self.blocks.values()), index)
 
     def plot(
@@ -196,18 +199,17 @@ class SweepResult(_OnlyBlock):
         """Draw the mean of a quantity over the grids of all blocks, with its standard error.
 
         Args:
-            quantity: a column of numbers, such as `dx`, `walk_time`, `bounces` or a drawn quantity.
-            x: the axis along x, such as `frequency`; by default the frequency if it has three values or more, else the
-                longest axis of numbers.
-            figure: an empty figure to draw into; by default a new one.
-            width: of a new figure [mm], such as 85 for a column of a paper; texts then have 6 pt at least.
+            quantity: a column of numbers, such as `dx`, `walk_time`, `bounces` or a sampled quantity.
+            x: the axis along x; None: the frequency if it has at least three values, otherwise the longest axis of
+                numbers.
+            figure: an empty figure to draw into; None: a new one.
+            width: width of a new figure [mm], e.g. 85 for a column of a paper; texts then have at least 6 pt.
 
         Returns:
             The figure.
 
         Raises:
-            InputError: no block has such a column or axis, or there is nothing to show: no axis of several values, or
-                no walk that has the quantity.
+            InputError: the column or axis does not exist, no axis has several values, or no walk has the quantity.
         """
         from warpchain.pictures.grid_figure import draw_grid
         from warpchain.pictures.style import on_paper
@@ -230,7 +232,7 @@ class SweepResult(_OnlyBlock):
         return ", ".join([*common, many, *[f"{failed:,} walks failed"] * (failed > 0)])
 
     def to_xarray(self) -> "xarray.Dataset | xarray.DataTree":
-        """The only block as a data set, or several as a tree with one child each."""
+        """The only block as a Dataset, or several blocks as a DataTree with one child each."""
         import xarray
 
         sets = {name: block.to_xarray() for name, block in self.blocks.items()}
@@ -248,7 +250,7 @@ class SweepResult(_OnlyBlock):
         return pandas.concat(list(tables.values()), ignore_index=True)
 
     def notes(self) -> dict[str, Any]:
-        """Attributes of a file: what the result is and how to make it again."""
+        """Attributes of a file: name, seed, counts, definition and versions of the sweep."""
         return {
             "title": self.name,
             "seed": str(self.seed),
@@ -261,15 +263,16 @@ class SweepResult(_OnlyBlock):
 
 
 def load(path: AnyPath | Sequence[AnyPath]) -> SweepResult:
-    """Read the folder of a sweep, as far as the sweep is, or a file that `warpchain merge` wrote.
+    """Load the results of a sweep, as far as it has run.
 
     Args:
-        path: the folder or the file; or several, which have different walks of one sweep, such as its parts.
+        path: the folder of the sweep, or a file that `warpchain merge` wrote; or several of them with different walks
+            of one sweep, such as its parts.
 
     Raises:
         OSError: a folder or a file cannot be read.
-        InputError: there is no sweep in it, a file is damaged, foreign or of another version, or several do not fit
-            together.
+        InputError: the path holds no sweep, a file is damaged or of another version, or the paths belong to different
+            sweeps.
     """
     if isinstance(path, Sequence) and not isinstance(path, str | bytes):
         return _together(path)
@@ -278,7 +281,7 @@ def load(path: AnyPath | Sequence[AnyPath]) -> SweepResult:
 
 
 def _together(sources: Sequence[AnyPath]) -> SweepResult:
-    """The results of several folders and merged files as one; errors as of `load`."""
+    """The results of several folders and merged files as one; errors are those of `load`."""
     if not sources:
         raise InputError("path: expected folders of a sweep, got an empty list; pass them")
     first, *others = sources
@@ -302,7 +305,8 @@ def _together(sources: Sequence[AnyPath]) -> SweepResult:
 
 def _load_folder(directory: AnyPath) -> SweepResult:
     for left in reversed(range(TRIES)):
-        begun, manifest = _seen(directory)
+        begun = stamp(directory) if os.path.lexists(Path(directory) / SWEEP_FILE) else ""  # then the next line refuses
+        manifest = read_manifest(directory)
         try:
             rows, motions = read_rows(directory, manifest)
             break
@@ -314,13 +318,6 @@ def _load_folder(directory: AnyPath) -> SweepResult:
             time.sleep(PAUSE * is_deleting)
     provenance = {"digest": manifest.sweep.digest(), "numerics_version": manifest.numerics_version}
     return _result(manifest.sweep, provenance | {"versions": manifest.versions}, rows, motions)
-
-
-def _seen(directory: AnyPath) -> tuple[str, Manifest]:
-    """Stamp and manifest of a folder."""
-    if os.path.lexists(Path(directory) / SWEEP_FILE):
-        return stamp(directory), read_manifest(directory)
-    return "", read_manifest(directory)  # says what is wrong
 
 
 def _load_merged(path: AnyPath) -> SweepResult:

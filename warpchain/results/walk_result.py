@@ -1,12 +1,10 @@
-"""What a run returns, and the HDF5 file that keeps a walk.
+"""`WalkResult`, which `warpchain.walk` and `load_walk` return, and the HDF5 file of a saved walk.
 
-A saved walk has the groups `series` (time series), `frames` (joint positions), `summary` (numbers), `parameters` (the
-chain's quantities with their symbols) and, if that was kept, `before_release`; every dataset has its unit and meaning.
-The attributes `setup`, `seed` and `versions`, in JSON, say how to make the walk again. Shards and merged files of
-sweeps keep the motion of a walk in the same groups. All dimensions have names and coordinates, so that
-`xarray.open_datatree(path)` reads the file.
-
-Its fields are those of `warpchain.walks.walk_numbers`.
+A saved walk has the groups `series` (time series), `frames` (joint positions), `summary` (numbers), `parameters`
+(physical parameters with their symbols) and, if it was recorded, `before_release`. Every dataset has its unit and
+meaning. The attributes `setup`, `seed` and `versions`, in JSON, suffice to repeat the walk. Shards and merged files of
+sweeps store the motion of a walk in the same groups. The fields are those of `warpchain.walks.walk_numbers`.
+All dimensions have names and coordinates, so that `xarray.open_datatree(path)` reads the file.
 """
 
 import json
@@ -49,10 +47,10 @@ if TYPE_CHECKING:
 
 WANTED: Final = "use a saved walk; `walk --like SWEEP --index I` saves one"
 SHOWN: Final = 12_000
-"""Joints that a notebook keeps of the frames of a walk: 200 frames of 60 links take 0.12 MB."""
+"""Maximum number of joint positions that a notebook shows; 200 frames of 60 links take 0.12 MB."""
 
 _GROUP: Final = "start"
-"""Group of the state that a walk began from, so that it can be run again to the bit."""
+"""Group of the state that a walk began from, so that the walk can be repeated bit for bit."""
 _STATE: Final = {
     "position": ("m, m, rad", "x, y and angle of each link"),
     "velocity": ("m/s, m/s, rad/s", "their rates"),
@@ -65,14 +63,17 @@ _FORMAT: Final = Format.of("warpchain walk", STORED, LOOP_FIELDS, {name: unit fo
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class WalkResult(WalkNumbers):
-    """One walk, from the release to its end: t instants and f frames of a chain of n links.
+    """One walk from its release to its end; `warpchain.walk` and `load_walk` return it.
 
-    Time counts from the release, x from the centre of sprocket or ellipse, y up from the floor. Units, meanings and
-    shapes stand beside the fields. Time series have a row at every `record_interval` exactly, and at the end; at an
-    impact a row of a velocity or an energy lies between the values before and after. Frames are at the ends of steps.
-    `setup` is complete; `seed` is that of the random draw, None if nothing was drawn; `versions` names the software.
-    `provenance` names command, date, system, processor or GPU and driver; it is empty of a walk that a sweep kept.
-    `before_release` is the motion on the sprocket just before the release, None if it was not kept.
+    A walk has t record times and f frames of a chain of n links; units, meanings and shapes stand beside the fields.
+    Time is measured from the release, x from the centre of the sprocket or ellipse, and y upwards from the floor. Time
+    series have a row at every multiple of `record_interval` and at the end; at an impact, velocities and energies lie
+    between the values before and after. Frames are taken at the ends of steps. `setup` is the complete definition of
+    the walk, `seed` the seed of its sample (None: nothing was sampled), and `versions` names the software.
+    `provenance` names command, date, system, processor or GPU and driver; it is empty for a walk recorded by a sweep.
+    `before_release` is the motion on the sprocket just before the release, None if it was not recorded.
+
+    Check `status` before you use `dx`, which is NaN unless the chain came to rest.
     """
 
     def __repr__(self) -> str:
@@ -85,17 +86,17 @@ class WalkResult(WalkNumbers):
         )
 
     def state(self, t: float) -> State:
-        """The chain at the end of its first step at or after a time, as samples and frames are taken.
+        """Return the state of the chain at the end of the first step at or after a time.
 
-        The walk is run again until then, which takes as long as it took the first time. `warpchain.walk(start=state)`
-        goes on with it, `dataclasses.replace` perturbs it.
+        The walk is run again until then, which takes as long as the first time. `warpchain.walk(start=state)` continues
+        from the state; `dataclasses.replace` makes a perturbed one.
 
         Args:
-            t: time since the release [s], at most `walk_time`; not before the sprocket of a `release` vanishes, of
-                which a state knows nothing.
+            t: time since the release [s], at most `walk_time`. With a moving sprocket (`release`), the time must be
+                after the sprocket has vanished, because a state has no sprocket.
 
         Raises:
-            InputError: `t` is no such time, the chain was never released, or the device of the walk is not here.
+            InputError: `t` is outside this range, the chain was never released, or the walk's device is missing.
         """
         is_released = not np.isnan(self.energy["kinetic_at_release"])
         return state_at(self.setup, t, self.walk_time if is_released else np.nan)
@@ -111,19 +112,19 @@ class WalkResult(WalkNumbers):
         """Draw the walk.
 
         Args:
-            kind: `height_and_speed` of the centre of mass, `film_strip` for the chain itself, `loop` for its loop on
-                the sprocket just before the release, `energy` for its energies, `tilt` for tilt, yaw and lateral drift
-                of a plane that tilts.
-            figure: an empty matplotlib figure to draw into; by default a new one, which a notebook shows.
-            ax: where to draw `energy`, the only figure with one pair of axes.
-            width: of a new figure [mm], such as 85 for a column of a paper; texts then have 6 pt at least.
+            kind: `height_and_speed` of the centre of mass, `film_strip` of the chain, `loop` for the loop on the
+                sprocket just before the release, `energy`, or `tilt` for tilt, yaw and lateral motion of a tilting
+                plane.
+            figure: an empty matplotlib figure to draw into; None: a new one, which a notebook shows.
+            ax: axes to draw `energy` into, the only figure with a single pair of axes.
+            width: width of a new figure [mm], e.g. 85 for a column of a paper; texts then have at least 6 pt.
 
         Returns:
-            The figure, that of `ax` if it is given.
+            The figure; if `ax` is given, the figure of `ax`.
 
         Raises:
-            ValueError: the kind is unknown, the walk does not have what it shows (frames, `before_release`,
-                energies), or `ax` does not suit the kind.
+            ValueError: the kind is unknown, the walk lacks the data of this figure (frames, `before_release`,
+                energies), or `ax` is not possible for the kind.
         """
         from warpchain.pictures.style import on_paper
         from warpchain.pictures.walk_figures import draw
@@ -132,17 +133,17 @@ class WalkResult(WalkNumbers):
             return draw(self, kind, figure=figure, ax=ax, width=inches)
 
     def animate(self, path: str | os.PathLike[str], *, fps: float = 30.0, slow: float = 4.0) -> None:
-        """Write a moving picture of the walk; the suffix of `path` gives the format: .gif, .mp4 or .html.
+        """Write an animation of the walk; the suffix of `path` sets the format: .gif, .mp4 or .html.
 
         Args:
-            path: the file to write, whole or not at all; an older one is replaced.
-            fps: pictures per second of playing time; in a .html file the browser decides.
-            slow: playing time per simulated time; in a .html file the value at the start.
+            path: file to write, completely or not at all; an older file is replaced.
+            fps: frames per second of playing time; ignored for .html, where the browser decides.
+            slow: playing time divided by simulated time; for .html the initial value.
 
         Raises:
-            ValueError: the walk has no frames, the suffix is another, `fps` or `slow` is not positive, or a GIF or
-                MP4 would have too many pictures.
-            ImportError: an .mp4 is asked for, and imageio-ffmpeg is not installed.
+            ValueError: the walk has no frames, the suffix is unknown, `fps` or `slow` is not positive, or a GIF or
+                MP4 would have too many frames.
+            ImportError: an .mp4 is requested, and imageio-ffmpeg is not installed.
             OSError: the file cannot be written.
         """
         from warpchain.pictures.animation import animate
@@ -156,9 +157,9 @@ class WalkResult(WalkNumbers):
         return first_png(partial(self.plot, kind) for kind in ("film_strip", "height_and_speed"))
 
     def _repr_html_(self) -> str:
-        """The most important numbers, why the walk is inaccurate if it is, a player if there are frames, the picture.
+        """The main numbers, warnings of inaccuracy, a player if there are frames, and the film strip.
 
-        What shows no frames, such as a notebook that is not trusted, shows the picture.
+        A notebook that is not trusted cannot run the player and shows the film strip only.
         """
         from warpchain.pictures.player import framed_player
         from warpchain.pictures.style import fragment
@@ -240,7 +241,7 @@ class WalkResult(WalkNumbers):
 
 
 def load_walk(path: str | os.PathLike[str]) -> WalkResult:
-    """Read a walk that `WalkResult.save` wrote, or the `walk.h5` of a folder; every number comes back to the bit.
+    """Load a walk that `WalkResult.save` wrote, or the `walk.h5` of a folder, with bitwise identical numbers.
 
     Raises:
         OSError: the file cannot be read.

@@ -1,1 +1,1 @@
-"""The library's three verbs: `walk`, `simulate` and `sweep`."""
+"""The three main functions of the library: `walk`, `simulate` and `sweep`."""

@@ -1,4 +1,4 @@
-"""The progress of a sweep, shown where somebody looks: in a terminal or in a notebook."""
+"""Progress lines of walks and sweeps in a terminal, in a notebook, or in a log."""
 
 import contextlib
 import math

@@ -1,4 +1,4 @@
-"""The motion of any given chain: what tests and analysts use."""
+"""`warpchain.simulate` and `warpchain.Chains`, which integrate given chains without a sprocket."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -24,29 +24,29 @@ if TYPE_CHECKING:
     from warpchain.typed import SolverFields
 
 LONGEST = 1e9
-"""Durations [s] from here on are refused."""
+"""Durations of this length and longer are refused [s]."""
 MOST_PLACES = 10_000_000
-"""Most links × instants of a trajectory, which take 0.5 GB."""
+"""Maximum number of links × times of a trajectory, which takes 0.5 GB."""
 _Numbers = Sequence[int] | NDArray[np.integer[Any]]
 _UNSOFTENED = {"soften_pile": False, "soften_drive": False}
-"""A given chain has no phases in which joints soften."""
+"""Options of `simulate`, because a given chain has no phases in which joints are softened."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Trajectory:
-    """Motion of a chain of n links at t chosen instants, as `warpchain.simulate` returns it.
+    """Motion of a chain of n links at t times; `warpchain.simulate` returns it.
 
     Attributes:
         status: how the simulation ended.
-        time: instants [s], shape (t,).
+        time: times [s], shape (t,).
         position: x, y [m] and θ [rad] of each link's centre of mass, shape (t, n, 3).
-        velocity: their rates [m/s, m/s, rad/s], shape (t, n, 3).
+        velocity: their rates of change [m/s, m/s, rad/s], shape (t, n, 3).
         steps_accepted: number of accepted steps.
         steps_rejected: number of rejected steps.
-        impulses: number of impulses by kind of contact.
-        losses: energy lost by cause [J], positive.
-        greatest_opening: greatest distance between two joined link ends [m].
-        greatest_penetration: greatest overlap by kind of contact [m].
+        impulses: number of contact impulses by kind of contact.
+        losses: dissipated energy by cause [J], positive.
+        greatest_opening: maximum joint separation, the distance between two joined link ends [m].
+        greatest_penetration: maximum penetration depth by kind of contact [m].
     """
 
     status: Status
@@ -77,30 +77,31 @@ def simulate(
     gravity: bool = True,
     **settings: "Unpack[SolverFields[Never]]",
 ) -> Trajectory:
-    """Integrate a given chain, without sprocket.
+    """Integrate the motion of a given chain without a sprocket, e.g. to test an integrator or a measured motion.
 
     Args:
-        parameters: Of the chain, or the name of a preset; or a :class:`State`, which has positions and velocities, too.
-        position: (n, 3): x, y [m] and θ [rad] of each link's centre; n as of :class:`State`. Link i's right end meets
-            link i + 1's left end, the last link's the first one's. Links 0, 2, … are inner ones.
-        velocity: (n, 3): their rates [m/s, m/s, rad/s].
-        duration: Simulated time [s], from time 0, which is that of the state; None: up to the last of ``times``.
-        times: Instants of the trajectory [s], rising, in [0, duration]; steps land on them exactly. Default: 101
-            instants evenly spread.
-        floor: True (at y = 0), False (none) or what ``floor`` of a scene may be, such as points ``[x, y]`` [m] or
-            ``[x, y, e, μ]``; None: that of the state's scene, for arrays at y = 0.
+        parameters: Physical parameters of the chain, the name of a preset, or a :class:`State`, which also has the
+            positions and velocities.
+        position: x, y [m] and θ [rad] of each link's centre of mass, shape (n, 3). The right end of link i meets the
+            left end of link i + 1, and that of the last link meets link 0. Links 0, 2, … are inner links.
+        velocity: Rates of change of ``position`` [m/s, m/s, rad/s], shape (n, 3).
+        duration: Simulated time [s]; time 0 is that of the given motion. None: up to the last of ``times``.
+        times: Times of the trajectory [s], increasing, in [0, duration]; steps end exactly at them. None: 101 times at
+            equal intervals.
+        floor: True (at y = 0), False (no floor), or any floor of a scene, e.g. points ``[x, y]`` [m] or
+            ``[x, y, e, μ]``. None: the floor of the state's scene; y = 0 for arrays.
         gravity: Whether gravity acts.
-        self_contact: Whether links touch one another.
-        method: A key of ``warpchain.inputs.methods.METHODS``, such as ``"dp5"``.
-        tolerance: See :func:`walk`.
+        self_contact: Whether links can touch each other.
+        method: Integrator, a key of ``warpchain.inputs.methods.METHODS`` such as ``"dp5"``.
+        tolerance: Maximum error of a step, see :func:`walk`.
         device: ``"cpu"``, ``"cuda"`` (the first GPU) or ``"cuda:N"``.
         settings: Any other field of :class:`Options` by its name.
 
     Returns:
-        The trajectory. If ``status`` is not ``FINISHED``, it ends with the state in which the chain stopped.
+        The trajectory. If ``status`` is not ``FINISHED``, it ends with the state at which the integration stopped.
 
     Raises:
-        InputError: A value is refused; nothing has been computed. It is a ``ValueError``.
+        InputError: A value is refused, before anything is computed. It is a ``ValueError``.
     """
     chosen = {"method": "rkf78"} | {name: value for name, value in settings.items() if value is not None}
     floor, gravity = plain(floor, "floor"), checked(gravity, "gravity", bool)
@@ -149,13 +150,14 @@ def simulate(
 
 
 class Chains:
-    """Many given chains of n links, side by side on a device, whose velocities may be changed between runs.
+    """Many given chains of n links on one device, whose velocities you can change while they move.
 
-    For experiments, such as a drag or a push at any time. There is no sprocket; loops that collapse soften as those of
-    walks do.
+    Use it for experiments such as a drag or a push at any time: call `run`, read `motions`, call `set_velocity`, and
+    `run` again. The chains are independent of each other and have no sprocket. As in walks, the joints of a loop that
+    has collapsed are softened.
 
     Attributes:
-        time: To which the chains were last carried on [s], from 0.
+        time: time up to which the chains were last advanced [s], from 0.
     """
 
     def __init__(
@@ -167,15 +169,15 @@ class Chains:
         floor: bool = True,
         **settings: "Unpack[SolverFields[Never]]",
     ) -> None:
-        """Place the chains.
+        """Place W chains on the device, at time 0.
 
         Args:
-            parameters: Of each of the W chains.
-            position: (W, n, 3), as those of :func:`simulate`.
-            velocity: (W, n, 3): their rates.
+            parameters: Physical parameters of each of the W chains.
+            position: x, y [m] and θ [rad] of each link, shape (W, n, 3), as in :func:`simulate`.
+            velocity: Rates of change of ``position``, shape (W, n, 3).
             floor: Whether there is a floor at y = 0.
-            method: See :func:`simulate`.
-            device: See :func:`simulate`.
+            method: Solver profile or integrator, see :func:`walk`.
+            device: ``"cpu"``, ``"cuda"`` (the first GPU) or ``"cuda:N"``.
             settings: Any other field of :class:`Options` by its name.
 
         Raises:
@@ -208,16 +210,20 @@ class Chains:
 
     @property
     def status(self) -> NDArray[np.int32]:
-        """Codes of `Status`, (W,): FINISHED of a chain that can go on."""
+        """Status code of each chain, shape (W,); a chain that `run` can advance has `Status.FINISHED`."""
         return self._batch.statuses().copy()
 
     def motions(self, chains: _Numbers | None = None) -> tuple[Array, Array]:
-        """Place and angle of the links of all chains, or of some numbers, (W, n, 3); and their rates."""
+        """Positions and velocities of the links, (W, n, 3) each, of all chains or of those with some numbers."""
         chosen = self._batch.several(self._numbers(chains))
         return chosen.position, chosen.velocity
 
     def set_velocity(self, chains: _Numbers, velocity: Array) -> None:
-        """Give some chains, by their numbers, other velocities, (chains, n, 3); an `InputError` if they do not fit."""
+        """Set the velocities (chains, n, 3) of the chains with some numbers.
+
+        Raises:
+            InputError: A number or the shape is refused.
+        """
         numbers = self._numbers(chains)
         rates = checked_array(velocity, "velocity", len(numbers), self._links, 3)
         if numbers:
@@ -225,12 +231,13 @@ class Chains:
             chosen.place(chosen.position, rates)
 
     def run(self, until: float, chains: _Numbers | None = None, *, to_rest: bool = False) -> None:
-        """Carry on all chains that can go on, or those of some numbers.
+        """Advance all chains whose status is `FINISHED`, or those with some numbers.
 
         Args:
-            until: Time [s], not before that of any of them.
+            until: Time up to which to advance [s], not before the time of any of them.
             chains: Numbers of the chains; None: all.
-            to_rest: Whether a chain that comes to rest on the floor stays there, AT_REST; others end with TIME_LIMIT.
+            to_rest: Whether chains that come to rest on the floor stop as `AT_REST`; the others then end as
+                `TIME_LIMIT`.
 
         Raises:
             InputError: A number or the time is refused.
@@ -246,14 +253,14 @@ class Chains:
         self.time = until
 
     def _numbers(self, chains: _Numbers | None) -> list[int]:
-        """Numbers of chains, by default all, or an `InputError`."""
+        """Checked numbers of chains; None: all."""
         count = len(self.status)
         numbers: list[int] = checked(chains, "chains", list[Annotated[int, Field(ge=0, lt=count)]] | None)
         return list(range(count)) if numbers is None else numbers
 
 
 def _follow(batch: Batch, body: str, instants: Array, end: float) -> Trajectory:
-    """Carry the chain of a batch on from instant to instant until the end [s]; ``body``: its floor."""
+    """Advance the chain of a batch from time to time until the end [s]; ``body`` is its floor."""
     features, world = batch.features(fixed_body=body), batch.worlds[0]
     reached, positions, velocities = [], [], []
     for instant in instants:

@@ -1,4 +1,4 @@
-"""One walk, from a user's few words to its result."""
+"""`warpchain.walk`, which users and the command `walk` call to simulate one walk."""
 
 from typing import TYPE_CHECKING, Never, Unpack
 
@@ -33,42 +33,41 @@ def walk(
     """Simulate one walk: hang a chain on its sprocket, spin it up, release it and follow it to rest.
 
     Args:
-        links: Number of links n, even where two kinds alternate.
-        frequency: Turns of the sprocket per second [Hz].
-        preset: None or ``"paper"`` (Table 1), or ``"soft"`` (softer joints, with ``reference`` 15 to 19
-            times fewer steps).
-        method: ``"standard"`` (``"hybrid"`` at 3e-3, with joints softened on the sprocket and in the pile; on a
-            GPU, and with ``record_joint_forces``, the next), ``"explicit"`` (``"os32"`` at 3e-3, softened likewise),
-            ``"reference"`` (``"rkf78"`` at 1e-6, as in the paper), or an integrator: a key of
-            ``warpchain.inputs.methods.METHODS``, such as ``"dp5"``.
-        tolerance: Error allowed in a step, absolute (SI units) and relative alike; None: the method's, 1e-6 for an
-            integrator, 1e-4 for ``"hybrid"``, and of ``"standard"`` and ``"explicit"`` 3e-3 while joints are soft.
-        start: ``"rest"``, ``"spinning"`` or ``"ellipse"``; or a :class:`State`, from which the walk goes on to
-            its end, by itself the rest of the same walk to the bit. Beside a state only parameters, options, limits
-            of the walk, floors and what its links have of their own are taken, and nothing is drawn.
-        setup: ``setup`` of another walk, which is repeated to the bit, whatever was drawn for it. It is complete: no
-            other setting is taken beside it, nothing is drawn, and ``seed`` is only noted in the result.
-        seed: Draw those parameters, phase and clearance that are not given from their distributions; None: Table 1's
-            means, phase 0.
-        frame_interval: Time between kept frames of all joints [s], at least 1e-6; None keeps none. It is rounded to
-            whole samples; less than a ``record_interval`` holds after the release. Frames and samples do not change
-            the walk: they are taken at the end of the first step after their time.
-        record_before: Time [s] before the release of which frames and samples are kept as well, as ``before_release``
-            of the result, with the forces in the joints; None: 0.5 s if frames are kept; 0: none. Nothing is kept of
-            a loop under multiplied loads; ``extra_hold`` makes room for more.
-        record_joint_forces: Whether ``frame_forces`` and ``frame_moments`` of the joints are recorded with each frame
-            after the release. No method with rigid joints has them: ``"standard"`` then is ``"explicit"``. The picture
-            of waves needs frames some 1e-4 s apart; with 60 links they take 24 MB for each second of the walk.
-        on_progress: Called before kernels are compiled, if any are, and after each launch, several times a second; by
-            default a notebook shows a line of progress.
+        links: Number of links n; even if inner and outer links differ.
+        frequency: Frequency of the sprocket [Hz].
+        preset: Set of physical parameters: ``"paper"`` (Table 1) or ``"soft"`` (softer joints; with ``reference`` 15 to
+            19 times fewer steps). None: ``"paper"``.
+        method: Solver profile: ``"standard"``, ``"explicit"`` or ``"reference"``; or an integrator, a key of
+            ``warpchain.inputs.methods.METHODS`` such as ``"dp5"``. None: ``"standard"``. On a GPU, with a tilting plane
+            and with ``record_joint_forces``, ``"standard"`` means ``"explicit"``.
+        tolerance: Maximum error of a step, absolute (SI units) and relative. None: that of the profile; 1e-6 for an
+            integrator, 1e-4 for ``"hybrid"``.
+        start: How the walk begins: ``"rest"``, ``"spinning"`` or ``"ellipse"``; or a :class:`State`, from which the
+            walk continues. An unchanged state of a walk continues that walk bit for bit. With a state, only
+            parameters, options, limits of the walk, floors and properties of single links can be set. None: ``"rest"``.
+        setup: Setup of another walk, ``other.setup``, which is repeated bit for bit. It is complete, so no other
+            setting is possible; ``seed`` is only recorded in the result.
+        seed: Seed with which parameters, phase and clearance that are not set are sampled from their distributions.
+            None: Table 1's means, phase 0.
+        frame_interval: Time between recorded frames of all joints [s], at least 1e-6, rounded to whole record
+            intervals; None: no frames. Recording does not change the walk: a frame is taken at the end of the first
+            step after its time.
+        record_before: Time before the release that is recorded as well, with the joint forces, as ``before_release``
+            of the result [s]; 0: none; None: 0.5 s if frames are recorded. A loop under scaled loads is not recorded;
+            ``extra_hold`` holds the loop longer.
+        record_joint_forces: Whether to record ``frame_forces`` and ``frame_moments`` of the joints with each frame
+            after the release. The figure of waves needs frames every 1e-4 s or so; with 60 links they take 24 MB for
+            each second of the walk.
+        on_progress: Function that is called before kernels are compiled, if any are, and after each launch, several
+            times a second. None: a notebook shows a progress line.
         settings: Any other field of :class:`Parameters`, :class:`Scene` or :class:`Options`, by its name or the
-            paper's symbol, such as ``mu_fc``; ``warpchain parameters`` lists them.
+            paper's symbol, e.g. ``mu_fc``; ``warpchain parameters`` lists them.
 
     Returns:
-        The walk; look at ``status`` before ``dx``.
+        The walk. Check ``status`` before you use ``dx``, which is NaN unless the chain came to rest.
 
     Raises:
-        InputError: A value is refused; nothing has been computed. It is a ``ValueError``.
+        InputError: A value is refused, before anything is computed. It is a ``ValueError``.
     """
     given = by_name({name: value for name, value in settings.items() if value is not None or name not in MAY_BE_NONE})
     refuse_axes(given)

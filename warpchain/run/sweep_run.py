@@ -1,4 +1,4 @@
-"""Runs a sweep: hands its shards to workers and follows their progress; a sweep that was killed can go on.
+"""`warpchain.sweep`: hands the shards of a sweep to workers and follows their progress; an interrupted sweep resumes.
 
 A worker runs the walks of shards, writes each shard to an immutable file and returns nothing. So
 any executor in the style of ``concurrent.futures`` will do, on this machine or another that sees the same folder.
@@ -81,51 +81,54 @@ def sweep(
     on_progress: OnProgress | None = None,
     **settings: "Unpack[SweepFields]",
 ) -> SweepResult:
-    """Run a sweep, or what is left of it, and load its results.
+    """Run a sweep, or resume it, and load its results.
 
         warpchain.sweep(links=[40, 60], frequency=np.linspace(5, 30, 6), start="spinning", samples=20, out="speeds")
 
     Args:
-        source: A sweep file (YAML), the bare name of one that comes with the package, its content, or a :class:`Sweep`;
-            or None, and the settings of a walk and the keys of a file by name:
-        out: Folder of the results. A sweep that was killed goes on where it was, and leaves the same bytes. A sweep
-            with more samples than the folder, and else the same, adds them; latin hypercubes do not grow.
-        settings: Whatever :func:`walk` takes; a list, an array or a range ``{"from":, "to":, "step":}`` is an axis of
-            the grid, and so are names with floors, releases or lists of numbers for links. The last axis varies
-            fastest. Beside these the keys of a sweep file:
+        source: A sweep file (YAML), the bare name of one that comes with the package, its content, or a :class:`Sweep`.
+            None: the sweep is defined by the keywords below.
+        out: Results folder. If it holds part of this sweep, the sweep resumes, and the results are the same bytes as
+            without the interruption. If only ``samples`` is larger than in the folder, the new samples are added
+            (not possible for Latin hypercubes).
+        settings: Any setting of :func:`walk`. A list, an array or a range ``{"from":, "to":, "step":}`` is an axis of
+            the grid; floors, releases and lists of numbers for links need a name each. The last axis varies fastest.
+            The other keywords are the keys of a sweep file:
         grid: Further axes, which come before those of the settings.
-        points: Parameter sets, as a table or a mapping: quantity → its value in each set. They are one more axis,
-            ``point``, beside the grid.
-        samples: Samples in each cell of the grid; beside a source instead of those at the top of it.
+        points: Parameter sets, as a table or as a mapping from each quantity to its values. They are an additional
+            axis, ``point``, beside the grid.
+        samples: Number of samples in each cell of the grid; with a source it replaces the number at its top level.
         sampler: ``"random"`` (the default), ``"sobol"``, ``"latin_hypercube"`` or ``"saltelli"``.
-        randomisations: Independent randomisations of such a design, by default 8; errors of means come from them.
-        preset: As of :func:`walk`.
+        randomisations: Number of independent randomisations of such a design, from which standard errors of means are
+            estimated; default 8.
+        preset: Set of physical parameters, as in :func:`walk`.
         scene: Fields of :class:`Scene` that differ from their defaults.
         parameters: Fields of :class:`Parameters` that differ from the preset.
         options: Fields of :class:`Options` that differ from their defaults.
-        distributions: Quantity → what samples draw: ``"fixed"``, ``"table"`` (Table 1), ``{"uniform": [lower, upper]}``
-            or ``{"gaussian": {"mean":, "sigma":}}``; ``"all"`` is any that is not named, by default ``"table"``.
+        distributions: Quantity → its distribution: ``"fixed"``, ``"table"`` (Table 1), ``{"uniform": [lower, upper]}``
+            or ``{"gaussian": {"mean":, "sigma":}}``; ``"all"`` stands for every other quantity, by default ``"table"``.
         same_samples_along: Axes along which the same samples are used.
-        independent: Drawn quantities of which every cell has its own values, even along such axes.
-        record: What is kept of motions, such as ``{"series": True, "frames": {"samples": [0]}}``.
-        name: Of the sweep; by default that of the folder.
-        seed: Of all random numbers, by default 0; beside a source instead of its own.
-        part: ``"k/N"``: run only the k-th of N parts, in a folder of its own; ``warpchain merge`` puts them together.
-        device: ``"cpu"``, ``"cuda"`` or ``"cuda:N"`` instead of what the sweep says. Method ``standard`` is then what
-            it means there; the ``sweep.yaml`` of a folder names the method that was run, which stays.
-        executor: Where shards are run: what has ``submit`` as the executors of ``concurrent.futures`` and
+        independent: Sampled quantities whose values differ between cells even along such axes.
+        record: Which motions are recorded, e.g. ``{"series": True, "frames": {"samples": [0]}}``.
+        name: Name of the sweep; default: the name of the folder.
+        seed: Seed of all random numbers, default 0; with a source it replaces the seed of the source.
+        part: ``"k/N"``: run only the k-th of N parts, in its own folder; ``warpchain merge`` joins the parts.
+        device: ``"cpu"``, ``"cuda"`` or ``"cuda:N"`` instead of the device of the sweep. ``standard`` then means
+            the default of that device; a folder keeps the method with which it was begun.
+        executor: Object that computes the shards by ``submit``, such as the executors of ``concurrent.futures`` and
             ``mpi4py.futures``, or a Dask client; its workers must see ``out``. Default: threads of this process.
-        workers: Number of tasks at a time. Default: the processors of this machine; with a Dask client the threads of
-            its workers. With an executor, at least the number of its workers. Without one, a GPU has one task.
-        fresh: Delete what another sweep left in the folder.
+        workers: Number of tasks at a time. Default: the CPU cores of this machine; with a Dask client the threads of
+            its workers. With an executor, set at least the number of its workers. Without one, a GPU has one task.
+        fresh: Delete the results of another sweep in the folder.
         progress: Show a bar in a terminal or a notebook, elsewhere a line a minute on standard error, unless
             ``on_progress`` is given.
-        on_progress: Called before kernels are compiled, if any are, when the walks begin, and about every second.
+        on_progress: Function that is called before kernels are compiled, if any are, when the walks begin, and about
+            every second.
 
     Raises:
         InputError: The sweep or the folder is refused; one line with the remedy for each value. It is a ``ValueError``.
         OSError: The folder cannot be read or written.
-        LostWorkersError: Worker processes were killed, or the scheduler of a Dask client was closed.
+        LostWorkersError: Worker processes have ended, or the scheduler of a Dask client was closed.
     """
     if executor is not None and not hasattr(executor, "submit"):
         wanted = "one with submit, such as concurrent.futures.ProcessPoolExecutor(), or a Dask client"

@@ -1,4 +1,4 @@
-"""Where the tasks of a sweep run: threads of this process, an executor, a process for each GPU; and lost workers."""
+"""Executors of a sweep's tasks: threads, given executors, or one process per GPU; and detection of lost workers."""
 
 import concurrent.futures
 import contextlib

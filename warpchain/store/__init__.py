@@ -1,1 +1,1 @@
-"""What a sweep leaves on disk, and reads back."""
+"""The folder of a sweep: its manifest, shards and lock."""

@@ -1,4 +1,4 @@
-"""The folder of a sweep, as the one process that runs the sweep holds it.
+"""The folder of a sweep, as seen by the process that runs the sweep.
 
     DIR/sweep.h5       what the folder belongs to, see `Manifest`; written first, replaced when the sweep grows
     DIR/sweep.yaml     the resolved sweep, for people and to run again
@@ -11,7 +11,7 @@ None of these is a symbolic link when a sweep is run: nothing is written or dele
 shard is deleted, named in log.txt and by a warning, and computed again.
 
 A sweep grows when its file is given more samples: the shards that are there stay, others join them. Whatever happens
-between two of these lines, the next `SweepFolder.open` goes on from there.
+between two of these lines, the next `SweepFolder.open` resumes from there.
 """
 
 import datetime
@@ -62,7 +62,7 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
 
     @classmethod
     def open(cls, directory: AnyPath, sweep: Sweep, shard_size: int, fresh: bool = False, part: Part = (1, 1)) -> Self:
-        """Begin a sweep in a folder, made if need be, or go on with it, with more samples if the sweep has more.
+        """Begin a sweep in a folder, made if need be, or resume it, with more samples if the sweep has more.
 
         `fresh` deletes what a sweep has left there, and begins. New shards have `shard_size` walks, those that are
         there keep their size. A folder keeps the `Manifest.part` that it was begun with. An `InputWarning` says that a
@@ -172,7 +172,7 @@ def _prepared(folder: Path, sweep: Sweep, manifest: Manifest, fresh: bool) -> Ma
     _clear_leftovers(folder)
     named, has_shards = folder / SWEEP_FILE, any(shards.own_shards(folder))
     if not (named.exists() or has_shards):
-        for name in (*shards.OWN, shards.EARLIER, WALK_FILE):
+        for name in (*shards.OWN, WALK_FILE):
             if (folder / name).exists():
                 raise InputError(f"{folder / name}: in the way of a sweep; move it away, or use another folder")
         write_whole(named, manifest.image())
@@ -210,7 +210,7 @@ def _is_whole(folder: Path) -> bool:
 
 
 def _rebuild(folder: Path, manifest: Manifest) -> None:
-    """Write a lost or damaged sweep.h5 anew, if the shards are those of this sweep; else an `InputError`."""
+    """Write a lost or damaged sweep.h5 again, if the shards are those of this sweep; else an `InputError`."""
     path, damaged = folder / SWEEP_FILE, dict[str, str]()
     problem = f"{path}: lost or damaged, and the shards are"
     try:
@@ -236,7 +236,7 @@ def _rebuild(folder: Path, manifest: Manifest) -> None:
 
 
 def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
-    """The manifest of a folder that is to go on with a sweep of this manifest; an `InputError` if it holds another."""
+    """The manifest of a folder in which a sweep of this manifest is to resume; an `InputError` if it holds another."""
     found = read_manifest(folder)
     shards.check_numerics_of(folder, found.numerics_version)
     if found.part != manifest.part:

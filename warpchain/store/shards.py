@@ -45,8 +45,6 @@ CRATE: Final = "ro-crate-metadata.json"
 """Where and when the sweep was run, see `warpchain.store.crate`."""
 OWN: Final = (SWEEP_FILE, "sweep.yaml", "shards", "log.txt", CRATE)
 """What a sweep has in its folder, beside the lock."""
-EARLIER: Final = "sweep.json"
-"""What earlier versions have there instead of sweep.h5."""
 MANIFEST: Final = Format.of("warpchain sweep")
 SHARD: Final = Format.of("warpchain shard", STORED_COLUMNS, MOTION, dict(ROW_KEYS.fields or {}))
 _NAME: Final = re.compile(r"\d{6,}\.h5")
@@ -164,8 +162,6 @@ def read_manifest(directory: AnyPath) -> Manifest:
     if not os.path.lexists(path):
         if not os.path.exists(directory):
             raise InputError(f"{directory}: does not exist; use the folder of a sweep, or a merged file")
-        if (Path(directory) / EARLIER).exists():
-            raise InputError(f"{directory}: holds a sweep of an earlier warpchain; read it with that version")
         if any(own_shards(directory)):
             raise DamagedFileError(f"{path}: is missing; {REBUILT}")
         there = "a saved walk, no sweep" if (Path(directory) / WALK_FILE).exists() else "no sweep"

@@ -1,1 +1,1 @@
-"""What a sweep is: its file, its walks, and what it keeps of them."""
+"""Definition of a sweep: its file, grid, samples, walks and recorded motions."""

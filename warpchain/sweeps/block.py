@@ -1,4 +1,4 @@
-"""One block of a sweep: a grid of cells, and what the samples of a cell draw; and the values of an axis in a file.
+"""One block of a sweep: its grid of cells, the distributions of its samples, and the values of axes in a file.
 
 These are a list, a range that is written out, or names with values that are lists.
 """

@@ -1,4 +1,4 @@
-"""Designed samples: points that fill the space of the drawn quantities more evenly than random ones.
+"""Quasi-random designs, whose points fill the space of the sampled quantities more evenly than random ones.
 
 A design is a matrix of points in the unit cube, one row for each sample of a cell and one column for each drawn
 quantity; a sample's values are the quantiles of the distributions at its row. `saltelli` rows have twice as many
@@ -50,7 +50,7 @@ class Sampler(NamedTuple):
         return 2 * dimensions if self.crosses else dimensions
 
 
-_SALTELLI: Final = "points for Sobol indices: each sample of d drawn quantities takes d + 2 walks; "
+_SALTELLI: Final = "points for Sobol indices: each sample of d sampled quantities takes d + 2 walks; "
 SAMPLERS: Final[Mapping[str, Sampler]] = {
     "random": Sampler("independent samples"),
     "sobol": Sampler("scrambled Sobol' sequences; a power of two of samples", "Sobol", is_balanced=True),
@@ -80,7 +80,7 @@ def independent_groups(sampler: str, walks: int, dimensions: int, randomisations
 
 
 def check_design(sampler: str, samples: int, dimensions: int, randomisations: int, path: str) -> None:
-    """Check that a sampler can make a number of samples of so many drawn quantities, in so many randomisations.
+    """Check that a sampler can make a number of samples of so many sampled quantities, in so many randomisations.
 
     An `InputError`, which begins with `path`, says that samples would be equal, too many, or no balanced sequence.
     """

@@ -1,4 +1,4 @@
-"""What a sweep keeps of the motion of its walks, beside their rows: time series, and frames of all joints."""
+"""Which motions a sweep records in addition to the numbers of its walks: time series and frames of all joints."""
 
 from typing import Annotated, Any, Final, Literal, Self
 

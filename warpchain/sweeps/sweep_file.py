@@ -1,4 +1,4 @@
-"""The grammar of sweep files: `SweepFile` says it once, for checks, the JSON schema of editors and the reference page.
+"""The grammar of sweep files, `SweepFile`, from which checks, the JSON schema and the reference page are made.
 
 `read_sweep` makes `Block`s of a file, with every range written out and every distribution resolved. An error is a line
 that begins with the path of the offending value, such as `sweep.blocks[0].grid.frequency[3]`. Sweeps that come with the
@@ -186,7 +186,7 @@ class BlockKeys(WalkKeys):
         dict[str, Any], _mapping_of("distributions", {"all": _Word, **dict.fromkeys(DRAWABLE, _Drawn)})
     ] = Field({}, description="what samples draw, see below")
     independent: list[str] = Field(
-        [], description="drawn quantities that every cell draws by itself, even along axes with the same samples"
+        [], description="quantities that are sampled separately in every cell, even along axes with the same samples"
     )
     grid: Annotated[
         dict[str, list[Value] | dict[str, Value]], _mapping_of("grid", {"preset": axis(_Preset), **_AXES})

@@ -1,1 +1,1 @@
-"""From the chains of a batch to the results of walks."""
+"""Runs walks on the chains of a batch and reduces them to numbers."""

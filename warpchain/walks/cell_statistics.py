@@ -1,4 +1,4 @@
-"""Statistics of a quantity in each cell of a grid: the one home of means, their errors and their bounds.
+"""Means of a quantity in each cell of a grid, with standard errors and bounds; all tables and figures use them.
 
 Tables, figures, pages and `info` show these numbers. The error of a mean comes from the spread between groups of walks
 that are independent of one another: the single walks of random samples, the randomisations of designed ones.

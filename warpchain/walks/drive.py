@@ -1,4 +1,7 @@
-"""What the sprocket does with a chain until the release, as kernels read it."""
+"""The motion of the sprocket and the hold until the release, as the kernels' `Drive` needs them.
+
+`WalkRun` calls this when it starts a walk. The hold ends by the kernels' release rule.
+"""
 
 import math
 from collections.abc import Sequence
@@ -11,11 +14,11 @@ from warpchain.chain.softened_joints import SOFT, SOFT_MASS, SOFTEST, Joints
 from warpchain.inputs.arrays import Array
 
 HOLD_STRAIN = 3e-4
-"""Greatest strain of a held loop on softened joints by its speed."""
+"""Maximum strain of a held loop with softened joints, due to its speed."""
 LOADED_STRAIN = 1e-3
-"""Greatest strain by speed and mean weight while loads are multiplied."""
+"""Maximum strain due to speed and mean weight while loads are scaled."""
 GREATEST_LOAD = 50.0
-"""Factor by which loads are multiplied, unless the chain bears less. With 15, 30 and 60 the released loop is the
+"""Factor by which loads are scaled, unless the chain bears less. With 15, 30 and 60 the released loop is the
 same to 0.2 % of its height and 0.4 % of its width (60 to 180 links, 5 to 30 Hz), and within 0.8 % of the width of one
 that was held for 40 s under its own loads. Twice as much takes two thirds of the time, in shorter steps."""
 PUSH = 0.25

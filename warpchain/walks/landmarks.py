@@ -1,4 +1,4 @@
-"""What is told of a walk beside its motion: the loop at the release, bounces, what is inaccurate."""
+"""Derived quantities of a walk: the loop at the release, bounces, and inaccuracies."""
 
 from collections.abc import Mapping
 from typing import Any, Final

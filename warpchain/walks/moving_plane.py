@@ -1,4 +1,4 @@
-"""A plane that tilts, as seen from the host: at the release, its angles, places in the room.
+"""A plane that tilts, as seen from the host: at the release, its angles, positions in the laboratory frame.
 
 The values of a plane are those of :mod:`warpchain.kernels.layout`: lateral speed, two rates, the components of the
 room's X and Y axes along the plane's axes e1, e2, e3, and the origin in the room. Z = X × Y points to the right of the
@@ -46,7 +46,7 @@ def angles(planes: Array) -> tuple[Array, Array]:
 
 
 def frame_axes(planes: Array) -> Array:
-    """e1 and e2 in the room, shape (f, 2, 3), of planes (f, PLANE_VALUES)."""
+    """e1 and e2 in the laboratory frame, shape (f, 2, 3), of planes (f, PLANE_VALUES)."""
     ahead, up = (planes[:, first : first + 3] for first in (layout.AHEAD, layout.UP))
     axes = np.stack([ahead, up, np.cross(ahead, up)], axis=1)  # room axes along axis 1, components along axis 2
     return np.ascontiguousarray(axes[:, :, :2].transpose(0, 2, 1))

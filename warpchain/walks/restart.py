@@ -1,13 +1,11 @@
 """States of a walk: taken by running it again until then, with all that its rest depends on.
 
-`WalkResult.state` takes one; `WalkRun` goes on from one.
+`WalkResult.state` takes one; `WalkRun` continues from one.
 """
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpchain.chain.setup import Setup, State
 from warpchain.engine.batch import Batch
@@ -16,11 +14,6 @@ from warpchain.inputs.validation import InputError, checked
 from warpchain.status import Status
 from warpchain.walks.moving_plane import state_of_plane
 from warpchain.walks.walk_phases import WalkRun, go_on
-
-
-def memory_of(run: WalkRun) -> dict[str, NDArray[Any]]:
-    """All that the rest of a walk, or of its outcome, depends on: a `State.memory`."""
-    return {**run.world.snapshot(), "setup": run.setup.fingerprint, **run.driven.memory}
 
 
 def state_at(setup: Setup, t: object, end: float) -> State:
@@ -61,7 +54,7 @@ def state_at(setup: Setup, t: object, end: float) -> State:
                     velocity=world.velocity,
                     setup=replace(setup, start=None),
                     time=world.time,
-                    memory=memory_of(run),
+                    memory={**world.snapshot(), "setup": setup.fingerprint, **run.driven.memory},
                     **(state_of_plane(world.plane) if setup.scene.plane == "tilting" else {}),
                 )
         raise InputError(f"t: the repeated walk ended as {run.status.label} at {world.time:.6g} s; use an earlier time")

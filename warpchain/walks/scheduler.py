@@ -3,13 +3,14 @@
 import threading
 import time
 from collections import defaultdict, deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 
 import numpy as np
 
 from warpchain.chain.keep import NOTHING, Keep
 from warpchain.chain.setup import Setup
+from warpchain.chain.starts import Motion, first_motions
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import Gpu, gpu_turn, start_device
 from warpchain.engine.kernel_choice import block_threads, load_kernels, resident_blocks
@@ -32,12 +33,11 @@ SHARED_WALKS = 2000
 Kernels for blocks of different sizes compete for the instruction cache of a multiprocessor: the 504 walks of Figure 6
 took a fifth longer in blocks of five sizes than in blocks of 192 threads, some of them idle; 2016 walks took as long.
 """
-BEGUN_TOGETHER = 32
-"""Free worlds of a batch of some hundred that are worth a beginning, if chains are under way there.
+DRAWN_TOGETHER = 32
+"""Walks that are drawn and laid together, ahead of the worlds that they will have.
 
-To begin w walks takes about F + c w, with F as much as 20 walks (F = 1.2 ms, c = 0.06 ms on a quiet core of 3 GHz): so
-much of it goes to Python and not to numbers. From 32 walks on F is less than half of that. Meanwhile an eighth of the
-worlds at most is idle, and there are `WORLDS_OF_BLOCK` times as many as fill the device.
+To lay w chains takes about F + c w, with F as much as 10 to 20 chains: Python's part, beside that of the numbers. For
+32 it is a third of the whole. To take more would gain little, and let a launch that is over wait longer.
 """
 BATCHES_PER_GPU = 4
 """While the host handles one of them, the others go on and fill the device."""
@@ -62,7 +62,7 @@ def run_setups(
 
     Args:
         setups: The walks, samples drawn; with ``draw``, options and links suffice.
-        draw: Called with the places of walks that begin; returns their setups, with options and links of ``setups``.
+        draw: Called with the places of walks that are next; returns their setups, with options and links of ``setups``.
         keeps: What is kept of the motion of each; None: nothing. Walks of equal options keep frames equally often.
         slots: Number of chains that run at the same time. Default: on a GPU as many as fill it; on a CPU, where one
             core does a launch, one, which stays in the cache.
@@ -71,15 +71,16 @@ def run_setups(
         waited: Called with the seconds of each pause in which the host waited for a GPU.
     """
 
-    def complete(places: Sequence[int]) -> Iterator[tuple[int, Setup, Keep]]:
+    def prepare(places: Sequence[int]) -> Iterator[Prepared]:
         drawn = [setups[place] for place in places] if draw is None else draw(places)
-        return zip(places, drawn, [NOTHING if keeps is None else keeps[place] for place in places], strict=True)
+        kept = [NOTHING if keeps is None else keeps[place] for place in places]
+        return zip(places, drawn, kept, first_motions(drawn), strict=True)
 
     def group(places: list[int]) -> list[BatchRun]:
         kept = [] if keeps is None else [keeps[place] for place in places]
         batches, capacity = _batches([setups[place] for place in places], kept, slots)
-        waiting = deque(places)
-        return [BatchRun(batch, waiting, capacity, complete, watch) for batch in batches]
+        waiting = Waiting(places, prepare)
+        return [BatchRun(batch, waiting, capacity, watch) for batch in batches]
 
     yield from _run_groups(map(group, _groups(setups, len(setups))), stop, waited)
 
@@ -147,20 +148,44 @@ def compile_kernels(
         load_kernels(((start_device(device), features, size) for device, features, size in wanted), on_compile)
 
 
-class BatchRun:
-    """A batch and the walks on its worlds; `waiting` are places of the walks of its group that have not begun."""
+Prepared = tuple[int, Setup, Keep, Motion | None]
+"""Place of a walk, what it is, what is kept of it, and how its chain lies at first."""
 
-    def __init__(
-        self,
-        batch: Batch,
-        waiting: deque[int],
-        capacity: int,
-        complete: Callable[[Sequence[int]], Iterator[tuple[int, Setup, Keep]]],
-        watch: Callable[[WalkRun], None] | None,
-    ) -> None:
+
+class Waiting:
+    """Walks of a group that have not begun."""
+
+    def __init__(self, places: Sequence[int], prepare: Callable[[Sequence[int]], Iterable[Prepared]]) -> None:
+        """Let walks wait, in the order of their places; `prepare` draws and lays several."""
+        self._places, self._prepare, self._ready = deque(places), prepare, deque[Prepared]()
+
+    def __len__(self) -> int:
+        """Number of walks that wait."""
+        return len(self._places) + len(self._ready)
+
+    def prepare(self) -> bool:
+        """Draw and lay the next walks, unless as many are ready, or none is left; whether that was done."""
+        if not self._places or len(self._ready) >= DRAWN_TOGETHER:
+            return False
+        count = min(DRAWN_TOGETHER, len(self._places))
+        self._ready.extend(self._prepare([self._places.popleft() for _ in range(count)]))
+        return True
+
+    def take(self, most: int) -> list[Prepared]:
+        """The next walks, which wait no longer, so many at most."""
+        taken: list[Prepared] = []
+        while len(taken) < most and (self._ready or self.prepare()):
+            taken.append(self._ready.popleft())
+        return taken
+
+
+class BatchRun:
+    """A batch and the walks on its worlds; `waiting` are the walks of its group that have not begun."""
+
+    def __init__(self, batch: Batch, waiting: Waiting, capacity: int, watch: Callable[[WalkRun], None] | None) -> None:
         """Prepare to run waiting walks, of which `capacity` would fill the device; those that begin are taken away."""
         self.batch, self.waiting = batch, waiting
-        self._capacity, self._complete, self._watch = capacity, complete, watch
+        self._capacity, self._watch = capacity, watch
         self._running: dict[int, tuple[int, WalkRun]] = {}
         self._kernels = list[Features]()
         self._kernel = np.full(len(batch.worlds), -1)  # that each world needs, by its number; −1: it is free
@@ -171,17 +196,14 @@ class BatchRun:
         return len(self._running) / self._capacity
 
     def start(self) -> bool:
-        """Give waiting walks free worlds, if there are enough, and begin a launch; False if nothing is to carry on."""
-        free = np.flatnonzero(self._kernel < 0)[: len(self.waiting)].tolist()
-        enough = min(BEGUN_TOGETHER, len(self._kernel) // 8, len(self.waiting))
-        if free and (len(free) >= enough or not self._running):
-            walks = self._complete([self.waiting.popleft() for _ in free])
-            begun = {
-                world: (place, WalkRun(self.batch.worlds[world], setup, keep))
-                for world, (place, setup, keep) in zip(free, walks, strict=True)
-            }
-            self._running |= begun
-            self._go_on(begun)
+        """Give waiting walks all free worlds and begin a launch; False if there is nothing to carry on."""
+        free = np.flatnonzero(self._kernel < 0).tolist()
+        begun = {
+            world: (place, WalkRun(self.batch.worlds[world], setup, keep, motion))
+            for world, (place, setup, keep, motion) in zip(free, self.waiting.take(len(free)), strict=False)
+        }
+        self._running |= begun
+        self._go_on(begun)
         together = {
             features: np.flatnonzero(self._kernel == kernel)
             for kernel, features in enumerate(self._kernels)
@@ -230,6 +252,8 @@ def _run_groups(
                 return
             ready = next((run for run in under_way if run.batch.is_done()), None)
             if ready is None:
+                if any(run.waiting.prepare() for run in under_way):
+                    continue
                 began = time.perf_counter()
                 time.sleep(NAP)
                 waited(time.perf_counter() - began)

@@ -1,6 +1,6 @@
-"""All that is known of one walk: its numbers, its motion, what it was, and what follows from them.
+"""All recorded data of one walk, and the quantities derived from them.
 
-Figures draw a `WalkNumbers`; `warpchain.results.walk_result` gives it to a user. The annotations of `Outcome` and
+Figures are drawn from a `WalkNumbers`; its subclass `WalkResult` is what users get. The annotations of `Outcome` and
 `WalkNumbers` are the one table of a walk's quantities: files, columns of a sweep, units and the reference derive from
 them.
 """
@@ -26,7 +26,7 @@ _FIXED: Final = "if the plane is fixed"
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class WalkNumbers(Outcome):
-    """All that is known of one walk, t instants and f frames of a chain of n links; units stand beside the fields."""
+    """All data of one walk with t record times and f frames of a chain of n links; units stand beside the fields."""
 
     wall_time: Annotated[float, Stored("s", "computing time, without the compilation of kernels")]
     setup: Setup
@@ -88,7 +88,7 @@ class WalkNumbers(Outcome):
 
     @property
     def joints_lab(self) -> Array | None:
-        """Joints x, y, z [m] in the room, (f, n, 3), if the plane tilts; else None: `frame_joints` are in the room."""
+        """Joints x, y, z in the laboratory frame [m], (f, n, 3), if the plane tilts; else None, see `frame_joints`."""
         if self.setup.scene.plane == "fixed":
             return None
         return self.frame_origin[:, None, :] + self.frame_joints @ self.frame_axes

@@ -22,7 +22,7 @@ from warpchain.chain.floor import circles_of, raised_by
 from warpchain.chain.keep import NOTHING, Keep
 from warpchain.chain.setup import Setup
 from warpchain.chain.sprocket_motion import motion_rows
-from warpchain.chain.starts import first_motions
+from warpchain.chain.starts import Motion, first_motions
 from warpchain.engine.world import CACHES, World
 from warpchain.inputs.arrays import Array
 from warpchain.kernels import layout
@@ -44,8 +44,8 @@ class Progress:
         speed: Speed [m/s] along the loop, in phase ``"walk"`` of the centre of mass.
         attempts: Attempted steps so far.
         frame_time: Times [s] since the release of the frames recorded since the last call, shape (f,).
-        frame_joints: Joints in the room [m] of these frames, as in `WalkResult`: x, y, shape (f, n, 2), and z, shape
-            (f, n, 3), if the plane tilts.
+        frame_joints: Joints of these frames in the laboratory frame [m], as in `WalkResult`: x, y, shape (f, n, 2);
+            if the plane tilts x, y, z, shape (f, n, 3).
         sprocket_height: Height [m] of the sprocket's centre at the release; NaN before it, and without a sprocket.
     """
 
@@ -92,10 +92,14 @@ class WalkRun:
         is_released: Whether the chain walks, with or without a sprocket that moves.
     """
 
-    def __init__(self, world: World, setup: Setup, keep: Keep = NOTHING) -> None:
-        """Prepare a walk; the batch of the world has its options, and records what is to be kept."""
+    def __init__(self, world: World, setup: Setup, keep: Keep = NOTHING, motion: Motion | None = None) -> None:
+        """Prepare a walk; the batch of the world has its options, and records what is to be kept.
+
+        ``motion``: how the chain lies at first, of `first_motions`, if that is known.
+        """
         scene = setup.scene
         self.world, self.setup = world, setup
+        self._motion = first_motions([setup])[0] if motion is None else motion
         self.features: Features | None = None
         self.recorder = Recorder(world, keep, setup)
         self.driven = Driven(has_sprocket=setup.has_drive)
@@ -192,7 +196,7 @@ def _begin(runs: Sequence[WalkRun]) -> None:
         for run in runs:
             _continue(run)
         return
-    position, velocity = first_motions(setups)
+    position, velocity = (np.array(parts) for parts in zip(*(run._motion for run in runs if run._motion), strict=True))
     if not setups[0].has_drive:
         _release(runs, position, velocity)
         return

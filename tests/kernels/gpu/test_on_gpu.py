@@ -128,7 +128,7 @@ def test_a_walk_gives_the_same_bits_in_any_block(method: str, monkeypatch: pytes
 
 
 def test_memory_that_holds_few_chains_only_takes_longer(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where memory is short, walks wait for one another."""
+    """Where memory is short, walks are computed in turn."""
     setups = [brief_setup(seed, device=device) for seed in range(5)]
     together = outcomes(setups)
     monkeypatch.setattr(scheduler, "most_worlds", lambda *_, **__: 2)
