@@ -19,7 +19,6 @@ from warpchain.hdf5_files import SWEEP_FILE, WALK_FILE
 from warpchain.inputs.figure_kinds import KINDS, FigureWord
 from warpchain.inputs.validation import InputError, json_value, one_line, printable, short
 from warpchain.pictures.labels import COUNTS, SPREADS, cell_notes, cell_table, cell_text, with_error
-from warpchain.results.block_result import counted
 from warpchain.results.walk_result import WalkResult, load_walk
 from warpchain.status import Status
 from warpchain.walks.landmarks import FAULTS
@@ -142,6 +141,8 @@ def _sizes(*sizes: float) -> str:
 
 def print_samples(result: "SweepResult") -> None:
     """Print mean, error and spread of the distances of the samples of one cell on standard output, and statuses."""
+    from warpchain.results.block_result import counted
+
     cells, dx = result.statistics(), result.dx
     rows = {"Δx": "unknown; no walk came to rest"}
     if cells.count:
