@@ -358,5 +358,5 @@ def test_names_below_panels_on_paper_stay_apart(tmp_path: Path, width: float) ->
 def test_the_title_says_how_many_walks_cells_have(tmp_path: Path) -> None:
     """Of a sweep that runs until its errors are reached these are the walks so far, not all that there might be."""
     asked = sweep({"frequency": [10, 20]}, samples=8, at_most=16, until=1e-6)
-    result = make_sweep(tmp_path, asked, lambda walk: None if walk.index >= 13 else distance(walk))
+    result = make_sweep(tmp_path, asked, lambda walk: None if walk.index >= 21 else distance(walk))
     assert result.setting(["main"]).endswith("5–8 samples in each cell")
