@@ -127,6 +127,8 @@ class SweepFields(WalkFields[Any], total=False):
     options: Mapping[str, Any] | None
     parameters: Mapping[str, Any] | None
     samples: Int | None
+    until: Float | str | Mapping[str, Float | str] | None
+    at_most: Int | None
     sampler: Literal["random", "sobol", "latin_hypercube", "saltelli"] | None
     randomisations: Int | None
     distributions: Mapping[str, Any] | None

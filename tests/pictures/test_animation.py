@@ -106,7 +106,7 @@ def test_a_film_that_was_not_written_to_its_end_is_not_kept(
     ffmpeg.chmod(0o755)
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", SimpleNamespace(get_ffmpeg_exe=lambda: str(ffmpeg)))
     path.write_bytes(b"old")
-    with pytest.raises(OSError, match=r"^.*walk\.mp4: cannot be written \(ffmpeg ended early\); see to the disk$"):
+    with pytest.raises(OSError, match=r"^.*walk\.mp4: cannot be written \(ffmpeg ended early\); check the disk$"):
         animate(make_walk(), path, fps=10, slow=1)
     assert path.read_bytes() == b"old" and len(list(tmp_path.iterdir())) == 2
     assert capfd.readouterr().err == ""
@@ -115,7 +115,7 @@ def test_a_film_that_was_not_written_to_its_end_is_not_kept(
 @pytest.mark.parametrize(
     ("name", "settings", "message"),
     [
-        ("walk.avi", {}, "unknown kind of picture"),
+        ("walk.avi", {}, "unknown file format"),
         ("walk.gif", {"fps": 0}, "fps: expected at least 1, got 0"),
         ("walk.html", {"slow": math.inf}, "slow: expected a finite number, got inf"),
         ("walk.gif", {"fps": 51}, "fps: expected at most 50, got 51"),

@@ -207,7 +207,7 @@ def circles(axes: Any) -> list[tuple[float, float]]:
 
 
 def test_a_sprocket_that_moves_is_drawn_where_it_is_until_it_vanishes() -> None:
-    """In film strips at each instant and in films in each frame; one that vanishes at once is in none."""
+    """In film strips at each instant and in animations in each frame; one that vanishes at once is in none."""
     release = ((0.2, 0.3, 0.1, 5.0), (0.5, 0.2, -0.05, 0.0))
     moved, usual = make_walk(setup=made_setup(release=release)), make_walk()
     assert not circles(film_strip(usual).axes[0]) and not circles(Film(usual).figure.axes[0])

@@ -134,7 +134,12 @@ def test_workers_may_write_the_same_shard(tmp_path: Path) -> None:
 def test_a_changed_sweep_is_refused(tmp_path: Path) -> None:
     """Another sweep is refused in a folder unless it may start anew; another name of the same sweep is not."""
     run(tmp_path)
-    with refused(InputError, tmp_path, f"{tmp_path.name}: holds another sweep (synthetic)", "start anew with fresh"):
+    with refused(
+        InputError,
+        tmp_path,
+        f"{tmp_path.name}: holds another sweep (synthetic)",
+        "or fresh, which deletes what is there",
+    ):
         open_folder(tmp_path, CHANGED)
     open_folder(tmp_path, replace(SWEEP, name="renamed")).close()
     with open_folder(tmp_path, CHANGED, fresh=True) as opened:
@@ -150,7 +155,7 @@ def test_other_numerics_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     run(tmp_path)
     (tmp_path / "lock").unlink()  # as of a copied folder
     monkeypatch.setattr(shards, "NUMERICS_VERSION", 99)
-    with refused(InputError, tmp_path, f"numerics {NUMERICS_VERSION}, but this warpchain has 99", "start anew"):
+    with refused(InputError, tmp_path, f"numerics {NUMERICS_VERSION}, but this warpchain has 99", "or fresh"):
         open_folder(tmp_path)
     assert load(tmp_path).missing_count == 0 and not (tmp_path / "lock").exists()
 
@@ -270,5 +275,5 @@ def test_a_full_disk(tmp_path: Path) -> None:
         pytest.skip("needs a mount namespace")
     done = play("full_disk", tmp_path / "full", *namespace)
     writing, opening = done["messages"]
-    assert ".h5: cannot be written (No space left on device); make room" in writing
-    assert "make room" in opening and done["missing"] == 0
+    assert ".h5: cannot be written (No space left on device); free disk space" in writing
+    assert "free disk space" in opening and done["missing"] == 0

@@ -84,5 +84,5 @@ def test_several_folders_are_one_result_everywhere(tmp_path: Path, command: Comm
     min((parts[1] / "shards").glob("*.h5")).unlink()
     assert "part 2/2: 9 of 13 walks\n" in command("info", names[1]).out
     assert command("plot", *names, "-o", "figures").status == 0 and (tmp_path / "figures/distance.png").exists()
-    with pytest.raises(InputError, match="has walks that a folder before it has"):
+    with pytest.raises(InputError, match="repeats walks of an earlier folder"):
         load([parts[0], parts[0]])

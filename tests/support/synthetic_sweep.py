@@ -82,8 +82,9 @@ def write(store: SweepFolder, shard: Shard, rows: Rows) -> None:
 def run(directory: Path | str, sweep: Sweep = SWEEP, *, shard_size: int = SHARD_SIZE, **settings: Any) -> None:
     """Begin or go on with a sweep, to its end."""
     with SweepFolder.open(directory, sweep, shard_size=shard_size, **settings) as store:
-        for shard in store.missing():
-            write(store, shard, synthetic_rows(sweep, shard))
+        while missing := store.missing():  # one round, or those of a sweep with `until`
+            for shard in missing:
+                write(store, shard, synthetic_rows(sweep, shard))
 
 
 def content(directory: Path) -> dict[str, bytes]:

@@ -7,24 +7,34 @@ import os
 import sys
 import tempfile
 from collections.abc import Container, Iterable, Iterator, Sequence
+from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
+
+import numpy as np
 
 from warpchain.engine.tallies import LOST
 from warpchain.files import checked_output, make_folder, naming, remove_output
 from warpchain.hdf5_files import SWEEP_FILE, WALK_FILE
 from warpchain.inputs.figure_kinds import KINDS, FigureWord
-from warpchain.inputs.validation import InputError, json_value, one_line, printable
-from warpchain.pictures.labels import COUNTS, SPREADS, cell_notes, cell_table
+from warpchain.inputs.validation import InputError, json_value, one_line, printable, short
+from warpchain.pictures.labels import COUNTS, SPREADS, cell_notes, cell_table, cell_text, with_error
 from warpchain.results.walk_result import WalkResult, load_walk
 from warpchain.status import Status
 from warpchain.walks.landmarks import FAULTS
 
 if TYPE_CHECKING:
     from warpchain.results.sweep_result import SweepResult
+    from warpchain.run.sweep_plan import SweepPlan
+    from warpchain.sweeps.plan import Sweep
 
 _PICTURES: Final = (*(f"{kind}.png" for kind in KINDS), "walk.gif")
 """What `plot` and `animate` write beside the record unless told otherwise."""
+ONE_OF_MANY: Final = "one of many: the least change alters it by some 4 %; --samples 12 gives a mean"
+"""What a single distance is worth, which has two digits."""
+BYTES_ON_DISK: Final = 500
+"""Bytes of a walk in its shard, about, without its motion."""
+_OF_PARTS: Final = ("is_there", "is_missing")
 _MOST_CELLS: Final = 1000
 """Most cells of a sweep that a table lists; one of 100,000 would take minutes to lay out."""
 
@@ -56,6 +66,7 @@ def print_sweep(result: "SweepResult", folder: Path | None, as_json: bool) -> No
             name: {
                 "axes": cells.axes,
                 "dx": {key: getattr(cells, key) for key in (*SPREADS, "independent", *COUNTS)},
+                **({} if cells.reached is None else {"reached": cells.reached}),
             }
             for name, cells in statistics.items()
         }
@@ -67,9 +78,11 @@ def print_sweep(result: "SweepResult", folder: Path | None, as_json: bool) -> No
     print(f"{printable(result.name)}: {result.walk_count:,} walks, {counts}")
     if folder is not None and folder.is_dir():
         manifest = read_manifest(folder)
-        (part, parts), own = manifest.part, sum(map(len, manifest.wanted))
+        part, parts = manifest.part
         if parts > 1:
-            print(f"part {part}/{parts}: {result.walk_count - result.missing_count:,} of {own:,} walks")
+            found, left = ([getattr(block, name).ravel() for block in result.blocks.values()] for name in _OF_PARTS)
+            done, own = np.concatenate(found).sum(), (np.concatenate(left) & manifest.mine).sum()
+            print(f"part {part}/{parts}: {done:,} of {done + own:,} walks")
     for fault, remedy in FAULTS.items():
         if number := sum(int(block.faults[fault].sum()) for block in result.blocks.values()):
             print(f"{number:,} inaccurate: {remedy}")
@@ -89,16 +102,64 @@ def print_sweep(result: "SweepResult", folder: Path | None, as_json: bool) -> No
 
 def print_walk(result: WalkResult) -> None:
     """Print the results of a walk on standard output."""
-    rows = list(_walk_rows(result))
+    _print_rows(_walk_rows(result))
+
+
+def _print_rows(given: Iterable[tuple[str, str]]) -> None:
+    """Print names and values in two columns."""
+    rows = list(given)
     width = max(len(name) for name, _ in rows)
     for name, value in rows:
         print(f"{name:<{width}}  {value}")
 
 
+def print_plan(planned: "Sweep", plan: "SweepPlan", as_json: bool) -> None:
+    """Print what a sweep would take, or what is left of it, on standard output, as rows or one JSON object."""
+    if as_json:
+        print(json.dumps(json_value({"name": planned.name, **vars(plan)}), indent=2, allow_nan=False))
+        return
+    least, most = plan.walks
+    rows = {"sweep": f"{printable(planned.name)} is valid", "cells": f"{plan.cells:,}"}
+    rows |= {"walks done": f"{plan.done:,}"} if plan.done else {}
+    rows["walks left" if plan.done else "walks"] = f"{least:,}" + f" in this round, {most:,} at most" * (most > least)
+    rows |= {"expected": f"{plan.expected:,} walks left"} if plan.expected is not None else {}
+    rows |= {"files": f"{plan.shards:,}", "disk": _sizes(BYTES_ON_DISK * least, BYTES_ON_DISK * most)}
+    rows |= {"motions": f"of {plan.motions:,} walks; they need room beside this"} if plan.motions else {}
+    rows |= {"memory": f"{_sizes(plan.memory)} to read the results", "at a time": f"{plan.at_once}"}
+    for block, values, seconds in plan.pilot:
+        name = f"{printable(block)}: " * (len(planned.blocks) > 1)
+        rows[f"a walk of {name}{cell_text(values) or 'the cell'}"] = f"{seconds:.2f} s"
+    if plan.seconds:
+        rows["time"] = " to ".join(dict.fromkeys(str(timedelta(seconds=math.ceil(each))) for each in plan.seconds))
+    _print_rows(rows.items())
+
+
+def _sizes(*sizes: float) -> str:
+    """Numbers of bytes, alike ones once."""
+    return " to ".join(dict.fromkeys(f"{short(max(size / 1e6, 0.001), 2)} MB" for size in sizes))
+
+
+def print_samples(result: "SweepResult") -> None:
+    """Print mean, error and spread of the distances of the samples of one cell on standard output, and statuses."""
+    from warpchain.results.block_result import counted
+
+    cells, dx = result.statistics(), result.dx
+    rows = {"Δx": "unknown; no walk came to rest"}
+    if cells.count:
+        mean, error = cells.mean.item(), cells.standard_error.item()
+        rows["Δx"] = f"{with_error(mean, error)} m, mean and standard error of {cells.count} walks at rest"
+        spread = f"{short(cells.sd.item(), 2)} m, " * bool(cells.count > 1)
+        rows["spread"] = f"{spread}from {short(np.nanmin(dx), 3)} to {short(np.nanmax(dx), 3)} m"
+    rows["status"] = counted(result.summary())
+    if inaccurate := result.inaccurate_count:
+        rows["warning"] = f"{inaccurate} inaccurate"
+    _print_rows(rows.items())
+
+
 def _walk_rows(result: WalkResult) -> Iterator[tuple[str, str]]:
     """Names and values."""
     status, energy = result.status, result.energy
-    yield "Δx", f"{result.dx:.4f} m" if math.isfinite(result.dx) else "unknown"
+    yield "Δx", f"{result.dx:#.2g}".removesuffix(".") + f" m, {ONE_OF_MANY}" if math.isfinite(result.dx) else "unknown"
     yield "status", status.label if status.ok else f"{status.label}: {status.sentence}"
     if math.isfinite(result.hold_time):
         drift = f"drift {100 * result.drift:.2g} %" if math.isfinite(result.drift) else ""

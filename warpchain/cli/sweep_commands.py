@@ -3,9 +3,10 @@
 import contextlib
 import re
 import sys
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import typer
 
@@ -24,6 +25,16 @@ _KIND: Final = (
 )
 _DEVICE: Final = "cpu, cuda (the first GPU) or cuda:N, instead of the device in the sweep file."
 
+_PLAN: Final = (
+    "Run nothing: check the sweep, and show its walks, files, disk and memory; with -o DIR of a sweep that has begun, "
+    "what is left of it."
+)
+_PILOT: Final = "Plan with times, on a CPU: run a walk of each corner of the grid first."
+_UNTIL: Final = (
+    "Add samples to each cell until the standard error of its mean Δx is so small, as 1% or 2mm; NAME=ERROR, which may "
+    "be repeated, for other columns."
+)
+
 AsJson = Annotated[bool, JSON]
 
 
@@ -41,6 +52,8 @@ def sweep(
     part: Annotated[str | None, option("K/N", "Run only the K-th of N parts; `merge` joins them.")] = None,
     seed: Annotated[int | None, option("S", "Seed instead of the file's.", min=0)] = None,
     samples: Annotated[int | None, option("N", "Samples of each cell instead of the file's.", min=1)] = None,
+    until: Annotated[list[str] | None, option("ERROR", _UNTIL)] = None,
+    at_most: Annotated[int | None, option("N", "Most samples of each cell with --until. Default: 1024.", min=1)] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Delete the results of another sweep in the folder.")] = False,
     new: Annotated[
         Path | None,
@@ -48,6 +61,8 @@ def sweep(
             "FILE.yaml", "Write a small sweep file whose comments explain its keys; run nothing.", parser=output_path
         ),
     ] = None,
+    plan: Annotated[bool, typer.Option("--plan", help=_PLAN)] = False,
+    pilot: Annotated[bool, typer.Option("--pilot", help=_PILOT)] = False,
     as_json: AsJson = False,
 ) -> None:
     """Run or resume a sweep: many walks over a grid of values."""
@@ -55,13 +70,25 @@ def sweep(
     from warpchain.sweeps.sweep_file import write_new_sweep
 
     if new is not None:
-        if any(value is not None and value is not False for name, value in context.params.items() if name != "new"):
+        others = [value for name, value in context.params.items() if name != "new" and value not in ((), [])]
+        if any(value is not None and value is not False for value in others):
             raise InputError("--new: not possible with other arguments; remove them")
         write_new_sweep(new)
         print(printable(str(new)))
         return
     if source is None:
         raise InputError("FILE.yaml: missing; pass a sweep file, or write one with --new FILE.yaml")
+    replaced: dict[str, Any] = {"seed": seed, "samples": samples, "until": _errors(until or []), "at_most": at_most}
+    if plan or pilot:
+        from warpchain.cli.output import print_plan
+        from warpchain.run.sweep_plan import plan_sweep
+
+        if fresh:
+            raise InputError("--fresh: a plan deletes nothing; remove it, or use another folder")
+        device = "cuda" if gpus else device
+        how: dict[str, Any] = {"device": device, "workers": workers, "gpus": gpus, "part": part, "pilot": pilot}
+        print_plan(*plan_sweep(source, folder, **how, **replaced), as_json)
+        return
     if folder is None:
         raise InputError("--output: missing; set a folder for the results with -o DIR")
     if device is not None and device.startswith("cuda") and gpus is None:
@@ -94,8 +121,7 @@ def sweep(
                 workers=workers or gpus,
                 fresh=fresh,
                 part=part,
-                seed=seed,
-                samples=samples,
+                **replaced,
             )
     except KeyboardInterrupt:
         print(f"rerun the same command{', without --fresh,' if fresh else ''} to resume the sweep", file=sys.stderr)
@@ -107,6 +133,20 @@ def sweep(
         print(f"{counts[status.label]} {status.label}: {status.sentence}", file=sys.stderr)
     if failed:
         raise typer.Exit(FAILED)
+
+
+def _errors(given: Sequence[str]) -> dict[str, str] | None:
+    """Quantity → error of `--until`, of Δx without a name; None if there is none."""
+    from warpchain.inputs.validation import InputError
+
+    errors: dict[str, str] = {}
+    for text in given:
+        name, equals, error = text.rpartition("=")
+        name = name.strip() if equals else "dx"
+        if name in errors:
+            raise InputError(f"--until: {name} is given twice; remove one")
+        errors[name] = error
+    return errors or None
 
 
 def compile_kernels(

@@ -1,7 +1,9 @@
 """The commands for single walks: walk and animate."""
 
+import contextlib
 import json
 import sys
+import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -33,6 +35,10 @@ _SET: Final = (
 _SEED: Final = (
     "Sample every parameter that you do not set from its distribution; each integer seed gives one sample. "
     "Default: mean values and phase 0."
+)
+_SAMPLES: Final = (
+    "Run N samples of the walk, each with its own draws, and show the mean Δx and its standard error; with -o DIR also "
+    "write the sweep of these walks and samples.png. A larger N adds samples to DIR."
 )
 _CONFIG: Final = "Read preset, scene, options and parameters from a YAML file; command-line options take precedence."
 _LIKE: Final = (
@@ -67,6 +73,7 @@ def walk(
     device: Annotated[_Text, option("NAME", "Where it runs: cpu, cuda (first GPU) or cuda:N. Default: cpu.")] = None,
     assignments: Annotated[list[str] | None, option("NAME=VALUE", _SET, "--set")] = None,
     seed: Annotated[_Text, option("S", _SEED)] = None,
+    samples: Annotated[int | None, option("N", _SAMPLES, min=1)] = None,
     config: Annotated[Path | None, option("FILE.yaml", _CONFIG)] = None,
     like: Annotated[Path | None, option("PATH", _LIKE)] = None,
     index: Annotated[_Text, option("I", _INDEX)] = None,
@@ -92,6 +99,11 @@ def walk(
     given = _given_values(named | {"method": method, "tolerance": tolerance, "device": device}, assignments or [])
     for section in given.values():
         refuse_axes(section)
+    if samples is not None:
+        alone = {"--like": like, "--index": index, "--frame-interval": frame_interval}
+        alone["--record-joint-forces"] = "asked" if record_joint_forces else None
+        if others := [name for name, value in alone.items() if value is not None]:
+            raise InputError(f"{others[0]}: only for one walk, not with --samples; remove one of them")
     own: Mapping[str, Mapping[str, Any]] = {}
     number = None if seed is None else checked(parse_yaml(seed, "seed"), "seed", Seed)
     if like is not None:
@@ -119,6 +131,10 @@ def walk(
             raise InputError("preset: missing; set the parameters to start from, e.g. preset: paper")
     elif index is not None:
         raise InputError("--index: --like is missing; add --like DIR, the sweep that has this walk")
+    if samples is not None:
+        sections = {name: {**own.get(name, {}), **values} for name, values in given.items()}
+        content = {"preset": preset or DEFAULT_PRESET, "samples": samples, "seed": number or 0, **sections}
+        return _run_samples(content, folder, as_json)
     if like is not None and base.start is not None:
         setup = continued(base.start, given)
     else:
@@ -152,6 +168,37 @@ def walk(
                 print(printable(str(path)))
     if not result.status.ok:
         print(f"{result.status.label}: {result.status.sentence}", file=sys.stderr)
+        raise typer.Exit(FAILED)
+
+
+def _run_samples(content: Mapping[str, object], folder: Path | None, as_json: bool) -> None:
+    """Run the samples of one walk as a sweep of one cell, and show their mean; with a folder keep them, and a picture.
+
+    The picture has the median walk, run again.
+    """
+    from warpchain.cli.output import print_samples, print_sweep
+    from warpchain.inputs.validation import printable
+    from warpchain.reports.samples_picture import median_sample, samples_picture
+    from warpchain.run.sweep_run import sweep
+    from warpchain.status import Status
+
+    with contextlib.nullcontext(folder) if folder else tempfile.TemporaryDirectory(prefix="warpchain-") as place:
+        result = sweep({"version": 1, "name": "samples", **content}, place)
+    if as_json:
+        print_sweep(result, None, True)
+    else:
+        print_samples(result)
+    counts = result.summary()
+    if folder is not None and counts[Status.AT_REST.label]:
+        from warpchain.pictures.style import save_figure
+
+        path = folder / "samples.png"
+        save_figure(samples_picture(result, result.walk(sample=median_sample(result.dx))), path)
+        print(printable(str(path)))
+    failed = [status for status in Status if not status.ok and counts.get(status.label)]
+    for status in failed:
+        print(f"{counts[status.label]} {status.label}: {status.sentence}", file=sys.stderr)
+    if failed:
         raise typer.Exit(FAILED)
 
 

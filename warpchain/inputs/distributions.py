@@ -56,6 +56,10 @@ class Uniform:
         lower, upper = self._physical_ends()
         return lower + (upper - lower) * fraction
 
+    def expected(self) -> float:
+        """Mean of the physical draws."""
+        return self.quantile(0.5)
+
     def _physical_ends(self) -> tuple[float, float]:
         return max(self.lower, self.bounds[0]), min(self.upper, self.bounds[1])
 
@@ -93,6 +97,12 @@ class Gaussian:
             lower, upper, fraction, scale = -upper, -lower, 1.0 - fraction, -scale
         first, last = _below(lower), _below(upper)
         return self._placed_mean + scale * NormalDist().inv_cdf(first + (last - first) * fraction)
+
+    def expected(self) -> float:
+        """Mean of the physical draws."""
+        lower, upper = self._standard_ends()
+        heights = [math.exp(-end * end / 2) / math.sqrt(2 * math.pi) for end in (lower, upper)]
+        return self._placed_mean + self.sigma * (heights[0] - heights[1]) / self.share()
 
     @property
     def _placed_mean(self) -> float:

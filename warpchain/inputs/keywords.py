@@ -23,8 +23,8 @@ from warpchain.inputs.scene import Scene
 Keywords = Mapping[str, tuple[str, Any]]
 """Name → type and default."""
 F = TypeVar("F", bound=Callable[..., object])
-_NAMED: Final = {"floor": "Floor", "start": "Start"}
-"""Fields whose types have names."""
+_NAMED: Final = {"floor": "Floor", "start": "Start", "until": "float | str | Mapping[str, float | str]"}
+"""Fields whose types have names, or take more than they become."""
 
 
 class _Type(str):

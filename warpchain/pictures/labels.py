@@ -53,6 +53,14 @@ def short_texts(values: Sequence[Any] | NDArray[Any]) -> list[str]:
     return texts
 
 
+def with_error(mean: float, error: float) -> str:
+    """A mean and its standard error, which has two digits: ``0.606 ± 0.012``; the mean alone if it has no error."""
+    if not 0 < error < math.inf:
+        return short(mean, 3)
+    digits = max(0, 1 - math.floor(math.log10(error)))
+    return f"{mean:.{digits}f} ± {error:.{digits}f}"
+
+
 def unit_text(name: str) -> str:
     """Unit of a field of `Parameters`, `Scene` or `Options`; empty for pure numbers, `preset` and `point`."""
     if name not in SECTION_OF:
@@ -122,6 +130,9 @@ def cell_table(found: "CellStatistics") -> tuple[list[str], Iterator[list[str]]]
     counts = {"at rest": found.count, "failed": found.failed}
     counts |= {"ended as asked": found.absent} if found.absent.any() else {}
     counts |= {"not run yet": found.missing} if found.missing.any() else {}
+    if found.reached is not None:
+        words = np.where(found.reached, "yes", np.where(found.missing > 0, "not yet", "no"))
+        counts |= {"walks": found.count + found.absent + found.failed, "error reached": words}
     rows = (
         [
             *(value_text(value) for value in cell_values(found.axes, place).values()),

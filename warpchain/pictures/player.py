@@ -1,6 +1,6 @@
 """The player of walks in a browser: its data, a page with it, and a frame with that page.
 
-HTML films, reports and notebooks show the page; the live page has the player as well. Nothing heavy is imported.
+HTML animations, reports and notebooks show the page; the live page has the player as well. Nothing heavy is imported.
 """
 
 import html

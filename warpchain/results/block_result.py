@@ -20,8 +20,10 @@ from warpchain.status import Status
 from warpchain.sweeps.block import POINT, Block
 from warpchain.sweeps.designs import SAMPLERS
 from warpchain.sweeps.plan import Sweep
+from warpchain.sweeps.rounds import Asked
 from warpchain.walks import rows
 from warpchain.walks.cell_statistics import CellStatistics, known_values
+from warpchain.walks.control_variates import controlled
 from warpchain.walks.landmarks import LENGTHS
 from warpchain.walks.rows import COLUMNS, MISSING, Column, quantity_of
 from warpchain.walks.walk_numbers import read_motion
@@ -129,6 +131,15 @@ class BlockResult(Columns):
     def is_there(self) -> NDArray[np.bool_]:
         """Whether a walk has been computed, shape `shape`."""
         return np.asarray(self.columns["status"] != MISSING)
+
+    @cached_property
+    def _asked(self) -> Asked:
+        return Asked.of(self.block, self.columns)
+
+    @property
+    def is_missing(self) -> NDArray[np.bool_]:
+        """Whether a walk is still to be computed, shape `shape`; with `until` of the cell, as far as is known."""
+        return self._asked.walks.reshape(self.shape) & ~self.is_there
 
     @property
     def kept(self) -> NDArray[np.bool_]:
@@ -262,7 +273,7 @@ class BlockResult(Columns):
 
     def summary(self) -> dict[str, int]:
         """Number of walks by status label; `at_rest` and `missing` always, others if there are any."""
-        return status_counts(self.columns["status"])
+        return status_counts(self.columns["status"], self.is_missing)
 
     @cached_property
     def faults(self) -> dict[str, NDArray[np.bool_]]:
@@ -278,20 +289,41 @@ class BlockResult(Columns):
         """A column as numbers, shape `shape`, which `statistics` averages; NaN for walks excluded from means."""
         return known_values(self.columns[name], self.columns["status"])
 
-    def statistics(self, name: str = "dx") -> CellStatistics:
+    def statistics(self, name: str = "dx", *, control: bool = False) -> CellStatistics:
         """Statistics of a column in each cell, over the walks at rest that have a value.
 
         Walks without a value (NaN or −1), e.g. `bounces_before_collapse` of a loop that never collapsed, are excluded
         from means and counted in `absent`. Quasi-random designs have a standard error if there are several
         randomisations.
 
+        Args:
+            name: the column.
+            control: whether means of random samples are corrected, and their errors reduced, by a regression on what
+                the samples drew, whose means are known; `worth` of the result says how many walks that is worth. Cells
+                in which a walk failed, or that have few walks more than drawn quantities, have no such mean (NaN).
+
         Raises:
             KeyError: there is no such column.
+            InputError: `control` of samples that are not random, draw nothing, or had to be drawn again.
         """
         unit, column, status = self.unit(name), self.columns[name], self.columns["status"]
         is_bounded = name == "dx" and (status == Status.DISTANCE_LIMIT).any()
         farthest = self._farthest() if is_bounded else np.array(np.nan)
-        return CellStatistics.of(self.axes, unit, column, status, self.block.groups, farthest)
+        cells = CellStatistics.of(self.axes, unit, column, status, self.block.groups, farthest)
+        reached = self._asked.reached.reshape(cells.mean.shape) if self.block.until else None
+        cells = replace(cells, missing=self.is_missing.sum(axis=-1), reached=reached)
+        return self._controlled(cells, name) if checked(control, "control", bool) else cells
+
+    def _controlled(self, cells: CellStatistics, name: str) -> CellStatistics:
+        """The statistics of a column with corrected means; errors as of `statistics`."""
+        if self.block.sampler != "random" or not self.drawn:
+            problem = f"a {self.block.sampler} design fills the ranges evenly" if self.drawn else "nothing is sampled"
+            raise InputError(f"control: {problem}, so there is nothing to correct; remove it")
+        drawn = np.stack([self.columns[rows.drawn_column(each)] for each in self.drawn], axis=-1)
+        expected = np.empty((*cells.mean.shape, len(self.drawn)))
+        for cell in np.ndindex(*cells.mean.shape):
+            expected[cell] = self.origin.expected(self.block, cell, self.is_there[cell], drawn[cell])
+        return controlled(cells, self.values(name), drawn, expected)
 
     def named_sets(self, cells: CellStatistics) -> CellStatistics:
         """The statistics of some cells, with parameter sets named by their values, as figures show them."""
@@ -350,6 +382,7 @@ class BlockResult(Columns):
     def to_pandas(self) -> "pandas.DataFrame":
         """The block as a table with one row for each walk: values of the axes, sample, columns; statuses by label."""
         table = self.to_xarray().to_dataframe().reset_index()
+        table = table[(self.is_there | self.is_missing).ravel()].reset_index(drop=True)
         labels = {MISSING: "missing"} | {int(status): status.label for status in Status}
         return table.assign(status=table["status"].map(labels))
 
@@ -378,11 +411,11 @@ class BlockResult(Columns):
         return notes
 
 
-def status_counts(status: AnyArray) -> dict[str, int]:
+def status_counts(status: AnyArray, is_missing: NDArray[np.bool_]) -> dict[str, int]:
     """Number of walks by status label, in the order of the codes, missing ones last."""
     counts = {code.label: int((status == code).sum()) for code in Status}
     kept = {label: count for label, count in counts.items() if count or label == Status.AT_REST.label}
-    return kept | {"missing": int((status == MISSING).sum())}
+    return kept | {"missing": int(is_missing.sum())}
 
 
 def counted(summary: Mapping[str, int]) -> str:

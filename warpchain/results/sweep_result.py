@@ -139,8 +139,8 @@ class SweepResult(_OnlyBlock):
 
     @property
     def walk_count(self) -> int:
-        """Number of walks of the sweep, including missing ones."""
-        return sum(block.columns["index"].size for block in self.blocks.values())
+        """Number of walks of the sweep, including missing ones; with `until` it grows by rounds."""
+        return sum(self.summary().values())
 
     @property
     def missing_count(self) -> int:
@@ -149,7 +149,9 @@ class SweepResult(_OnlyBlock):
 
     def summary(self) -> dict[str, int]:
         """Number of walks by status label; `at_rest` and `missing` always, others if there are any."""
-        return status_counts(np.concatenate([block.columns["status"].ravel() for block in self.blocks.values()]))
+        blocks = self.blocks.values()
+        statuses, missing = ([getattr(each, name).ravel() for each in blocks] for name in ("status", "is_missing"))
+        return status_counts(np.concatenate(statuses), np.concatenate(missing))
 
     @property
     def inaccurate_count(self) -> int:

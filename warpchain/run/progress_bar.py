@@ -23,7 +23,7 @@ class SweepProgress:
     """Progress of a sweep.
 
     Attributes:
-        walks: Walks of the sweep.
+        walks: Walks of the sweep; with `until` those of its rounds so far.
         done: Walks that are over, those of earlier runs included. Threads of this process count each walk, other
             workers only those in files that are written.
         before: Walks that were on disk when this run began.
@@ -31,6 +31,7 @@ class SweepProgress:
         statuses: Number of walks of this run by status label.
         inaccurate: Walks of this run that are inaccurate, see `warpchain.walks.landmarks`.
         waited: Time [s] for which the threads of this process have waited for a GPU.
+        round: Number of the round of this run that is under way, of a sweep with `until`; else None.
         compiling: Kernels are being compiled, which takes seconds to minutes the first time on a machine.
     """
 
@@ -42,6 +43,7 @@ class SweepProgress:
     compiling: bool = False
     inaccurate: int = 0
     waited: float = 0.0
+    round: int | None = None
 
     @property
     def rate(self) -> float:
@@ -104,6 +106,8 @@ def progress_text(progress: SweepProgress) -> str:
     rate = f"{progress.rate:.2f} a second"
     if progress.rate > 0:  # else no walk is over yet
         rate += f"   {timedelta(seconds=round((progress.walks - progress.done) / progress.rate))} left"
+    if progress.round is not None:
+        rate += f" in round {progress.round}"
     bar = f"[{'#' * (10 * progress.done // progress.walks):10}]"
     return f"{bar} {progress.done:,} of {progress.walks:,} walks   {rate}   {counts_text(progress)}"
 

@@ -38,7 +38,7 @@ from warpchain.run.workers import Pulse, losses_named, pulsing_threads
 from warpchain.status import Status
 from warpchain.store.crate import write_crate
 from warpchain.store.folder import SweepFolder
-from warpchain.store.shards import Part, Shard, check_numerics, opened_shard, rows_of, stamp, write_shard
+from warpchain.store.shards import SHARDS, Part, Shard, check_numerics, opened_shard, rows_of, stamp, write_shard
 from warpchain.sweeps.block import is_axis
 from warpchain.sweeps.plan import Source, Sweep, load_sweep
 from warpchain.sweeps.sweep_file import VERSION, BlockKeys, SweepFile
@@ -56,6 +56,8 @@ FILE_KEYS: Final = (*BlockKeys.model_fields, "same_samples_along", "record", "na
 """Keys of a sweep file that are keywords."""
 OF_FILE: Final = {name: f"{kind.removesuffix(' | None')} | None" for name, kind in types_of(SweepFile).items()}
 """Types of the keys of a sweep file as keywords."""
+REPLACED: Final = ("seed", "samples", "until", "at_most")
+"""Keys that are also taken beside a source, where they replace those at its top level."""
 BYTES_OF_WALK = 1500
 """Memory that each walk of a sweep takes in the end, about: its row of some 700 bytes, read and put into columns."""
 SHARD_WALKS = 256
@@ -64,8 +66,6 @@ GPU_TASK_WALKS = 262144
 """Upper bound on the walks of a GPU's task, about; the GPU idles while the last walks finish."""
 PASSES = 8
 """Times that a sweep on a CPU is gone through."""
-SHARDS = 32
-"""Least number of shards of a sweep, about, if it has as many walks: the grain of a restart."""
 
 
 @takes_fields("scene", "parameters", "options", beside={name: (OF_FILE[name], None) for name in FILE_KEYS})
@@ -98,6 +98,9 @@ def sweep(
         points: Parameter sets, as a table or as a mapping from each quantity to its values. They are an additional
             axis, ``point``, beside the grid.
         samples: Number of samples in each cell of the grid; with a source it replaces the number at its top level.
+        until: Quantity → standard error of its mean at which a cell stops, relative as ``{"dx": 0.01}`` or ``"1 %"``,
+            or absolute as ``"2 mm"``; a single value is that of Δx. The samples of a cell double until all are reached.
+        at_most: Greatest number of samples of a cell with ``until``, by default 1024.
         sampler: ``"random"`` (the default), ``"sobol"``, ``"latin_hypercube"`` or ``"saltelli"``.
         randomisations: Number of independent randomisations of such a design, from which standard errors of means are
             estimated; default 8.
@@ -157,7 +160,7 @@ def _checked_call(
     problems, found = list[str](), list[Any]()
     unsaid = {name for name in (*FILE_KEYS, *MAY_BE_NONE) if given.get(name) is None}
     settings = {name: value for name, value in given.items() if name not in unsaid}
-    replaced = {name: plain(settings[name], name) for name in ("seed", "samples") if name in settings}
+    replaced = {name: plain(settings[name], name) for name in REPLACED if name in settings}
     if source is not None and (others := [name for name in settings if name not in replaced]):
         names = ", ".join(others)
         problems.append(f"{names}: not possible with a source; remove one, or write it into the source")
@@ -226,27 +229,37 @@ def _run_in_folder(
     needed = BYTES_OF_WALK * planned.walk_count
     if needed > (free := free_memory()):
         problem = f"{planned.walk_count:,} walks take {needed / 1e9:.2g} GB of memory, and {free / 1e9:.2g} GB are free"
-        raise InputError(f"samples: {problem}; use fewer samples or cells, or a machine with more memory")
-    size = max(1, min(SHARD_WALKS, planned.walk_count // SHARDS))  # by the sweep only: equal sweeps leave equal files
+        key = "at_most" if planned.has_rounds else "samples"
+        raise InputError(f"{key}: {problem}; use fewer samples or cells, or a machine with more memory")
+    size = shard_size(planned)
     with SweepFolder.open(folder, planned, fresh=fresh, shard_size=size, part=part) as store, ExitStack() as held:
         missing = store.missing()
-        walks = sum(map(len, store.manifest.wanted))
-        before = walks - sum(map(len, missing))
-        progress = SweepProgress(walks=walks, done=before, before=before)
-        store.log(f"{len(missing)} shards to do, {before} of {walks} walks done")
+        before = store.walks - store.left
+        progress = SweepProgress(walks=store.walks, done=before, before=before)
+        store.log(f"{len(missing)} shards to do, {before} of {store.walks} walks done")
         if missing and executor is None:
-            compile_kernels(kinds, walks - before, lambda: report(replace(progress, compiling=True)))
+            compile_kernels(kinds, store.left, lambda: report(replace(progress, compiling=True)))
             executor, pulse = held.enter_context(pulsing_threads(at_once))
+        crated = partial(write_crate, store.directory, store.manifest, made_by(sorted(on_devices)))
         if missing:
-            crated = partial(write_crate, store.directory, store.manifest, made_by(sorted(on_devices)))
             crated()
+        where = str(store.directory), stamp(store.directory)
+        for number in range(1, int(store.manifest.turns.max()) + 2):  # rounds of `until`; else there is one
+            if not missing:
+                break
+            progress.walks, progress.round = store.walks, number if planned.has_rounds else None
             tasks = _tasks(planned, missing, at_once if pulse is None else 1)  # threads take turns on a GPU
-            where = str(store.directory), stamp(store.directory)
             submitted = ((executor.submit(run_shards, planned, *where, tuple(task), pulse), task) for task in tasks)
-            _follow(submitted, 2 * at_once, pulse or Pulse(), store, progress, report)
-            crated(is_over=True)
+            _follow(submitted, 2 * at_once, pulse or Pulse(), store, missing, progress, report)
+            if not (missing := store.missing()):
+                crated(is_over=True)
         counts = counts_text(progress) or "nothing to do"
         store.log(f"complete after {progress.seconds:.1f} s: {counts}")
+
+
+def shard_size(planned: Sweep) -> int:
+    """Most walks of a shard; it depends on the sweep only, so that equal sweeps leave equal files."""
+    return max(1, min(SHARD_WALKS, planned.walk_count // SHARDS))
 
 
 def kinds_of_kernels(planned: Sweep) -> list[Setup]:
@@ -326,15 +339,22 @@ def run_shards(planned: Sweep, directory: str, seal: str, shards: Sequence[Shard
 
 
 def _follow(
-    tasks: Tasks, at_once: int, pulse: Pulse, store: SweepFolder, progress: SweepProgress, report: OnProgress
+    tasks: Tasks,
+    at_once: int,
+    pulse: Pulse,
+    store: SweepFolder,
+    missing: Sequence[Shard],
+    progress: SweepProgress,
+    report: OnProgress,
 ) -> None:
     """Ask for so many tasks at once, so that memory does not grow with the sweep, and count the shards they write.
 
     A task whose shards are written is done, whatever becomes of it: Dask fails one that a killed worker had finished.
     """
     report(progress)
-    began, written, blocks = time.perf_counter(), 0, store.manifest.sweep.blocks
-    folder, left = store.directory / "shards", {shard.name: shard for shard in store.missing()}
+    began, written, blocks = time.perf_counter() - progress.seconds, 0, store.manifest.sweep.blocks
+    done, beats = progress.done, pulse.over
+    folder, left = store.directory / "shards", {shard.name: shard for shard in missing}
     lengths = {name: np.concatenate([block.parameter(name).ravel() for block in blocks]) for name in LENGTHS}
     pending: dict[Future[None], list[Shard]] = {}
     try:
@@ -358,7 +378,7 @@ def _follow(
                 progress.statuses.update(Status(int(code)).label for code in rows["status"])
                 progress.inaccurate += int(np.any([*found.values()], axis=0).sum())
                 written += len(shard)
-            progress.done = progress.before + max(written, pulse.over)
+            progress.done = done + max(written, pulse.over - beats)
             progress.seconds, progress.waited = time.perf_counter() - began, pulse.waited
             report(progress)
     finally:

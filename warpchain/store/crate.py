@@ -62,7 +62,8 @@ def write_crate(directory: Path, manifest: Manifest, run: Mapping[str, str], *, 
         }
     versions = ", ".join(f"{name} {version}" for name, version in manifest.versions.items())
     parts = {SWEEP_FILE: "File", "sweep.yaml": "File", "shards/": "Dataset"}
-    walks = f"{manifest.sweep.walk_count:,} walks of roller chains, simulated by warpchain"
+    most = "at most " * manifest.sweep.has_rounds
+    walks = f"{most}{manifest.sweep.walk_count:,} walks of roller chains, simulated by warpchain"
     ours: dict[str, dict[str, Any]] = {
         CRATE: {
             **{"@type": "CreativeWork", "about": {"@id": "./"}},

@@ -36,6 +36,7 @@ from warpchain.store.folder_lock import locked
 from warpchain.store.shards import Manifest, Part, Shard, read_manifest
 from warpchain.sweeps.designs import SAMPLERS
 from warpchain.sweeps.plan import Sweep
+from warpchain.sweeps.rounds import Asked
 from warpchain.walks.rows import MISSING, ROW_KEYS, Rows, missing_rows
 
 _PART: Final = re.compile(r"\.(?:sweep|\d{6,})\.[0-9a-f]{8}\.part\.(?:yaml|h5)")
@@ -43,7 +44,7 @@ _PART: Final = re.compile(r"\.(?:sweep|\d{6,})\.[0-9a-f]{8}\.part\.(?:yaml|h5)")
 _YAML_HEAD: Final = """\
 # The sweep of this folder with all its values. A copy with more samples adds them to this folder; a copy that is
 # changed otherwise needs another folder.
-# It names the method that was run: for the one that suits another device, give a copy of it method: standard.
+# It names the method that was run. For the default method of another device, set method: standard in a copy.
 """
 
 
@@ -52,13 +53,14 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
     """The folder of a sweep, locked against other processes until `close` or the end of this process.
 
     `unlock` lets other processes have it; `found` says of each walk in the order of `Manifest.keys` whether it was
-    there when the folder was opened.
+    there when the folder was read, and `asked` whether it is to be there, which with `until` follows from those.
     """
 
     directory: Path
     manifest: Manifest
     unlock: Callable[[], None]
     found: NDArray[np.bool_]
+    asked: NDArray[np.bool_]
 
     @classmethod
     def open(cls, directory: AnyPath, sweep: Sweep, shard_size: int, fresh: bool = False, part: Part = (1, 1)) -> Self:
@@ -85,8 +87,7 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
             manifest = _prepared(path, sweep, Manifest(sweep, shard_size, part), fresh)
             damaged: dict[str, str] = {}
             rows, _ = read_rows(path, manifest, damaged)
-            found = np.concatenate([block["status"].ravel() for block in rows]) != MISSING
-            folder = cls(path, manifest, unlock, found)
+            folder = cls(path, manifest, unlock, *seen(manifest.sweep, rows))
             for name, problem in damaged.items():
                 remove_output(path / "shards" / name)
                 folder.log(f"{problem}; deleted, its walks are computed again")
@@ -112,9 +113,23 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
             file.write(f"{now}  {text}\n")
 
     def missing(self) -> list[Shard]:
-        """The shards that are not there yet, in order; errors as of `shard_files`."""
+        """The shards that are not there yet, in order, with `until` those of a round; errors as of `read_rows`."""
         written = set(shards.shard_files(self.directory))
-        return [shard for shard in self.manifest.left(self.found) if shard.name not in written]
+        left = [shard for shard in self.manifest.left(self.found, self.asked) if shard.name not in written]
+        if left or not self.manifest.sweep.has_rounds:
+            return left
+        self.found[:], self.asked[:] = seen(self.manifest.sweep, read_rows(self.directory, self.manifest)[0])
+        return self.manifest.left(self.found, self.asked)
+
+    @property
+    def walks(self) -> int:
+        """Number of the walks of this folder so far, missing ones included; with `until` it grows by rounds."""
+        return int((self.manifest.mine & self.asked).sum())
+
+    @property
+    def left(self) -> int:
+        """Number of those that were missing when the folder was read."""
+        return int((self.manifest.mine & self.asked & ~self.found).sum())
 
     def close(self) -> None:
         """Let other processes have the folder."""
@@ -164,6 +179,12 @@ def read_rows(
     return tables, motions
 
 
+def seen(sweep: Sweep, rows: list[Rows]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """`found` and `asked` of a `SweepFolder`, given the rows of each block."""
+    found = np.concatenate([table["status"].ravel() for table in rows]) != MISSING
+    return found, np.concatenate([Asked.of(*both).walks.ravel() for both in zip(sweep.blocks, rows, strict=True)])
+
+
 def _prepared(folder: Path, sweep: Sweep, manifest: Manifest, fresh: bool) -> Manifest:
     """Make manifest and folder of the shards, in an order in which a kill at any moment does no harm.
 
@@ -184,7 +205,7 @@ def _prepared(folder: Path, sweep: Sweep, manifest: Manifest, fresh: bool) -> Ma
     elif not _is_whole(folder):
         _rebuild(folder, manifest)
     else:
-        manifest = _continued(folder, sweep, manifest)
+        manifest = continued(folder, sweep, manifest)
     make_folder(folder / "shards")
     return manifest
 
@@ -235,7 +256,7 @@ def _rebuild(folder: Path, manifest: Manifest) -> None:
     )
 
 
-def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
+def continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
     """The manifest of a folder in which a sweep of this manifest is to resume; an `InputError` if it holds another."""
     found = read_manifest(folder)
     shards.check_numerics_of(folder, found.numerics_version)
@@ -250,13 +271,16 @@ def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
             f"{folder}: holds another sweep ({found.sweep.name}), or this one before it was changed; "
             "use another folder, or fresh, which deletes what is there"
         )
-    for count, more, block in zip(there, asked, sweep.blocks, strict=True):
-        holds = f"{folder}: holds {count} samples of each cell of block {block.name}, but"
+    for count, more, before, block in zip(there, asked, found.sweep.blocks, sweep.blocks, strict=True):
+        up_to, key = ("up to ", "at_most") if before.until else ("", "at_most" if block.until else "samples")
+        holds = f"{folder}: holds {up_to}{count} samples of each cell of block {block.name}, but"
         if more < count:
-            raise InputError(f"{holds} {more} are requested; use samples: {count} or more, or another folder")
+            raise InputError(f"{holds} {more} are requested; use {key}: {count} or more, or another folder")
+        if found.part[1] > 1 and bool(before.until) != bool(block.until):
+            raise InputError(f"{folder}: parts with and without until have different walks; use another folder")
         if more > count and not SAMPLERS[block.sampler].grows:
             raise InputError(f"{holds} a {block.sampler} design cannot grow; use samples: {count}, or another folder")
-    return found if there == asked else replace(manifest, versions=found.versions)
+    return found if found.sweep.digest() == sweep.digest() else replace(manifest, versions=found.versions)
 
 
 def _clear_leftovers(folder: Path) -> None:

@@ -14,6 +14,7 @@ was computed: a sweep leaves the same bytes however often it was killed.
 import hashlib
 import itertools
 import json
+import math
 import os
 import re
 from collections.abc import Iterator, Mapping
@@ -51,6 +52,8 @@ _NAME: Final = re.compile(r"\d{6,}\.h5")
 FOREIGN: Final = "a shard of another sweep; move it out of this folder"
 REBUILT: Final = "run the sweep in this folder again; all shards are kept"
 
+SHARDS: Final = 32
+"""Least number of shards of a sweep or a round, about, if it has as many walks: the grain of a restart."""
 FIRST_SHARDS: Final = 32
 """Most walks in each of the first four shards."""
 
@@ -113,20 +116,46 @@ class Manifest:
             first += len(own)
         return keys
 
+    @cached_property
+    def mine(self) -> NDArray[np.bool_]:
+        """Whether each walk belongs to the part, in the order of `keys`; of cells with `until` all walks or none."""
+        (number, parts), own = self.part, []
+        for block in self.sweep.blocks:
+            cells, samples = np.indices(block.shape[:-1]).sum(axis=0).reshape(-1, 1), np.zeros(block.samples, int)
+            if not block.until:
+                cells, samples = np.arange(len(cells))[:, np.newaxis], np.arange(block.samples)
+            own.append(((cells + samples) % parts == number - 1).ravel())
+        return np.concatenate(own)
+
+    @cached_property
+    def turns(self) -> NDArray[np.int8]:
+        """Number of the round of each walk, in the order of `keys`; a sweep without `until` has just one round."""
+        turns = [np.searchsorted(each.rounds, np.arange(each.samples), side="right") for each in self.sweep.blocks]
+        cells = [math.prod(block.shape[:-1]) for block in self.sweep.blocks]
+        return np.concatenate([np.tile(turn.astype(np.int8), count) for turn, count in zip(turns, cells, strict=True)])
+
     @property
     def wanted(self) -> list[Shard]:
-        """The shards that are computed in an empty folder: all, or those of its part."""
-        return self.left(np.zeros(self.sweep.walk_count, bool))
+        """The shards that are first computed in an empty folder, of its part: all, or with `until` a round."""
+        return self.left(np.zeros(self.sweep.walk_count, bool), self.turns == 0)
 
-    def left(self, done: NDArray[np.bool_]) -> list[Shard]:
-        """The shards of the walks that are still to be computed; `done` says which are not, in the order of `keys`."""
-        (number, parts), walks, found = self.part, self.sweep.indices, []
-        own = np.flatnonzero((self.keys["cell"] + self.keys["sample"]) % parts == number - 1)
-        for start, stop in itertools.pairwise(_bounds(len(own), self.shard_size)):
-            places = own[start:stop][~done[own[start:stop]]]
-            if len(places):
-                found.append(Shard(self.digest, self.row_type, self.keys[places], walks[places], self.part))
-        return found
+    def left(self, done: NDArray[np.bool_], asked: NDArray[np.bool_]) -> list[Shard]:
+        """The shards of the walks that are still to be computed, in the first round that has any.
+
+        In the order of `keys`, `done` says which walks are there, `asked` which there are to be. The shards of a round
+        do not depend on how far it is.
+        """
+        walks, mine = self.sweep.indices, self.mine & asked
+        for turn in range(self.turns.max() + 1):
+            own, found = np.flatnonzero(mine & (self.turns == turn)), []
+            most = min(self.shard_size, max(1, len(own) // SHARDS)) if self.sweep.has_rounds else self.shard_size
+            for start, stop in itertools.pairwise(_bounds(len(own), most)):
+                places = own[start:stop][~done[own[start:stop]]]
+                if len(places):
+                    found.append(Shard(self.digest, self.row_type, self.keys[places], walks[places], self.part))
+            if found:
+                return found
+        return []
 
     def image(self) -> bytes:
         """Content of sweep.h5."""

@@ -3,6 +3,7 @@
 These are a list, a range that is written out, or names with values that are lists.
 """
 
+import dataclasses
 import math
 from collections import Counter
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping
@@ -24,6 +25,7 @@ from warpchain.inputs.parameters import preset as parameter_preset
 from warpchain.inputs.scene import COMPOUND, Scene
 from warpchain.inputs.validation import InputError, checked, json_value, path_of, shown, validated
 from warpchain.sweeps.designs import SAMPLERS, independent_groups
+from warpchain.sweeps.until import Target
 from warpchain.walks.landmarks import least
 
 Value = float | int | str | tuple[Any, ...] | None
@@ -58,7 +60,9 @@ class Block:
         independent: names of those that each cell draws by itself, also along axes with the same samples.
         sampler: a key of `warpchain.sweeps.designs.SAMPLERS`.
         randomisations: number of independent randomisations of designed samples; random ones need none.
-        samples_given: samples per cell, as the file says.
+        samples_given: samples per cell, as the file says; with `until` the most of them.
+        first_given: samples of the first round of each cell; all without `until`.
+        until: quantity → the error of its mean at which a cell has no more rounds; empty without such.
         first_cell: number of the block's first cell among all cells of the sweep.
         stride: number of all cells of the sweep.
         first_stream: number of the block's first stream of random numbers.
@@ -76,6 +80,8 @@ class Block:
     sampler: str
     randomisations: int
     samples_given: int
+    first_given: int
+    until: Mapping[str, Target] = dataclasses.field(default_factory=dict)
     first_cell: int = 0
     stride: int = 0
     first_stream: int = 0
@@ -87,8 +93,16 @@ class Block:
 
     @property
     def samples(self) -> int:
-        """Walks in each cell; for `saltelli` all walks of all samples."""
+        """Walks in each cell, with `until` at most; for `saltelli` all walks of all samples."""
         return self.samples_given * SAMPLERS[self.sampler].walks(len(self.distributions))
+
+    @property
+    def rounds(self) -> tuple[int, ...]:
+        """Walks in each cell at the end of each round, see `warpchain.sweeps.rounds`; one round without `until`."""
+        sizes = [self.first_given]
+        while sizes[-1] < self.samples_given:
+            sizes.append(min(2 * sizes[-1], self.samples_given))
+        return tuple(size * self.samples // self.samples_given for size in sizes)
 
     @property
     def groups(self) -> NDArray[np.int64]:
@@ -194,7 +208,9 @@ class Block:
         return {
             "name": self.name,
             **({} if self.preset is None else {"preset": self.preset}),
-            "samples": self.samples_given,
+            "samples": self.first_given,
+            **({"until": {n: each.canonical() for n, each in self.until.items()}} if self.until else {}),
+            **({"at_most": self.samples_given} if self.until else {}),
             "sampler": self.sampler,
             **({} if SAMPLERS[self.sampler].engine is None else {"randomisations": self.randomisations}),
             **{section: getattr(first, section).model_dump(exclude=replaced) for section in SECTIONS},

@@ -79,10 +79,13 @@ def independent_groups(sampler: str, walks: int, dimensions: int, randomisations
     return samples if own.engine is None else samples % randomisations
 
 
-def check_design(sampler: str, samples: int, dimensions: int, randomisations: int, path: str) -> None:
+def check_design(
+    sampler: str, samples: int, dimensions: int, randomisations: int, path: str, key: str = "samples"
+) -> None:
     """Check that a sampler can make a number of samples of so many sampled quantities, in so many randomisations.
 
-    An `InputError`, which begins with `path`, says that samples would be equal, too many, or no balanced sequence.
+    An `InputError`, which begins with `path` and the `key` of the samples, says that these would be equal, too many, or
+    no balanced sequence.
     """
     own = SAMPLERS[sampler]
     if dimensions == 0:
@@ -90,7 +93,7 @@ def check_design(sampler: str, samples: int, dimensions: int, randomisations: in
             raise InputError(f"{path}.sampler: {sampler} needs sampled quantities; set distributions")
         if samples > 1:
             raise InputError(
-                f"{path}.samples: nothing is sampled, so all samples would be equal; use 1, or set distributions"
+                f"{path}.{key}: nothing is sampled, so all samples would be equal; use 1, or set distributions"
             )
         return
     if own.engine is None:
@@ -98,14 +101,14 @@ def check_design(sampler: str, samples: int, dimensions: int, randomisations: in
     columns = own.columns(dimensions)
     if samples * columns > DESIGN_LIMIT:
         most = 1 << (DESIGN_LIMIT // columns).bit_length() - 1
-        raise InputError(f"{path}.samples: expected at most {most}, got {samples}; use fewer, or sampler: random")
+        raise InputError(f"{path}.{key}: expected at most {most}, got {samples}; use fewer, or sampler: random")
     if own.is_balanced and randomisations & (randomisations - 1):
         problem = f"expected a power of 2 for {sampler}, got {randomisations}"
         raise InputError(f"{path}.randomisations: {problem}; use {1 << randomisations.bit_length() - 1}")
     if own.is_balanced and samples & (samples - 1):
         lower = 1 << (samples.bit_length() - 1)
         raise InputError(
-            f"{path}.samples: expected a power of 2 for {sampler}, got {samples}; use {lower} or {2 * lower}"
+            f"{path}.{key}: expected a power of 2 for {sampler}, got {samples}; use {lower} or {2 * lower}"
         )
 
 

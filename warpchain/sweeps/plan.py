@@ -18,11 +18,13 @@ from functools import cached_property, lru_cache
 from typing import Any, Final
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
 from warpchain.chain.keep import Keep
 from warpchain.chain.setup import Setup
 from warpchain.files import AnyPath
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.distributions import DRAW_LIMIT, Distribution, draw, random_generator
 from warpchain.inputs.fields import SECTIONS
 from warpchain.inputs.options import Options
@@ -83,6 +85,11 @@ class Sweep:
     def walk_count(self) -> int:
         """Number of walks."""
         return sum(block.walk_count for block in self.blocks)
+
+    @property
+    def has_rounds(self) -> bool:
+        """Whether walks decide how many samples some cells have, see `warpchain.sweeps.rounds`."""
+        return any(block.until for block in self.blocks)
 
     @property
     def indices(self) -> NDArray[np.int64]:
@@ -180,14 +187,8 @@ class Sweep:
         The designed ones are tried first, then random ones; if all are impossible, an `InputError` says so. What is
         independent of the other cells is always random, from a generator of the cell's own.
         """
-        number = 0  # of the cell's random stream among those of the block
-        for (name, values), place in zip(block.axes.items(), cell, strict=True):
-            if name not in self.same_samples_along:
-                number = number * len(values) + place
-        stream = block.first_stream + number
-        rng, problem = random_generator(self.seed, stream, row), ""
-        own = {name: laws[name] for name in block.independent}
-        of_cell = random_generator(self.seed, stream, row, 1, *cell) if own else rng
+        stream, rng, of_cell = self._generators(block, cell, row)
+        own, problem = {name: laws[name] for name in block.independent}, ""
         makers: Iterable[Callable[[], Point]] = itertools.repeat(lambda: draw(laws, rng), DRAW_LIMIT)
         if is_designed:
             given = block.samples_given, len(laws), block.randomisations
@@ -207,6 +208,31 @@ class Sweep:
         raise InputError(
             f"{block.path}.distributions: none of {DRAW_LIMIT} samples makes a possible walk; the last: {problem}"
         )
+
+    def _generators(self, block: Block, cell: Cell, row: int) -> tuple[int, Generator, Generator]:
+        """Stream of the samples of a cell; generators of a sample, and of what it draws apart from other cells."""
+        number = 0  # of the cell's random stream among those of the block
+        for (name, values), place in zip(block.axes.items(), cell, strict=True):
+            if name not in self.same_samples_along:
+                number = number * len(values) + place
+        stream = block.first_stream + number
+        rng = random_generator(self.seed, stream, row)
+        return stream, rng, random_generator(self.seed, stream, row, 1, *cell) if block.independent else rng
+
+    def expected(self, block: Block, cell: Cell, there: NDArray[np.bool_], drawn: Array) -> Array:
+        """What random samples of a cell draw on average, in the order of drawing.
+
+        Given are which samples are there, and what they drew, (samples, quantities). An `InputError` says that one was
+        drawn again because the first draw made no possible walk: then the means of what is drawn are not known.
+        """
+        laws = block.fixed(cell).placed(block.distributions)
+        for row in np.flatnonzero(there).tolist():
+            _, rng, of_cell = self._generators(block, cell, row)
+            first = draw(laws, rng) | draw({name: laws[name] for name in block.independent}, of_cell)
+            if [*first.values()] != drawn[row].tolist():
+                problem = f"sample {row} of a cell of block {block.name} was drawn twice, as it made no possible walk"
+                raise InputError(f"control: {problem}; remove it, or use narrower distributions")
+        return np.array([law.expected() for law in laws.values()])
 
     def canonical(self) -> dict[str, Any]:
         """The sweep as JSON-able content of a file, with every default and range written out."""
@@ -230,6 +256,8 @@ class Sweep:
             del block["name"]
             if samples is not None:
                 block["samples"] = samples[number]
+                for key in ("until", "at_most"):  # which decide how many samples there are, too
+                    block.pop(key, None)
             usual = {name: field.default for model in (Scene, Options) for name, field in model.model_fields.items()}
             usual |= vars(PRESETS[block["preset"]]) if "preset" in block else {}
             for section in SECTIONS:

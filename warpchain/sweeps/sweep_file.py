@@ -14,7 +14,15 @@ from pathlib import Path
 from typing import Annotated, Any, Final, Literal, Self
 
 import pydantic
-from pydantic import AfterValidator, BaseModel, Field, ValidationError, ValidationInfo, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    Field,
+    PlainValidator,
+    ValidationError,
+    ValidationInfo,
+    model_validator,
+)
 
 from warpchain.files import AnyPath, write_whole
 from warpchain.inputs import validation
@@ -27,6 +35,7 @@ from warpchain.inputs.yaml_files import read_yaml
 from warpchain.sweeps.block import CELL_LIMIT, POINT, Block, Name, Sections, Value, axis, list_of, named_axis
 from warpchain.sweeps.designs import RANDOMISATIONS, SAMPLERS, check_design
 from warpchain.sweeps.recording import Frames, Recording
+from warpchain.sweeps.until import AT_MOST, LEAST_GROUPS, Target, targets
 
 VERSION: Final = 1
 """Version of the file format."""
@@ -143,6 +152,8 @@ _Drawn = Annotated[
 
 # The file
 
+_OneUntil = Annotated[float, Field(gt=0)] | str
+
 
 def _printable(name: str) -> str:
     if not name.strip() or not name.isprintable():
@@ -176,7 +187,13 @@ class BlockKeys(WalkKeys):
     """The keys that a block and the file itself may have."""
 
     samples: Annotated[int, Field(ge=1, le=2**30), validation.WHOLE] | None = Field(
-        None, description="samples in each cell of the grid"
+        None, description="samples in each cell of the grid; with `until` those of its first round"
+    )
+    until: Annotated[dict[str, Target], PlainValidator(targets, _OneUntil | dict[str, _OneUntil])] | None = Field(
+        None, description="errors of means at which a cell stops, see below; by default its samples are all run"
+    )
+    at_most: Annotated[int, Field(ge=LEAST_GROUPS, le=2**30), validation.WHOLE] | None = Field(
+        None, description=f"most samples in each cell with `until`; default: {AT_MOST}, or `samples` if these are more"
     )
     sampler: _Sampler | None = Field(None, description="how samples are drawn, see below; default: random")
     randomisations: Annotated[int, Field(ge=1, le=1024), validation.WHOLE] | None = Field(
@@ -336,12 +353,33 @@ def _block(name: str, path: str, outer: BlockKeys | None, inner: BlockKeys) -> B
     if inner.randomisations is not None and SAMPLERS[sampler].engine is None:
         raise InputError(f"{path}.randomisations: {sampler} samples are independent anyway; remove it")
     check_design(sampler, samples, len(drawn), randomisations, path)
+    until, at_most = either("until") or {}, either("at_most")
+    most = (at_most or max(AT_MOST, samples)) if until else samples
+    if until:
+        _check_until(sampler, samples, most, len(drawn), randomisations, path)
+    elif inner.at_most is not None:
+        raise InputError(f"{path}.at_most: until is missing; remove it, or add until: {{dx: 1 %}}")
     own = {*map(validation.full_name, either("independent") or ())}
     for quantity in own - drawn.keys():
         remedy = validation.suggestion(quantity, sorted(drawn))
         raise InputError(f"{path}.independent: {shown(quantity)} is not sampled; {remedy}")
     independent, fixed = tuple(each for each in drawn if each in own), None if "preset" in axes else preset
-    return Block(path, name, fixed, sections, axes, named, points, drawn, independent, sampler, randomisations, samples)
+    own_values = path, name, fixed, sections, axes, named, points
+    return Block(*own_values, drawn, independent, sampler, randomisations, most, samples, until)
+
+
+def _check_until(sampler: str, first: int, most: int, dimensions: int, randomisations: int, path: str) -> None:
+    """Check that samples can grow from the first round to the most, and that errors can come of them."""
+    if dimensions == 0:
+        raise InputError(f"{path}.until: nothing is sampled, so more samples change nothing; remove it")
+    if not SAMPLERS[sampler].grows:
+        raise InputError(f"{path}.until: a {sampler} design cannot grow; use sampler: sobol or random")
+    if sampler != "random" and randomisations < LEAST_GROUPS:
+        problem = f"until needs {LEAST_GROUPS}, got {randomisations}"
+        raise InputError(f"{path}.randomisations: {problem}; use {LEAST_GROUPS}")
+    if most < first:
+        raise InputError(f"{path}.at_most: expected samples: {first} or more, got {most}; use {first}")
+    check_design(sampler, most, dimensions, randomisations, path, "at_most")
 
 
 def _drawn(given: Mapping[str, Any], sections: Sections, varied: set[str], path: str) -> dict[str, Distribution]:
@@ -375,7 +413,8 @@ def _numbered(blocks: list[Block], same_samples_along: tuple[str, ...]) -> Itera
                 f"{block.path}.grid: expected at most {CELL_LIMIT} cells, got {cells:.6g}; use fewer values"
             )
         if walks > WALK_LIMIT:
-            raise InputError(f"{block.path}.samples: expected at most {WALK_LIMIT} walks, got {walks:.6g}; use fewer")
+            key = "at_most" if block.until else "samples"
+            raise InputError(f"{block.path}.{key}: expected at most {WALK_LIMIT} walks, got {walks:.6g}; use fewer")
         first_stream += math.prod(len(values) for name, values in block.axes.items() if name not in same_samples_along)
 
 

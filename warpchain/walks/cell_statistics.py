@@ -36,7 +36,9 @@ class CellStatistics:
         count: number of walks that ended as planned and have the quantity: those in the mean.
         absent: number of walks that ended as planned and have none, NaN or −1 in their column.
         failed: number of walks that ended otherwise.
-        missing: number of walks not computed yet.
+        missing: number of walks that are still to be computed.
+        reached: of a block with `until` whether the errors that it asks for are reached; else None.
+        worth: of corrected means the number of walks that would have the same error without a correction; else None.
     """
 
     axes: dict[str, AnyArray]
@@ -50,6 +52,8 @@ class CellStatistics:
     absent: Counts
     failed: Counts
     missing: Counts
+    reached: NDArray[np.bool_] | None = None
+    worth: Floats | None = None
 
     @classmethod
     def of(
@@ -97,6 +101,8 @@ class CellStatistics:
     @property
     def why_no_error(self) -> str:
         """Why some cells with several walks have no standard error; empty if all of these have one."""
+        if self.worth is not None:
+            return "" if np.isfinite(self.worth).all() else "cells with failed walks or few walks are not corrected"
         if not ((self.count > 1) & (self.independent < 2)).any():
             return ""
         problem = "walks of one randomisation depend on one another, so their spread gives no standard error"

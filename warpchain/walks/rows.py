@@ -106,7 +106,7 @@ def fill_drawn(rows: Rows, places: Sequence[int], points: Sequence[Mapping[str, 
         rows[drawn_column(name)][places] = [point.get(name, np.nan) for point in points]
 
 
-def derived_columns(columns: Columns) -> dict[str, NDArray[np.float64]]:
+def derived_columns(columns: "Columns | Rows") -> dict[str, NDArray[np.float64]]:
     """The columns that are computed from others."""
     at_release = columns["energy_kinetic_at_release"] + columns["energy_potential_at_release"]
     return {"energy_at_release": at_release, "energy_error": energy_error(at_release, columns["energy_residual"])}
