@@ -118,7 +118,7 @@ def test_what_does_not_fit_the_folder_is_refused(tmp_path: Path) -> None:
     """Fewer samples than the folder may have, or a part that would have other walks, end in one line."""
     run(tmp_path / "rounds", sweep_of())
     with pytest.raises(
-        InputError, match="holds up to 64 samples of each cell of block main, but 32 are requested; use"
+        InputError, match="holds up to 64 samples of each cell of block main, but 32 are requested; use samples: 64 or"
     ):
         run(tmp_path / "rounds", sweep_of(None, samples=32))
     run(tmp_path / "part", sweep_of(None), part=(1, 2))

@@ -1,6 +1,6 @@
 """Every field that a user may set, by its name or symbol: complete wherever it is imported, as it has all sections."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 from pydantic.fields import FieldInfo
@@ -27,18 +27,21 @@ SYMBOL_OF: Final = {
 NAME_OF_SYMBOL: Final = {symbol: name for name, symbol in SYMBOL_OF.items()}
 
 
-def by_section(settings: Mapping[str, object]) -> dict[str, dict[str, Any]]:
-    """Values by name or symbol, sorted into sections, unchecked; an `InputError` if there is no such field."""
+def by_section(settings: Mapping[str, object], keys: Iterable[str] = ()) -> dict[str, dict[str, Any]]:
+    """Values by name or symbol, sorted into sections, unchecked; an `InputError` if there is no such field.
+
+    By an unknown name one of the `keys` may be meant, which stand beside fields.
+    """
     sections: dict[str, dict[str, Any]] = {name: {} for name in SECTIONS}
     for name, value in by_name(settings).items():
-        sections[SECTION_OF[dotted_name(name, shown(name))]][name] = value
+        sections[SECTION_OF[dotted_name(name, shown(name), keys)]][name] = value
     return sections
 
 
-def dotted_name(written: str, path: str) -> str:
-    """Name of the field written as name or symbol, with or without its section; `path` is for the `InputError`."""
+def dotted_name(written: str, path: str, keys: Iterable[str] = ()) -> str:
+    """Name of the field written as name or symbol, with or without its section; the rest is for the `InputError`."""
     section, _, last = written.rpartition(".")
     name: str = full_name(last)
     if name not in SECTION_OF or section not in ("", SECTION_OF[name]):
-        raise InputError(f"{path}: unknown name; {suggested_name(last)}")
+        raise InputError(f"{path}: unknown name; {suggested_name(last, keys)}")
     return name

@@ -78,10 +78,10 @@ def walk(
             if value is not None:
                 raise InputError(f"{name}: not possible with a state, which has its own chain; remove it")
         del given["start"]
-        setup = continued(start, by_section(given))
+        setup = continued(start, by_section(given, walk.__kwdefaults__ or ()))
     elif setup is None:
         preset = DEFAULT_PRESET if preset is None else preset
-        setup = resolve(preset, **by_section(given), seed=seed, loads=loads)
+        setup = resolve(preset, **by_section(given, walk.__kwdefaults__ or ()), seed=seed, loads=loads)
     else:
         if not isinstance(setup, Setup):
             raise InputError(

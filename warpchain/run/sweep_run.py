@@ -186,7 +186,7 @@ def sweep_of_keywords(given: Values, out: AnyPath | None) -> Sweep:
     usual = {"name": name or "sweep", "seed": 0, "version": VERSION}
     values = plain(given, "sweep")
     content: dict[str, Any] = usual | {key: values.pop(key) for key in FILE_KEYS if key in values}
-    by_section(values)  # refuses unknown names
+    by_section(values, [*FILE_KEYS, *(sweep.__kwdefaults__ or ())])  # refuses unknown names
     if isinstance(content.get("preset"), list):
         values = {"preset": content.pop("preset"), **values}
     for name, value in by_name(values).items():

@@ -272,7 +272,7 @@ def continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
             "use another folder, or fresh, which deletes what is there"
         )
     for count, more, before, block in zip(there, asked, found.sweep.blocks, sweep.blocks, strict=True):
-        up_to, key = ("up to ", "at_most") if before.until else ("", "at_most" if block.until else "samples")
+        up_to, key = "up to " if before.until else "", "at_most" if block.until else "samples"
         holds = f"{folder}: holds {up_to}{count} samples of each cell of block {block.name}, but"
         if more < count:
             raise InputError(f"{holds} {more} are requested; use {key}: {count} or more, or another folder")
