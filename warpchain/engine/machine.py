@@ -1,4 +1,4 @@
-"""What ran a walk or a sweep, for the provenance of results: command, system, processor, GPU and its driver."""
+"""What ran a walk, a sweep or `bench`: command, system, processor, GPU and its driver."""
 
 import contextlib
 import os
@@ -14,13 +14,14 @@ from warpchain.engine.processors import processors
 
 
 def made_by(devices: Iterable[str]) -> dict[str, str]:
-    """The command of this process without the folders of its program, and what names the machine, without its name.
-
-    The GPUs among some devices are named with their driver; nothing else of the results depends on any of it.
-    """
+    """The provenance of a result: the command of this process without the folders of its program, and the machine."""
     program, *arguments = sys.argv or [""]
+    return {"command": shlex.join([os.path.basename(program) or "python", *arguments])[:1000], **machine_of(devices)}
+
+
+def machine_of(devices: Iterable[str]) -> dict[str, str]:
+    """System, processor, and the GPUs among some devices with their driver; an `InputError` if one is not there."""
     found = {
-        "command": shlex.join([os.path.basename(program) or "python", *arguments])[:1000],
         "system": f"{platform.system()} {platform.release()} {platform.machine()}",
         "processor": f"{_processor()}, {processors()} usable",
     }
