@@ -1,6 +1,7 @@
-"""What ran a walk, a sweep or `bench`: command, system, processor, GPU and its driver."""
+"""What ran a walk, a sweep or `bench`, and when: command, system, processor, GPU and its driver, time."""
 
 import contextlib
+import datetime
 import os
 import platform
 import re
@@ -11,6 +12,11 @@ from pathlib import Path
 
 from warpchain.engine.devices import Gpu, start_device
 from warpchain.engine.processors import processors
+
+
+def now() -> str:
+    """The time in the notation of ISO 8601, to a second."""
+    return datetime.datetime.now().astimezone().isoformat(timespec="seconds")
 
 
 def made_by(devices: Iterable[str]) -> dict[str, str]:
