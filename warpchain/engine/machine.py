@@ -1,7 +1,6 @@
-"""What ran a walk, a sweep or `bench`, and when: command, system, processor, GPU and its driver, time."""
+"""What ran a walk, a sweep or `bench`: command, system, processor, GPU and its driver."""
 
 import contextlib
-import datetime
 import os
 import platform
 import re
@@ -10,13 +9,9 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from warpchain.engine.devices import Gpu, start_device
+from warpchain.engine.devices import start_device
 from warpchain.engine.processors import processors
-
-
-def now() -> str:
-    """The time in the notation of ISO 8601, to a second."""
-    return datetime.datetime.now().astimezone().isoformat(timespec="seconds")
+from warpchain.inputs.options import FIBERS, on_gpu
 
 
 def made_by(devices: Iterable[str]) -> dict[str, str]:
@@ -31,9 +26,9 @@ def machine_of(devices: Iterable[str]) -> dict[str, str]:
         "system": f"{platform.system()} {platform.release()} {platform.machine()}",
         "processor": f"{_processor()}, {processors()} usable",
     }
-    started = [start_device(device) for device in dict.fromkeys(devices)]
-    if gpus := [device.warp.name for device in started if isinstance(device, Gpu) and device.warp.is_cuda]:
-        found["GPU"] = ", ".join(gpus)
+    gpus = [device for device in dict.fromkeys(devices) if on_gpu(device) and device != FIBERS]
+    if gpus:
+        found["GPU"] = ", ".join(start_device(device).warp.name for device in gpus)
         with contextlib.suppress(OSError, AttributeError):  # of Linux
             text = Path("/proc/driver/nvidia/version").read_text()
             found["driver"] = re.search(r"\d+(\.\d+)+", text)[0]  # type: ignore[index]

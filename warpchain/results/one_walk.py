@@ -9,7 +9,8 @@ from pydantic import Field
 from warpchain.chain.keep import FRAME_INTERVAL, LONGEST_INTERVAL, Keep
 from warpchain.chain.setup import Setup
 from warpchain.engine.devices import gpu_turn
-from warpchain.engine.machine import made_by, now
+from warpchain.engine.machine import made_by
+from warpchain.files import now
 from warpchain.inputs.validation import InputError, checked
 from warpchain.kernels.methods.method import find_method
 from warpchain.results.walk_result import WalkResult

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from warpchain.engine.processors import processors
-from warpchain.hdf5_files import SWEEP_FILE
 from warpchain.inputs.options import on_gpu
 from warpchain.inputs.validation import InputError
 from warpchain.run.sweep_run import BYTES_OF_WALK, checked_part, on_device, shard_size
@@ -73,7 +72,7 @@ def plan_sweep(
     planned = on_device(load_sweep(source, **replaced), device)
     blocks, cells = planned.blocks, list[Asked]()
     manifest = Manifest(planned, shard_size(planned), checked_part(part))
-    if folder is not None and (folder / SWEEP_FILE).exists():
+    if folder is not None and (folder / "sweep.h5").exists():
         manifest = continued(folder, planned, manifest)
         rows, _ = read_rows(folder, manifest)
         found, asked = seen(planned, rows)

@@ -10,8 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from warpchain.engine.machine import now
-from warpchain.files import AnyPath, naming, write_whole
+from warpchain.files import AnyPath, naming, now, write_whole
 from warpchain.hdf5_files import SWEEP_FILE
 from warpchain.inputs.validation import InputError
 from warpchain.store.shards import CRATE, Manifest

@@ -27,8 +27,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from warpchain.engine.machine import now
-from warpchain.files import AnyPath, given_path, make_folder, naming, remove_output, write_whole
+from warpchain.files import AnyPath, given_path, make_folder, naming, now, remove_output, write_whole
 from warpchain.hdf5_files import SWEEP_FILE, WALK_FILE, claims_to_be
 from warpchain.inputs.validation import ChangedFileError, DamagedFileError, InputError, InputWarning
 from warpchain.store import shards
