@@ -17,16 +17,7 @@ from warpchain.inputs.arrays import Array
 from warpchain.pictures import chain
 from warpchain.pictures.labels import math_symbol, setting
 from warpchain.pictures.places import center_in_room, checked_joints, circle_radii, walk_box
-from warpchain.pictures.style import (
-    DOTS,
-    GROUND,
-    INK,
-    NARROW,
-    InlineFigure,
-    text_scale,
-    tidy,
-    wrapped,
-)
+from warpchain.pictures.style import DOTS, GROUND, INK, NARROW, InlineFigure, text_scale, tidy, wrapped
 from warpchain.status import Status
 from warpchain.walks.walk_numbers import WalkNumbers as Walk
 
