@@ -221,23 +221,20 @@ def test_many_silent_connections(server: LiveServer) -> None:
 
 
 def test_samples_are_those_of_the_library(server: LiveServer) -> None:
-    """Equal seeds of two set-ups, each the walk of `warpchain.walk`; a count that is none is refused."""
-    other = FIRST | {"floor_friction": 0.6}
-    _, text = ask(server, "/samples", {"setups": [FIRST, other], "first": 3, "count": 2})
-    found = {(each["sample"]["side"], each["sample"]["seed"]): each["sample"]["dx"] for each in messages(text)[:-1]}
-    setups = (FIRST, other)
-    assert found == {(side, seed): warpchain.walk(**setups[side], seed=seed).dx for side in (0, 1) for seed in (3, 4)}
-    for wrong in (
-        {"count": 10**6},
-        {"count": 0},
-        {"first": -1},
-        {"first": "x"},
-        {"setups": []},
-        {"setups": [FIRST] * 3},
+    """A sample is the walk of `warpchain.walk` with its seed, without frames; a seed that is none is refused."""
+    for setup, seed in ((FIRST, 3), (FIRST | {"floor_friction": 0.6}, 4)):
+        told = messages(ask(server, "/sample", setup | {"seed": seed})[1])
+        walk = warpchain.walk(**setup, seed=seed)
+        assert [*told[-1]] == ["end", "path"] and told[-1]["end"]["dx"] == walk.dx and len(told) == 1
+        assert 100 < len(told[-1]["path"]) <= 400
+        assert told[-1]["path"][0] == (walk.center[0] * 1e4).round().astype(int).tolist()
+    for wrong, word in (
+        ({"seed": -1}, "seed"),
+        ({"seed": "x"}, "seed"),
+        ({"links": 31}, "scene.links"),
+        ({"index": 0}, "index"),
     ):
-        assert ask(server, "/samples", {"setups": [FIRST], "first": 0, "count": 1} | wrong)[0] == 400
-    _, text = ask(server, "/samples", {"setups": [FIRST | {"links": 31}], "first": 0, "count": 1})
-    assert messages(text)[-1]["error"].startswith("scene.links: expected an even number, got 31")
+        assert messages(ask(server, "/sample", FIRST | {"seed": 0} | wrong)[1])[-1]["error"].startswith(f"{word}: ")
 
 
 def test_what_is_pushed_goes_on_from_its_state(server: LiveServer) -> None:

@@ -116,7 +116,9 @@ def test_a_cell_of_a_sweep_walks(tmp_path: Path, browser: Page) -> None:  # noqa
         for beside in ({"seed": 1}, {"preset": "soft"}, {"links": 31}):
             with pytest.raises(warpchain.InputError, match=r"^(index|scene\.links): "):
                 server.walker.setup({"index": 1, **beside})
-        with pytest.raises(warpchain.InputError, match=r"^index: expected a number in the column index9"):
+        with pytest.raises(
+            warpchain.InputError, match=r"^index: expected a number in the column index, at most 11, got 99"
+        ):
             server.walker.setup({"index": 99})
     finally:
         server.close()

@@ -56,6 +56,6 @@ def _packed(place: tuple[int, ...]) -> str:
     whole = player_data(walk)
     joints = np.array(whole["joints"])
     whole["joints"] = [whole["joints"][0], *np.diff(joints, axis=0).tolist()]
-    end = summary(walk) | recipes(asked, walk, Path(), []) | {"wall_time": None}  # equal walks give equal bytes
+    end = summary(walk) | recipes(asked, walk, Path()) | {"wall_time": None}  # equal walks give equal bytes
     content = json.dumps({"end": end, "whole": whole}, separators=(",", ":"), allow_nan=False)
     return base64.b64encode(gzip.compress(content.encode(), 9, mtime=0)).decode()

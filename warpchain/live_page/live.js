@@ -315,17 +315,19 @@ player.shown = moment => {
 // Samples: walks of the same seeds for each side
 async function more() {
   const sides = [setup, ...(sideA ? [sideA] : [])].map(({ seed: _, push: __, ...given }) => given);
-  const first = Math.max(-1, ...samples.map(each => each.seed)) + 1, count = 12, mine = new AbortController();
+  const first = Math.max(-1, ...samples.map(each => each.seed)) + 1, mine = new AbortController();
+  const seeds = Array.from({ length: 12 }, (_, i) => first + i);
   sampling = mine;
   const isBusy = on => { $("bar").hidden = $("cancel").hidden = !on; $("more").disabled = on; };
   isBusy(true);
   $("bar").value = 0;
-  await ask("/samples", { setups: sides, first, count }, mine, ({ sample }) => {
-    if (!sample) return;
-    samples.push(sample);
-    $("bar").value += 1 / (count * sides.length);
+  const run = (seed, side) => ask("/sample", { ...sides[side], seed }, mine, ({ end, path }) => {
+    samples.push({ seed, side, path, dx: end.dx });
+    $("bar").value += 1 / (seeds.length * sides.length);
     showSamples();
-  }).catch(refuse);
+  });
+  await Promise.all(seeds.flatMap(seed => sides.map((_, side) => run(seed, side)))).catch(refuse);
+  mine.abort(); // the others, if one is refused
   if (sampling === mine) isBusy(false);
 }
 
