@@ -10,6 +10,8 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -197,6 +199,39 @@ def test_whoever_leaves_ends_the_walk(server: LiveServer) -> None:
     while walking() > before and time.monotonic() < began + 20:
         time.sleep(0.05)
     assert walking() == before
+
+
+def test_several_tabs(server: LiveServer) -> None:
+    """Requests at the same time, more than walks are computed at once, each get their own walk and its pushes."""
+    asked = [FIRST | {"floor_friction": 0.2 + number / 20, "push": [[0.1, 6, 0.02, 0.01]]} for number in range(6)]
+    alone = [messages(ask(server, "/walk", each)[1])[-1]["end"]["dx"] for each in asked]
+    with ThreadPoolExecutor(len(asked)) as threads:
+        answers = [*threads.map(lambda each: ask(server, "/walk", each)[1], asked)]
+    assert [messages(text)[-1]["end"]["dx"] for text in answers] == alone and len({*alone}) == 6
+
+
+@pytest.mark.parametrize(
+    "request_line",
+    [
+        "PUT /walk HTTP/1.1",
+        "OPTIONS /walk HTTP/1.1",
+        "TRACE / HTTP/1.1",
+        "GET " + "/" * 70_000 + " HTTP/1.1",
+        "GET http://evil.example/ HTTP/1.1",
+        "nonsense",
+    ],
+)
+def test_what_is_not_http(request_line: str, server: LiveServer) -> None:
+    """Other methods, endless addresses and other sites' addresses get an error and no token, and the server goes on."""
+    with socket.create_connection(("127.0.0.1", server.server_port), timeout=10) as line:
+        with suppress(ConnectionError):  # it may answer before it has read everything
+            line.sendall(f"{request_line}\r\nHost: 127.0.0.1:{server.server_port}\r\n\r\n".encode())
+        answer = b""
+        with suppress(ConnectionError):
+            while piece := line.recv(65536):
+                answer += piece
+    assert b" 200 " not in answer and server.token.encode() not in answer
+    assert ask(server, "/walk", {"links": 31})[0] == 200
 
 
 def test_a_walk_without_end_is_ended(server: LiveServer, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -151,10 +151,16 @@ function tell(end) {
   const texts = [["python", end.python], ["command", end.command], ["yaml", end.yaml]].filter(([, text]) => text);
   $("lines").replaceChildren($("lines").firstElementChild, ...texts.flatMap(([name, text]) => [
     make("pre", { id: "line-" + name, textContent: text }),
-    make("button", { textContent: `Copy ${name}`, onclick: () => navigator.clipboard.writeText(text) }),
+    make("button", { textContent: `Copy ${name}`, onclick: () => copy("line-" + name) }),
   ]));
   values = { ...end.values, seed: end.seed };
   showValues();
+}
+
+// By the selection, as the clipboard's own interface is missing where pages come by plain HTTP or are in a frame.
+function copy(id) {
+  getSelection().selectAllChildren($(id));
+  document.execCommand("copy");
 }
 
 // Controls
