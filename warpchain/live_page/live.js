@@ -355,8 +355,8 @@ function showSamples() {
 }
 
 // A page without a server: walks that it brings along
-async function unpacked(id) {
-  const bytes = Uint8Array.from(atob($(id).textContent), letter => letter.charCodeAt(0));
+async function unpacked(name) {
+  const bytes = Uint8Array.from(atob(JSON.parse($("walks").textContent)[name]), letter => letter.charCodeAt(0));
   const walk = await new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).json();
   walk.whole.joints.forEach((joints, i, all) => { if (i) all[i] = joints.map((part, k) => part + all[i - 1][k]); });
   return walk;
@@ -369,7 +369,7 @@ function buildChoices() {
     const places = axes.map(([name]) => $(name).value);
     history.replaceState(null, "", "#" + new URLSearchParams(axes.map(([name], i) => [name, places[i]])));
     setup = Object.fromEntries(axes.map(([name, list], i) => [name, list[places[i]]]));
-    const { whole, end } = await unpacked("walk-" + places.join("-"));
+    const { whole, end } = await unpacked(places.join("-"));
     player.load(whole);
     tell(end);
   };

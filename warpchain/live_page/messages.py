@@ -11,7 +11,7 @@ from typing import Any, Final, cast
 import numpy as np
 import yaml
 
-from warpchain.chain.setup import DEFAULT_PRESET, Setup
+from warpchain.chain.setup import Setup
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.fields import SECTIONS, by_section
 from warpchain.inputs.validation import InputError, json_value
@@ -20,8 +20,8 @@ from warpchain.results.walk_result import WalkResult
 from warpchain.walks.walk_numbers import WalkNumbers as Walk
 from warpchain.walks.walk_phases import Progress
 
-_OPTIONS: Final = ("links", "frequency", "start")
-"""Fields with an option of their own on the command line of `warpchain walk`, which come first there."""
+_OPTIONS: Final = ("preset", "seed", "links", "frequency", "start")
+"""Names with an option of their own on the command line of `warpchain walk`, which come first there."""
 
 
 class Frames:
@@ -71,26 +71,21 @@ def summary(walk: WalkResult) -> dict[str, Any]:
 
 def recipes(asked: Mapping[str, Any], walk: WalkResult, folder: Path) -> dict[str, str]:
     """Python lines, command line and YAML file that make the same walk; what cannot is empty."""
-    settings = {name: value for name, value in asked.items() if name != "push"}
-    index, seed, preset = (settings.pop(name, None) for name in ("index", "seed", "preset"))
-    pushes, fields = (
-        asked.get("push", []),
-        {name: settings[name] for name in (*_OPTIONS, *settings) if name in settings},
-    )
+    given = {name: asked[name] for name in (*_OPTIONS, *asked) if name in asked and name not in ("index", "push")}
+    given = {name: value for name, value in given.items() if value is not None or name not in ("preset", "seed")}
+    fields = {name: value for name, value in given.items() if name not in ("preset", "seed")}
+    index, pushes = asked.get("index"), asked.get("push", [])
     words = ["warpchain", "walk", *([] if index is None else ["--like", str(folder), "--index", f"{index}"])]
-    for name, value in {"preset": preset, "seed": seed}.items():
-        words += [] if value is None else [f"--{name}", f"{value}"]
-    for name, value in fields.items():
+    for name, value in given.items():
         text = value if isinstance(value, str) else json.dumps(value)
         words += [f"--{name}", text] if name in _OPTIONS else ["--set", f"{name}={text}"]
-    sections = {name: values for name, values in by_section(fields).items() if values}
-    file = yaml.safe_dump({"preset": preset or DEFAULT_PRESET} | sections, sort_keys=False, default_flow_style=None)
-    note = "# warpchain walk --config FILE.yaml" + f" --seed {seed}" * (seed is not None)
+    sections = {"preset": walk.setup.preset} | {name: values for name, values in by_section(fields).items() if values}
+    file = yaml.safe_dump(sections, sort_keys=False, default_flow_style=None)
+    note = "# warpchain walk --config FILE.yaml" + (f" --seed {given['seed']}" if "seed" in given else "")
     if index is not None and fields:  # the fields of the sweep's walk, one by one
-        preset, dumps = walk.setup.preset, [vars(walk.setup)[name].model_dump() for name in SECTIONS]
-        fields = {name: value for dump in dumps for name, value in dump.items()}
-    keywords = {name: value for name, value in {"preset": preset, "seed": seed}.items() if value is not None} | fields
-    made = f"walk({', '.join(f'{name}={value!r}' for name, value in keywords.items())})"
+        dumps = [vars(walk.setup)[name].model_dump() for name in SECTIONS]
+        given = {"preset": walk.setup.preset} | {name: value for dump in dumps for name, value in dump.items()}
+    made = f"walk({', '.join(f'{name}={value!r}' for name, value in given.items())})"
     if index is not None and not fields:
         made = f"load({str(folder)!r}).walk({index})"
     lines = ["import warpchain\n", f"walk = warpchain.{made}"]
