@@ -14,7 +14,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
-from warpchain import InputError, Status
+from studies import numerics
+from warpchain import InputError, Status, SweepResult
 
 Array = NDArray[Any]
 Block = Any  # A block of `warpchain.SweepResult.blocks`
@@ -157,14 +158,23 @@ def error_line(axes: Axes, x: Any, cells: Any, place: tuple[Any, ...], **style: 
 
 def read_columns(path: Path) -> dict[str, Array]:
     """The columns of a file of comma-separated values: texts where not all are numbers."""
-    columns = pandas.read_csv(path).items()
+    columns = pandas.read_csv(path, comment="#").items()
     return {name: each.to_numpy(float if pandas.api.types.is_numeric_dtype(each) else str) for name, each in columns}
 
 
-def write_rows(path: Path, rows: Iterable[Mapping[str, object]]) -> None:
-    """Write them with commas between values; numbers that are not whole have six digits."""
+def write_rows(path: Path, rows: Iterable[Mapping[str, object]], *sources: SweepResult | int) -> None:
+    """Write rows with commas between values, and in the first line numerics, seeds and command.
+
+    Sources are the sweeps that the rows are of, or seeds of walks that the command has simulated itself. Numbers that
+    are not whole have six digits.
+    """
+    versions = {numerics.today()}
+    if sweeps := [each for each in sources if isinstance(each, SweepResult)]:
+        versions = {each.provenance["numerics_version"] for each in sweeps}
+    seeds = {each.seed if isinstance(each, SweepResult) else each for each in sources}
+    values = pandas.DataFrame(list(rows)).to_csv(index=False, float_format="%.6g", na_rep="nan")
     path.parent.mkdir(parents=True, exist_ok=True)
-    pandas.DataFrame(list(rows)).to_csv(path, index=False, float_format="%.6g", na_rep="nan")
+    path.write_text(numerics.first_line(versions, seeds, numerics.this_command()) + values, encoding="utf-8")
 
 
 def with_tables(text: str, tables: Mapping[str, str]) -> str:

@@ -1,13 +1,17 @@
 """Compares the walks of two sweeps of the same samples, cell by cell; README.md has the commands.
 
-It prints the relative difference of the mean Δx of each cell with the standard error of pairs of samples; over all
-cells their mean and χ², scatter and bounces; and how exact either is.
+It writes results/NEW-BASE.csv and prints the relative difference of the mean Δx of each cell with the standard error of
+pairs of samples; over all cells their mean and χ², scatter and bounces; and how exact either is.
 """
+
+from pathlib import Path
 
 import numpy as np
 
 import warpchain
-from studies.common import Array, OverCells, of_cells, run_study
+from studies.common import Array, OverCells, of_cells, run_study, write_rows
+
+FOLDER = Path(__file__).parent
 
 
 def cells(sweep: warpchain.SweepResult, column: str) -> dict[str, Array]:
@@ -38,14 +42,14 @@ def describe(sweep: warpchain.SweepResult) -> None:
 
 
 def compare(new: warpchain.SweepResult, base: warpchain.SweepResult) -> None:
-    """Print how the walks of one sweep differ from those of another."""
+    """Write and print how the walks of one sweep differ from those of another."""
     distances, bounces = cells(new, "dx"), cells(new, "bounces")
     base_distances, base_bounces = cells(base, "dx"), cells(base, "bounces")
     if distances.keys() != base_distances.keys():
         raise warpchain.InputError(
             f"{new.name} and {base.name}: other cells; use sweeps with the same blocks and grids"
         )
-    rows = []
+    rows, cells_of_file = [], []
     for name, b in base_distances.items():
         a = distances[name][: len(b)]
         b = b[: len(a)]
@@ -53,7 +57,9 @@ def compare(new: warpchain.SweepResult, base: warpchain.SweepResult) -> None:
         a, b = a[pairs], b[pairs]
         difference, error = a.mean() / b.mean() - 1, np.std(a / a.mean() - b / b.mean(), ddof=1) / np.sqrt(len(a))
         rows.append((difference, error, a.std() / b.std(), bounces[name].mean() / base_bounces[name].mean()))
+        cells_of_file.append({"cell": name, "pairs": len(a), "change_percent": 100 * difference, "error": 100 * error})
         print(f"{name}: {100 * difference:+.2f} ± {100 * error:.2f} % ({len(a)} pairs)")
+    write_rows(FOLDER / "results" / f"{new.name}-{base.name}.csv", cells_of_file, new, base)
     differences, errors, scatter, bounced = np.array(rows).T
     over = OverCells(100 * differences, 100 * errors)
     print(f"mean of {len(rows)} cells {over.mean:+.3f} ± {over.error:.3f} %, χ² {over.chi2:.1f}")

@@ -87,8 +87,9 @@ def draw_loops(panels: Array, links: int = 60, frequency: float = 15.0) -> None:
 def main(folder: Annotated[str | None, typer.Argument()] = None) -> None:
     """Reduce a folder and draw its distances beside loops if it is given; write the tables."""
     if folder is not None:
-        blocks = warpchain.load(folder).blocks
-        common.write_rows(FOLDER / RESULTS, reduced(blocks))
+        result = warpchain.load(folder)
+        blocks = result.blocks
+        common.write_rows(FOLDER / RESULTS, reduced(blocks), result)
         figure = Figure(figsize=(9.2, 4.2), layout="constrained")
         left, right = figure.subfigures(1, 2, width_ratios=(1, 1.25))
         draw_distances(left.subplots(), blocks["ellipse"])

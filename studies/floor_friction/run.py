@@ -1,12 +1,28 @@
 """Draws the figure of README.md and prints its numbers, from the folder of the sweep."""
 
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 import warpchain
-from studies.common import DISTANCE, LINE_COLORS, Array, Block, error_line, publish, run_study, table, tidy
+from studies.common import (
+    DISTANCE,
+    LINE_COLORS,
+    Array,
+    Block,
+    Columns,
+    error_line,
+    of_cells,
+    publish,
+    read_columns,
+    run_study,
+    table,
+    tidy,
+    write_rows,
+)
 
 FOLDER = Path(__file__).parent
 
@@ -16,12 +32,26 @@ def furthest(block: Block) -> Array:
     return block.axes["floor_friction"][np.argmax(block.statistics().mean, axis=-1)]
 
 
-def ledger(block: Block, links: int, frequency: float) -> str:
+def reduced(blocks: Mapping[str, Block]) -> Iterator[dict[str, Any]]:
+    """Rows of the file: Δx of each cell [m] with its error, duration [s] and energy lost in self-contacts [J]."""
+    for name, block in blocks.items():
+        cells = block.statistics()
+        time, lost = (block.statistics(column).mean for column in ("walk_time", "loss_self_contact"))
+        for place, at in of_cells(block):
+            own = {"dx": cells.mean[place], "standard_error": cells.standard_error[place]}
+            yield {"block": name, **at, **own, "walk_time": time[place], "loss_self_contact": lost[place]}
+
+
+def ledger(rows: Columns, links: float, frequency: float) -> str:
     """Mean Δx, speed, duration and energy lost in self-contacts by friction of a cell, in Markdown."""
-    cell = tuple(list(block.axes[name]).index(value) for name, value in (("links", links), ("frequency", frequency)))
-    dx, time, lost = (block.statistics(name).mean[cell] for name in ("dx", "walk_time", "loss_self_contact"))
-    rows = zip(block.axes["floor_friction"], dx, dx / time, time, lost, strict=True)
-    return table("μ_fc | Δx / m | Δx / t / (m/s) | t / s | lost to self-contacts / J", rows, "g .3f .2f .2f .2f")
+    chosen = (rows["block"] == "rest") & (rows["links"] == links) & (rows["frequency"] == frequency)
+    friction, dx, time, lost = (
+        rows[name][chosen] for name in ("floor_friction", "dx", "walk_time", "loss_self_contact")
+    )
+    cells = zip(friction, dx, dx / time, time, lost, strict=True)
+    return table(
+        "μ_fc | Δx / m | mean speed / (m/s) | duration / s | lost in self-contacts / J", cells, "g .3f .2f .2f .2f"
+    )
 
 
 def draw(blocks: dict[str, Block]) -> Figure:
@@ -47,13 +77,14 @@ def draw(blocks: dict[str, Block]) -> Figure:
 
 
 def main(folder: str) -> None:
-    """Print the numbers of all blocks and draw them."""
-    blocks = warpchain.load(folder).blocks
-    for name, block in blocks.items():
+    """Reduce the sweep, write the table of 120 links at 30 Hz, draw all blocks and print where walks are longest."""
+    result = warpchain.load(folder)
+    for name, block in result.blocks.items():
         print(f"\n{name}: friction with the greatest mean Δx, rows links {block.axes['links'].tolist()}")
         print(furthest(block))
-        print(ledger(block, int(block.axes["links"].max() * 2 // 3), float(block.axes["frequency"].max())))
-    publish(FOLDER, {}, {"distances": draw(blocks)})
+    path = FOLDER / "results" / "floor_friction.csv"
+    write_rows(path, reduced(result.blocks), result)
+    publish(FOLDER, {"ledger": ledger(read_columns(path), 120, 30.0)}, {"distances": draw(result.blocks)})
 
 
 if __name__ == "__main__":

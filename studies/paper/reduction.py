@@ -31,6 +31,8 @@ def reduced(result: SweepResult) -> Numbers:
         "sweep": content_digest(result.sweep),
         "samples": {block.name: block.shape[-1] for block in result.blocks.values()},
         "numerics_version": result.provenance["numerics_version"],
+        "seed": result.seed,
+        "command": f"warpchain sweep studies/paper/sweeps/{result.name}.yaml",
         "walks": result.summary(),
         "inaccurate": result.inaccurate_count,
     }

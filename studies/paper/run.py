@@ -12,6 +12,7 @@ import typer
 
 import warpchain
 from studies.common import publish, run_study
+from studies.numerics import with_line
 from studies.paper.drawing import figures
 from studies.paper.reduction import SWEEPS, read, reduced, text_of
 from studies.paper.tables import page
@@ -31,7 +32,7 @@ def make(folders: Annotated[list[Path] | None, typer.Argument()] = None, out: Pa
     if folders:
         (out / RESULTS).write_text(text, encoding="utf-8")
     numbers = read(text)
-    (out / "README.md").write_text(page(numbers), encoding="utf-8")
+    (out / "README.md").write_text(with_line("paper", page(numbers)), encoding="utf-8")
     publish(out, {}, figures(numbers, sweeps))
 
 

@@ -105,19 +105,36 @@ def verdicts(numbers: Numbers) -> str:
     )
 
 
-def thresholds(numbers: Numbers) -> str:
-    """Which claims get another verdict if one bound of the rules is halved or doubled."""
-    usual, rows = all_verdicts(numbers), []
+def changed(numbers: Numbers) -> dict[str, list[list[int]]]:
+    """Numbers of the claims that get another verdict if a bound of the rules, by name, is halved, and if doubled."""
+    usual, found = all_verdicts(numbers), {}
     for name, value in asdict(BOUNDS).items():
-        texts = []
+        found[name] = []
         for factor in (0.5, 2.0):
             setattr(BOUNDS, name, factor * value)
             pairs = enumerate(zip(usual, all_verdicts(numbers), strict=True), 1)
-            changed = (f"{number}" for number, (before, after) in pairs if before != after)
-            texts.append(", ".join(changed) or "none")
+            found[name].append([number for number, (before, after) in pairs if before != after])
         setattr(BOUNDS, name, value)
-        rows.append([name, f"{value:g}", *texts])
+    return found
+
+
+def thresholds(numbers: Numbers) -> str:
+    """Which claims get another verdict if one bound of the rules is halved or doubled."""
+    rows = (
+        (name, f"{getattr(BOUNDS, name):g}", *(", ".join(map(str, each)) or "none" for each in both))
+        for name, both in changed(numbers).items()
+    )
     return table(["bound", "value", "halved", "doubled"], rows)
+
+
+def stability(numbers: Numbers) -> str:
+    """Which verdicts change if any bound is halved or doubled, and how many no bound decides."""
+    moved = sorted({number for both in changed(numbers).values() for each in both for number in each})
+    by_hand = sum(bool(claim.verdict or claim.check in ("", "waves")) for claim in CLAIMS)
+    return (
+        f"{len(moved)} of {len(CLAIMS)} verdicts change if one of the [rules' bounds](#how-verdicts-are-reached) is halved "
+        f"or doubled:\n  those of statements {', '.join(map(str, moved[:-1]))} and {moved[-1]}. {by_hand} are set by hand"
+    )
 
 
 def of_cells(cells: Mapping[str, Any], head: str, rows: Mapping[str, Any]) -> str:

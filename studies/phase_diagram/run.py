@@ -68,12 +68,15 @@ def make(
 ) -> None:
     """Reduce the sweeps that are given into the committed files; then draw and write all that is in them."""
     if parts:
-        walks = cells.walks_by_cell([warpchain.load(path) for path in parts])
-        write_rows(cells.CSV, (cells.reduced(*cell, columns) for cell, columns in walks.items()))
+        results = [warpchain.load(path) for path in parts]
+        walks = cells.walks_by_cell(results)
+        write_rows(cells.CSV, (cells.reduced(*cell, columns) for cell, columns in walks.items()), *results)
     if scaling is not None:
-        write_rows(scales.CSV, scales.reduced(warpchain.load(scaling)))
+        result = warpchain.load(scaling)
+        write_rows(scales.CSV, scales.reduced(result), result)
     if meetings:
-        write_rows(strands.CSV, strands.reduced([warpchain.load(path) for path in meetings]))
+        results = [warpchain.load(path) for path in meetings]
+        write_rows(strands.CSV, strands.reduced(results), *results)
     found, met, varied = read_columns(cells.CSV), read_columns(strands.CSV), scales.Cells()
     points = laws.points_of(found)
     ranges = candidates.ranges(found)

@@ -91,8 +91,9 @@ def draw(block: Block) -> Figure:
 def main(folder: Annotated[str | None, typer.Argument()] = None) -> None:
     """Reduce a folder and draw its slopes if it is given; write the tables of all blocks."""
     if folder is not None:
-        blocks = warpchain.load(folder).blocks
-        common.write_rows(FOLDER / RESULTS, reduced(blocks))
+        result = warpchain.load(folder)
+        blocks = result.blocks
+        common.write_rows(FOLDER / RESULTS, reduced(blocks), result)
         common.publish(FOLDER, {}, {"slopes": draw(blocks["slope"])})
     columns, tables = common.read_columns(FOLDER / RESULTS), {}
     for name, axes in TABLES.items():

@@ -9,7 +9,20 @@ import typer
 from matplotlib.figure import Figure
 
 import warpchain
-from studies.common import DASHES, FREQUENCY, GREEN, LINE_COLORS, RED, minus, publish, run_study, show, table, tidy
+from studies.common import (
+    DASHES,
+    FREQUENCY,
+    GREEN,
+    LINE_COLORS,
+    RED,
+    minus,
+    publish,
+    run_study,
+    show,
+    table,
+    tidy,
+    write_rows,
+)
 from studies.stationary_loop import theory
 
 FOLDER = Path(__file__).parent
@@ -128,6 +141,8 @@ def main(kinks: Annotated[str | None, typer.Argument()] = None) -> None:
         "same loop": table("links, Hz | height / % | width / % | position / mm | curvature / (1/m) | T_e / N", same),
     }
     show({name: minus(text) for name, text in printed.items()})
+    names = ("chain", "bottom: simulation, theory, catenary", "kink", "kink in theory", "off: theory, catenary")
+    write_rows(FOLDER / "results" / "shapes.csv", (dict(zip(names, row, strict=True)) for row in shapes))
     publish(FOLDER, {"shapes": minus(table(shape_head, shapes))}, {"loop": figure}, dpi=100)
 
 

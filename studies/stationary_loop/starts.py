@@ -39,11 +39,11 @@ SLOW = 10.0  # Frequency [Hz] at which loops hardly swing
 LONG = 150  # Links from which loops are called long
 
 
-def reduced(paths: list[str]) -> Iterator[dict[str, Any]]:
+def reduced(results: list[warpchain.SweepResult]) -> Iterator[dict[str, Any]]:
     """Mean and standard error of each quantity by cell; blocks of the same name are put together."""
     found: dict[Key, list[dict[str, Array]]] = {}
-    for path in paths:
-        for name, block in warpchain.load(path).blocks.items():
+    for result in results:
+        for name, block in result.blocks.items():
             names = [name for name in block.columns if name in QUANTITIES or name.endswith(DRAWN)]
             for place, at in common.of_cells(block):
                 key = name, int(at["links"]), float(at["frequency"]), float(at.get("extra_hold", 0))
@@ -172,7 +172,8 @@ def details(cells: Cells) -> dict[str, str]:
 def make(folders: Annotated[list[str] | None, typer.Argument()] = None) -> None:
     """Reduce the sweeps that are given into the committed file; then write all tables that are in it."""
     if folders:
-        common.write_rows(CSV, reduced(folders))
+        results = [warpchain.load(folder) for folder in folders]
+        common.write_rows(CSV, reduced(results), *results)
     cells = read()
     common.show(details(cells))
     common.publish(PAGE.parent, tables(cells))

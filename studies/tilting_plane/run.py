@@ -19,7 +19,7 @@ def table(rows: list[dict[str, str]]) -> str:
 def main(folder: str) -> None:
     """Write the table and draw the fraction of walks that fell over."""
     result, rows = taps.reduced(folder, "tilted")
-    common.write_rows(FOLDER / "results" / "tilt.csv", rows)
+    common.write_rows(FOLDER / "results" / "tilt.csv", rows, result)
     common.publish(FOLDER, {"tilt": table(rows)}, {"falls": result.plot(quantity="fell_over")})
 
 

@@ -1,10 +1,10 @@
 """What taps that a hand could give do: reduces the sweep `taps`, if its folder is given, and writes its tables."""
 
-import csv
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
+import pandas
 import typer
 
 import warpchain
@@ -80,8 +80,9 @@ def main(folder: Annotated[str | None, typer.Argument()] = None) -> None:
     """Reduce a folder if it is given; write the tables."""
     path = FOLDER / "results" / "taps.csv"
     if folder is not None:
-        write_rows(path, reduced(folder, "lateral_speed")[1])
-    rows = list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
+        result, found = reduced(folder, "lateral_speed")
+        write_rows(path, found, result)
+    rows = pandas.read_csv(path, comment="#", dtype=str).to_dict("records")
     publish(FOLDER, {"taps": taps_table(rows)})
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 import warpchain
-from studies.common import publish, run_study, table
+from studies.common import publish, run_study, table, write_rows
 from studies.video.calibration import CAMERA, Calibration, Wanted, calibrate, set_of_videos
 from studies.video.drawing import SYMBOLS, corner, coverage_figure, line_figure
 from warpchain import video
@@ -57,6 +57,14 @@ def calibration_rows(found: Calibration) -> Iterator[str]:
     return (f"{percent(width)}, {bias:+.1f}, {100 * a:.0f}, {100 * z:.0f}" for width, bias, a, z in sizes)
 
 
+def file_rows(found: Mapping[tuple[str, str], Calibration]) -> Iterator[dict[str, object]]:
+    """Rows of the file: of each truth, set of videos and parameter what the page has in one cell."""
+    for (truth, videos), one in found.items():
+        at = {"truth": truth, "videos": videos, "chains": one.chains, "refused": one.refused}
+        for row in zip(one.names, one.width, one.bias, one.coverage(1), one.coverage(1.96), strict=True):
+            yield at | dict(zip(("parameter", "width", "bias", "within_68", "within_95"), row, strict=True))
+
+
 def pitfalls_table(training: video.TrainingSet, truths: video.TrainingSet) -> str:
     """Coverage of 95 % intervals with one error of the camera at twice its σ, allowed for or not."""
     errors = {
@@ -99,9 +107,11 @@ def lines_table(training_sets: Mapping[str, video.TrainingSet]) -> str:
 
 def main(folder: Path) -> None:
     """Calibrate, compare, draw."""
+    results: dict[str, warpchain.SweepResult] = {}
 
     def training_set_of(sweep: str, block: str = "main") -> video.TrainingSet:
-        return video.TrainingSet.of(warpchain.load(folder / sweep).blocks[block])
+        results[sweep] = results.get(sweep) or warpchain.load(folder / sweep)
+        return video.TrainingSet.of(results[sweep].blocks[block])
 
     training = training_set_of("video_pair")
     hidden = {kind: training_set_of("video_truths", block) for kind, block in HEIGHTS.items()}
@@ -121,12 +131,13 @@ def main(folder: Path) -> None:
         rows = ((*at, *calibration_rows(one), str(one.chains), percent(one.refused)) for at, one in found.items())
         return table(head, rows)
 
-    known = found_in(hidden)
+    known, unlike = found_in(hidden), found_in(others)
+    write_rows(FOLDER / "results" / "calibration.csv", file_rows(known | unlike), *results.values())
     own = hidden["one for each video"]
     tables = {
         "experiments": experiments_table(training),
         "calibration": rows_of(known),
-        "other chains": rows_of(found_in(others)),
+        "other chains": rows_of(unlike),
         "pitfalls": pitfalls_table(training, own),
         "lines": lines_table({"video_pair": training} | others),
     }

@@ -116,7 +116,7 @@ def run() -> None:
         print(links, frequency, flush=True)
         cell = {"links": links, "frequency": f"{frequency:g}"}
         rows += [cell | row for row in reduced(*distances(links, frequency))]
-    common.write_rows(RESULTS, rows)
+    common.write_rows(RESULTS, rows, SEED)
 
 
 def change(way: str, size: float) -> OverCells:

@@ -83,7 +83,7 @@ def tables() -> dict[str, str]:
 def main(files: Annotated[list[Path] | None, typer.Argument()] = None) -> None:
     """Reduce files that are given, and write the tables."""
     if files:
-        common.write_rows(RESULTS, reduced(files))
+        common.write_rows(RESULTS, reduced(files), *SEEDS)
     common.show({"doses": changes_table(VARIANTS[2:]), "χ² between seeds": between_seeds()})
     common.publish(FOLDER, tables())
 

@@ -206,8 +206,8 @@ def draw(speed: float, waves: Waves, found: Array, room: Array) -> Figure:
     return figure
 
 
-def tables_and_figure() -> tuple[dict[str, str], Figure]:
-    """All tables by their markers, and the figure."""
+def tables_and_figure() -> tuple[dict[str, str], Figure, list[dict[str, object]]]:
+    """All tables by their markers, the figure, and rows of a file: rates of each mode in theory and found [1/s]."""
     speed, offset = speed_at(20.0), from_tap(LINKS)
     angles = tapped(LINKS, speed, 0.1 * offset * np.exp(-(offset**2) / 4.5), INTERVAL * np.arange(400))
     waves = dispersion.ring_waves(CHAIN, LINKS, speed, NUMBERS)
@@ -216,4 +216,11 @@ def tables_and_figure() -> tuple[dict[str, str], Figure]:
     texts = minus(table(head, (row[:-2] for row in rows), "d .0f s .3f .3f .2f .3g .3g"))
     show({"modes of the ring": ring_table(speed, waves, found), "packets": texts})
     tables = {"reach": reach_table(), "ring": ring_text(speed, waves, found)}
-    return tables, draw(speed, waves, found, np.array([row[-2:] for row in rows]))
+    rates = {"slow": (waves.rate[:, BOTH[0]], found[:, 0]), "fast": (waves.rate[:, BOTH[1]], found[:, 1])}
+    modes: list[dict[str, object]] = [
+        {"family": family, "waves": number, "frequency": -one.imag, "damping": -one.real}
+        | {"frequency_found": -other.imag, "damping_found": -other.real}
+        for family, both in rates.items()
+        for number, one, other in zip(NUMBERS, *both, strict=True)
+    ]
+    return tables, draw(speed, waves, found, np.array([row[-2:] for row in rows])), modes

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 import warpchain
-from studies.common import minus, publish, show, table
+from studies.common import minus, publish, show, table, write_rows
 from studies.waves import fields, rings
 from studies.waves.picture import waves_figure
 from studies.waves.wave_drag import inertia_of
@@ -41,7 +41,8 @@ def speeds_table(walk: warpchain.WalkResult) -> str:
 
 def main() -> None:
     """Write all tables and draw the figures."""
-    tables, dispersion = rings.tables_and_figure()
+    tables, dispersion, modes = rings.tables_and_figure()
+    write_rows(FOLDER / "results" / "rings.csv", modes)
     scene = {"links": LINKS, "frequency": FREQUENCY, "start": "spinning", "walk_limit": 0.35}
     walk = warpchain.walk(preset="soft", **scene, record_joint_forces=True, record_before=0.0, frame_interval=1e-4)
     show({"speeds": speeds_table(walk)})

@@ -115,7 +115,7 @@ def test_a_film_that_was_not_written_to_its_end_is_not_kept(
 @pytest.mark.parametrize(
     ("name", "settings", "message"),
     [
-        ("walk.avi", {}, "unknown kind of picture"),
+        ("walk.avi", {}, "unknown file format"),
         ("walk.gif", {"fps": 0}, "fps: expected at least 1, got 0"),
         ("walk.html", {"slow": math.inf}, "slow: expected a finite number, got inf"),
         ("walk.gif", {"fps": 51}, "fps: expected at most 50, got 51"),

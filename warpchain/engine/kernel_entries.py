@@ -27,7 +27,7 @@ def digest_of_sources() -> str:
     """SHA-256 of all source files of kernels, with their names."""
     root = Path(*warpchain.kernels.__path__)
     digest = hashlib.sha256()
-    for path in sorted(root.rglob("*.py")):
+    for path in sorted(path for path in root.rglob("*") if path.suffix in (".py", ".cpp")):
         content = path.read_bytes()
         digest.update(f"{path.relative_to(root)} {len(content)}\n".encode() + content)
     return digest.hexdigest()

@@ -13,6 +13,7 @@ which this elimination is stable. On matrices of chains errors are as large as L
 
 import functools
 from dataclasses import dataclass
+from pathlib import Path
 
 import warp as wp
 
@@ -91,99 +92,26 @@ def link_at(column: int, link_count: int):
     return wp.where(row >= link_count, row - link_count, row), is_copy
 
 
-_INVERSES = {
-    2: """
-        const lanes scale = 1.0 / (m(0, 0) * m(1, 1) - m(0, 1) * m(1, 0));
-        to(0, 0) = m(1, 1) * scale;
-        to(0, 1) = -m(0, 1) * scale;
-        to(1, 0) = -m(1, 0) * scale;
-        to(1, 1) = m(0, 0) * scale;
-    """,
-    3: """
-        const lanes a = m(1, 1) * m(2, 2) - m(1, 2) * m(2, 1);
-        const lanes b = m(1, 2) * m(2, 0) - m(1, 0) * m(2, 2);
-        const lanes c = m(1, 0) * m(2, 1) - m(1, 1) * m(2, 0);
-        const lanes scale = 1.0 / (m(0, 0) * a + m(0, 1) * b + m(0, 2) * c);
-        to(0, 0) = a * scale;
-        to(0, 1) = (m(0, 2) * m(2, 1) - m(0, 1) * m(2, 2)) * scale;
-        to(0, 2) = (m(0, 1) * m(1, 2) - m(0, 2) * m(1, 1)) * scale;
-        to(1, 0) = b * scale;
-        to(1, 1) = (m(0, 0) * m(2, 2) - m(0, 2) * m(2, 0)) * scale;
-        to(1, 2) = (m(0, 2) * m(1, 0) - m(0, 0) * m(1, 2)) * scale;
-        to(2, 0) = c * scale;
-        to(2, 1) = (m(0, 1) * m(2, 0) - m(0, 0) * m(2, 1)) * scale;
-        to(2, 2) = (m(0, 0) * m(1, 1) - m(0, 1) * m(1, 0)) * scale;
-    """,
-}
-
-
-def _vectors(layout: SegmentLayout) -> str:
-    """C++ types and functions for all segments at once: a vector has a lane per segment."""
-    size = layout.size
-    return f"""
-        typedef double lanes __attribute__((vector_size({8 * LANES}), aligned(8), may_alias));
-        struct column {{
-            enum {{ width = 1 }};
-            lanes m[{size}];
-        }};
-        struct submatrix {{
-            enum {{ width = {size} }};
-            lanes m[{size * size}];
-            lanes& operator()(int i, int j) {{ return m[{size} * i + j]; }}
-            const lanes& operator()(int i, int j) const {{ return m[{size} * i + j]; }}
-        }};
-        lanes* const first = reinterpret_cast<lanes*>(S.data);
-        const long next_row = S.shape[1] / {LANES};
-        const auto at_place = [=](int row, int p) {{ return first + next_row * row + p; }};
-        const auto at_separators = [=](int number) {{ return at_place({layout.separators}, number); }};
-        const auto load = [](auto& to, const lanes* from, long stride) {{
-            for (auto& number : to.m) {{
-                number = *from;
-                from += stride;
-            }}
-        }};
-        const auto store = [](const auto& from, lanes* to, long stride) {{
-            for (const auto& number : from.m) {{
-                *to = number;
-                to += stride;
-            }}
-        }};
-        // to += sign a b; the sign is known when this is compiled
-        const auto add = [](auto& to, const submatrix& a, const auto& b, double sign) {{
-            const int width = b.width;
-            for (int i = 0; i < {size}; i++)
-                for (int j = 0; j < width; j++)
-                    for (int k = 0; k < {size}; k++)
-                        to.m[width * i + j] += sign * a(i, k) * b.m[width * k + j];
-        }};
-        // to += sign a b for the a that is stored from this number on
-        const auto add_stored = [=](auto& to, const lanes* stored, long stride, const auto& b, double sign) {{
-            submatrix a;
-            load(a, stored, stride);
-            add(to, a, b, sign);
-        }};
-        const auto invert = [](const submatrix& m) {{
-            submatrix to;
-            {_INVERSES[size]}
-            return to;
-        }};
-        const auto multiple_of_one = [](lanes value) {{
-            submatrix to = {{}};
-            for (int i = 0; i < {size}; i++) to(i, i) = value;
-            return to;
-        }};
-        // lane s is lane s + by of the other one; that, too, is known when this is compiled
-        const auto turned = [](const auto& from, int by) {{
-            auto to = from;
-            for (int k = 0; k < {size} * from.width; k++)
-                for (int s = 0; s < {LANES}; s++) to.m[k][s] = from.m[k][(s + by) % {LANES}];
-            return to;
-        }};
-        // places that repeat a separator
-        lanes begins = {{}};
-        for (int s = full; s < {LANES}; s++) begins[s] = 1.0;
-        const auto where_repeated = [=](lanes value, lanes other) {{ return begins != 0.0 ? value : other; }};
-        """
+def _source(layout: SegmentLayout, name: str) -> str:
+    """C++ of a native function: its constants, the vectors that all of them use, and the body in a file beside this."""
+    square = layout.size**2
+    constants = {
+        "SIZE": layout.size,
+        "SQUARE": square,
+        "LANES": LANES,
+        "ROUNDS": ROUNDS,
+        # first memory rows: submatrices L, D, U, and two that elimination adds; right-hand side; separators
+        **{word: layout.submatrix(k) for k, word in enumerate(("LOWER", "DIAGONAL", "UPPER", "FILL", "HEAD"))},
+        "RIGHT": layout.right,
+        "SEPARATORS": layout.separators,
+        # submatrices of the separators: coupling of sums to them, the last pivots, what each round subtracts of others
+        "COUPLING": 0,
+        "LAST_PIVOT": square,
+        "ROUND_PARTS": 2 * square,
+    }
+    given = ", ".join(f"{word} = {value}" for word, value in constants.items())
+    parts = (Path(__file__).with_name(file).read_text(encoding="utf-8") for file in ("segment_vectors.cpp", name))
+    return f"\nconstexpr int {given};\n{''.join(parts)}"
 
 
 @functools.cache
@@ -194,114 +122,11 @@ def cyclic_solver(layout: SegmentLayout):
     loops over lanes passed them through memory, and the processor waited for its stores. Whatever S holds at a repeated
     separator, its matrix is taken to be L = −1, D = 1, U = 0, its right-hand side 0.
     """
-    size = layout.size
-    square = size * size
-    lower, diagonal, upper, fill, head = (layout.submatrix(k) for k in range(5))
-    # submatrices of the separators: coupling of sums to them, the last pivots, what each round subtracts of other rows
-    coupling, last_pivot, rounds = 0, square, 2 * square
-    vectors = _vectors(layout)
 
-    # Row p becomes x_p = y_p − U x_{p+1} + fill e, y_p = D (r_p − L y_{p−1}), with new D, U and fill; e is the
-    # separator before the segment. The first unknown that the segment owns is Σ head y + sum e plus the segment's
-    # separator times the head that is left over.
-    @wp.func_native(f"""
-        {vectors}
-        for (int k = 0; k < {square}; k++) {{
-            const double one = k % {size + 1} == 0;
-            lanes &low = *at_place({lower} + k, 1), &centre = *at_place({diagonal} + k, 1);
-            lanes& up = *at_place({upper} + k, 1);
-            low = where_repeated(lanes{{}} - one, low);
-            centre = where_repeated(lanes{{}} + one, centre);
-            up = where_repeated(lanes{{}}, up);
-        }}
-        submatrix ahead = {{}}, sum = {{}}, across = multiple_of_one(lanes{{}} + 1.0);
-        submatrix head = multiple_of_one(lanes{{}} + 1.0 - begins), low, up;
-        for (int p = 1; p < places; p++) {{
-            submatrix pivot, product = {{}};
-            load(low, at_place({lower}, p), next_row);
-            load(up, at_place({upper}, p), next_row);
-            load(pivot, at_place({diagonal}, p), next_row);
-            add(pivot, low, ahead, -1.0);
-            pivot = invert(pivot);
-            add(product, low, across, 1.0);
-            ahead = submatrix{{}};
-            across = submatrix{{}};
-            add(ahead, pivot, up, 1.0);
-            add(across, pivot, product, -1.0);
-            add(sum, head, across, 1.0);
-            store(pivot, at_place({diagonal}, p), next_row);
-            store(ahead, at_place({upper}, p), next_row);
-            store(across, at_place({fill}, p), next_row);
-            store(head, at_place({head}, p), next_row);
-            submatrix left_over = multiple_of_one(p == 1 ? begins : lanes{{}});
-            add(left_over, head, ahead, -1.0);
-            head = left_over;
-        }}
-        submatrix below = {{}}, centre, above = {{}};
-        load(low, at_place({lower}, places), next_row);
-        load(up, at_place({upper}, places), next_row);
-        load(centre, at_place({diagonal}, places), next_row);
-        add(below, low, across, 1.0);
-        add(centre, low, ahead, -1.0);
-        add(centre, up, turned(sum, 1), 1.0);
-        add(above, up, turned(head, 1), 1.0);
-        store(up, at_separators({coupling}), 1);
-        #pragma unroll
-        for (int r = 0; r < {ROUNDS}; r++) {{
-            const int after = 1 << r, before = {LANES} - after;
-            const submatrix pivot = invert(centre);
-            submatrix from_before = {{}}, from_after = {{}}, next_below = {{}}, next_above = {{}};
-            add(from_before, below, turned(pivot, before), 1.0);
-            add(from_after, above, turned(pivot, after), 1.0);
-            store(from_before, at_separators({rounds} + {2 * square} * r), 1);
-            store(from_after, at_separators({rounds + square} + {2 * square} * r), 1);
-            add(centre, from_before, turned(above, before), -1.0);
-            add(centre, from_after, turned(below, after), -1.0);
-            add(next_below, from_before, turned(below, before), -1.0);
-            add(next_above, from_after, turned(above, after), -1.0);
-            below = next_below;
-            above = next_above;
-        }}
-        for (int k = 0; k < {square}; k++) centre.m[k] += below.m[k] + above.m[k];
-        store(invert(centre), at_separators({last_pivot}), 1);
-    """)
+    @wp.func_native(_source(layout, "cyclic_factor.cpp"))
     def factor(S: Rows, places: int, full: int): ...
 
-    @wp.func_native(f"""
-        {vectors}
-        column value = {{}}, own = {{}}, next;
-        for (int p = 1; p < places; p++) {{
-            load(next, at_place({layout.right}, p), next_row);
-            if (p == 1)
-                for (auto& number : next.m) number = where_repeated(lanes{{}}, number);
-            add_stored(next, at_place({lower}, p), next_row, value, -1.0);
-            value = column{{}};
-            add_stored(value, at_place({diagonal}, p), next_row, next, 1.0);
-            add_stored(own, at_place({head}, p), next_row, value, 1.0);
-            store(value, at_place({layout.right}, p), next_row);
-        }}
-        load(next, at_place({layout.right}, places), next_row);
-        add_stored(next, at_place({lower}, places), next_row, value, -1.0);
-        value = next;
-        add_stored(value, at_separators({coupling}), 1, turned(own, 1), -1.0);
-        #pragma unroll
-        for (int r = 0; r < {ROUNDS}; r++) {{
-            const column from_before = turned(value, {LANES} - (1 << r)), from_after = turned(value, 1 << r);
-            add_stored(value, at_separators({rounds} + {2 * square} * r), 1, from_before, -1.0);
-            add_stored(value, at_separators({rounds + square} + {2 * square} * r), 1, from_after, -1.0);
-        }}
-        next = column{{}};
-        add_stored(next, at_separators({last_pivot}), 1, value, 1.0);
-        store(next, at_place({layout.right}, places), next_row);
-        const column before = turned(next, {LANES - 1});
-        for (int p = places - 1; p > 0; p--) {{
-            load(value, at_place({layout.right}, p), next_row);
-            add_stored(value, at_place({fill}, p), next_row, before, 1.0);
-            add_stored(value, at_place({upper}, p), next_row, next, -1.0);
-            store(value, at_place({layout.right}, p), next_row);
-            next = value;
-        }}
-    """)
+    @wp.func_native(_source(layout, "cyclic_solve.cpp"))
     def solve(S: Rows, places: int, full: int): ...
 
     return factor, solve
