@@ -188,7 +188,8 @@ def walks(numbers: Numbers) -> str:
     total = sum((Counter(content["walks"]) for content in numbers.values()), Counter())
     parts = (f"{count:,} {name.replace('_', ' ')}" for name, count in total.items())
     inaccurate = sum(content["inaccurate"] for content in numbers.values())
-    numerics = " and ".join(str(each) for each in sorted({content["numerics_version"] for content in numbers.values()}))
+    *earlier, last = (str(each) for each in sorted({content["numerics_version"] for content in numbers.values()}))
+    numerics = f"{', '.join(earlier)} and {last}" if earlier else last
     return f"{', '.join(parts)}; {inaccurate} with an energy error above 5 %; versions {numerics} of the numerics"
 
 

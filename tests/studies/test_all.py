@@ -63,7 +63,8 @@ def test_readme_says_with_which_numerics_the_paper_was_tested() -> None:
     """Its agreement with the paper has the versions of the paper's page, while walks have changed since."""
     text = (numerics.ROOT / "README.md").read_text(encoding="utf-8")
     if numerics.line("paper"):
-        assert f"with numerics {' and '.join(map(str, sorted(numerics.of_study('paper'))))}" in text
+        *earlier, last = map(str, sorted(numerics.of_study("paper")))
+        assert f"with numerics {', '.join(earlier)} and {last}" in text
 
 
 @pytest.mark.parametrize(
