@@ -35,7 +35,7 @@ def test_the_time_of_a_walk_is_without_compilation(monkeypatch: pytest.MonkeyPat
     """Time spent on kernels is not in the wall time of a walk."""
     settings = {"links": 30, "start": "ellipse", "walk_limit": 0.01, "method": "dp5"}
     walk(preset="soft", **settings)
-    monkeypatch.setattr(one_walk, "compile_kernels", lambda setups: time.sleep(1.0))
+    monkeypatch.setattr(one_walk, "compile_kernels", lambda setups, on_compile: time.sleep(1.0))
     began = time.perf_counter()
     result = walk(preset="soft", **settings)
     assert time.perf_counter() - began > 1.0
