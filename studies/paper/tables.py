@@ -131,9 +131,13 @@ def stability(numbers: Numbers) -> str:
     """Which verdicts change if any bound is halved or doubled, and how many no bound decides."""
     moved = sorted({number for both in changed(numbers).values() for each in both for number in each})
     by_hand = sum(bool(claim.verdict or claim.check in ("", "waves")) for claim in CLAIMS)
+    bounds, numbers_of = (
+        "[rules' bounds](#how-verdicts-are-reached)",
+        f"{', '.join(map(str, moved[:-1]))} and {moved[-1]}",
+    )
     return (
-        f"{len(moved)} of {len(CLAIMS)} verdicts change if one of the [rules' bounds](#how-verdicts-are-reached) is halved "
-        f"or doubled:\n  those of statements {', '.join(map(str, moved[:-1]))} and {moved[-1]}. {by_hand} are set by hand"
+        f"{len(moved)} of {len(CLAIMS)} verdicts change if one of the {bounds} is halved or doubled:\n"
+        f"  those of statements {numbers_of}. {by_hand} are set by hand"
     )
 
 
