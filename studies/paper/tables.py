@@ -131,13 +131,10 @@ def stability(numbers: Numbers) -> str:
     """Which verdicts change if any bound is halved or doubled, and how many no bound decides."""
     moved = sorted({number for both in changed(numbers).values() for each in both for number in each})
     by_hand = sum(bool(claim.verdict or claim.check in ("", "waves")) for claim in CLAIMS)
-    bounds, numbers_of = (
-        "[rules' bounds](#how-verdicts-are-reached)",
-        f"{', '.join(map(str, moved[:-1]))} and {moved[-1]}",
-    )
+    statements = f"{', '.join(map(str, moved[:-1]))} and {moved[-1]}"
     return (
-        f"{len(moved)} of {len(CLAIMS)} verdicts change if one of the {bounds} is halved or doubled:\n"
-        f"  those of statements {numbers_of}. {by_hand} are set by hand"
+        f"{len(moved)} of {len(CLAIMS)} verdicts change if one of the [rules' bounds](#how-verdicts-are-reached) is "
+        f"halved or doubled:\n  those of statements {statements}. {by_hand} are set by hand"
     )
 
 
@@ -192,7 +189,8 @@ def walks(numbers: Numbers) -> str:
     total = sum((Counter(content["walks"]) for content in numbers.values()), Counter())
     parts = (f"{count:,} {name.replace('_', ' ')}" for name, count in total.items())
     inaccurate = sum(content["inaccurate"] for content in numbers.values())
-    numerics = " and ".join(str(each) for each in sorted({content["numerics_version"] for content in numbers.values()}))
+    *earlier, last = (str(each) for each in sorted({content["numerics_version"] for content in numbers.values()}))
+    numerics = f"{', '.join(earlier)} and {last}" if earlier else last
     return f"{', '.join(parts)}; {inaccurate} with an energy error above 5 %; versions {numerics} of the numerics"
 
 

@@ -2,19 +2,22 @@
 
 import contextlib
 import math
-import shutil
+import os
 import sys
+import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from datetime import timedelta
-from typing import Protocol
+from typing import Protocol, TextIO
 
 from warpchain.walks.walk_phases import Progress
 
 LINE_EVERY = 60.0
 """Time [s] between two lines of progress where there is neither a terminal nor a notebook."""
+_COLUMNS = 120
+"""Width of a line where no terminal says its own."""
 COMPILING = "compiling kernels for this machine, which takes 10 to 30 s; later runs find them ready"
 
 
@@ -72,20 +75,25 @@ def changing_line(in_terminals: bool = True, every: float = math.inf) -> Iterato
     """Yield a function that shows a text in the place of the one before.
 
     Without a terminal and a notebook it prints a line on standard error, so often [s], by default never, and at once if
-    the text is urgent and a new one.
+    the text is urgent and a new one. Threads may call it at the same time.
     """
     in_notebook = type(sys.stdout).__module__.startswith("ipykernel")
     stays = not in_notebook and not (in_terminals and sys.stderr.isatty())
     stream, last, shown = sys.stdout if in_notebook else sys.stderr, time.monotonic(), False
     told = set[str]()
+    one_at_a_time = threading.Lock()
 
     def show(text: str, urgent: bool = False) -> None:
+        with one_at_a_time:
+            show_alone(text, urgent)
+
+    def show_alone(text: str, urgent: bool) -> None:
         nonlocal last, shown
         if urgent and stays and text not in told:
             print(text, file=stream, flush=True)
             told.add(text)
         elif not stays:
-            room = shutil.get_terminal_size((120, 24)).columns - 1
+            room = _columns(stream) - 1  # a longer line wraps, and the next one would not cover it
             print(f"\r{text[:room]:{room}}", end="", file=stream, flush=True)
             shown = True
         elif time.monotonic() - last >= every and not urgent:
@@ -97,6 +105,14 @@ def changing_line(in_terminals: bool = True, every: float = math.inf) -> Iterato
     finally:
         if shown:
             print(file=stream)
+
+
+def _columns(stream: TextIO) -> int:
+    """Width of the terminal of a stream, which need not be that of standard output."""
+    try:
+        return os.get_terminal_size(stream.fileno()).columns or _COLUMNS
+    except (OSError, ValueError):  # a notebook
+        return _COLUMNS
 
 
 def progress_text(progress: SweepProgress) -> str:
