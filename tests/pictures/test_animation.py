@@ -86,7 +86,7 @@ def test_html_is_complete_in_itself(make: Any, tmp_path: Path) -> None:
     assert data["slow"] == 3 and data["sprocket"] == [0, round(1e4 * walk.sprocket_center[1]), 556]
     seen = "" if walk.joints_lab is None else ", from the side"
     own = "" if walk.joints_lab is None else "plane tilting, "
-    assert f"<title>30 links, 15 Hz, preset soft, {own}drawn values: \u0394x = {walk.dx:.3f} m{seen}</title>" in page
+    assert f"<title>30 links, 15 Hz, preset soft, {own}sampled values: \u0394x = {walk.dx:.3f} m{seen}</title>" in page
 
 
 def test_mp4_frames(tmp_path: Path) -> None:

@@ -45,7 +45,7 @@ def test_height_and_speed_are_the_series() -> None:
     np.testing.assert_array_equal(height.lines[0].get_xydata(), np.stack([walk.time, walk.center[:, 1]], axis=1))
     np.testing.assert_array_equal(speed.lines[0].get_xydata(), np.stack([walk.time, walk.center_velocity[:, 0]], 1))
     assert height.get_shared_x_axes().joined(height, speed)
-    assert height.get_title(loc="left") == "30 links, 15 Hz, preset soft, drawn values"
+    assert height.get_title(loc="left") == "30 links, 15 Hz, preset soft, sampled values"
     assert "/ m" in height.get_ylabel() and "/ (m/s)" in speed.get_ylabel() and "/ s" in speed.get_xlabel()
 
 

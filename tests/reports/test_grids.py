@@ -2,6 +2,7 @@
 
 import json
 import math
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -255,7 +256,8 @@ def test_responses_are_panels_of_all_blocks_that_vary_one_quantity(tmp_path: Pat
     result = make_sweep(tmp_path, sweep(blocks=blocks), outcome)
     (picture,) = [picture for picture in figures(result) if picture.name == "distance_responses"]
     friction, stiffness, presets = picture.figure.axes
-    assert stiffness.get_xlabel() == "joint stiffness $k$ / N/m\n1 of 6 walks failed, 1 of 6 not run yet"
+    label = " ".join(stiffness.get_xlabel().split())
+    assert label == "joint stiffness $k$ / N/m 1 of 6 walks failed, 1 of 6 not run yet"
     assert [text.get_text() for text in presets.get_xticklabels()] == ["soft", "paper"]
     np.testing.assert_array_equal(lines(friction)[0][1], result.blocks["friction"].statistics().mean)
 
@@ -330,9 +332,31 @@ def test_a_figure_of_one_randomisation_says_that_it_has_no_errors(tmp_path: Path
         result = make_sweep(tmp_path / str(count), content)
         assert text in legend_texts(result.plot()) and len(legend_texts(result.plot())) == 3
         told = command("info", str(tmp_path / str(count))).out
-        assert ("gives no standard error; randomisations: 8" in told) == (count == 1)
+        assert ("gives no standard error; use randomisations: 8" in told) == (count == 1)
         assert result.to_xarray().randomisation.values.tolist() == [k % count for k in range(16)]
     merge(tmp_path / "8", tmp_path / "8.h5")
     np.testing.assert_array_equal(
         load(tmp_path / "8.h5").statistics().standard_error, result.statistics().standard_error
     )
+
+
+@pytest.mark.parametrize("width", [60, 85, 120, 180])
+def test_names_below_panels_on_paper_stay_apart(tmp_path: Path, width: float) -> None:
+    """Long names of axes and notes are neither cut by the paper nor touch those of the next panel."""
+    grid = {"links": [60, 120], "frequency": [10, 20], "floor_friction": [0.2, 0.3]}
+    result = make_sweep(tmp_path, sweep(grid), flawed)
+    for x in ("frequency", "floor_friction"):
+        figure = result.plot(x=x, width=width)
+        assert isinstance(figure, Figure)
+        figure.draw_without_rendering()
+        shown = [axes.xaxis.label for axes in panels(figure).values() if axes.get_xlabel()]
+        boxes = [text.get_window_extent() for text in shown]
+        assert all(figure.bbox.padded(1.0).contains(*corner) for box in boxes for corner in (box.min, box.max))
+        assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
+
+
+def test_the_title_says_how_many_walks_cells_have(tmp_path: Path) -> None:
+    """Of a sweep that runs until its errors are reached these are the walks so far, not all that there might be."""
+    asked = sweep({"frequency": [10, 20]}, samples=8, at_most=16, until=1e-6)
+    result = make_sweep(tmp_path, asked, lambda walk: None if walk.index >= 21 else distance(walk))
+    assert result.setting(["main"]).endswith("5–8 samples in each cell")

@@ -94,6 +94,10 @@ def test_designs_count_by_their_randomisations() -> None:
         ({"at_most": 64}, r"sweep\.at_most: until is missing; remove it"),
         ({"until": 0.01, "at_most": 4}, r"sweep\.at_most: .*8"),
         ({"until": 0.01, "samples": 16, "at_most": 8}, r"sweep\.at_most: expected samples: 16 or more, got 8"),
+        (
+            {"until": 0.01, "samples": 1800},
+            r"sweep\.until: the first round has samples: 1800 in each cell, .*; use fewer",
+        ),
         ({"until": 0.01, "distributions": {"all": "fixed"}, "samples": 1}, r"sweep\.until: nothing is sampled"),
         ({"until": 0.01, "sampler": "latin_hypercube"}, r"sweep\.until: a latin_hypercube design cannot grow; use"),
         (

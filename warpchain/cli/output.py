@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 _PICTURES: Final = (*(f"{kind}.png" for kind in KINDS), "walk.gif")
 """What `plot` and `animate` write beside the record unless told otherwise."""
-ONE_OF_MANY: Final = "one of many: the least change alters it by some 4 %; --samples 12 gives a mean"
+ONE_OF_MANY: Final = "one of many: any small change alters it, typically by 4 %; --samples 12 gives a mean"
 """What a single distance is worth, which has two digits."""
 BYTES_ON_DISK: Final = 500
 """Bytes of a walk in its shard, about, without its motion."""

@@ -40,8 +40,8 @@ _SEED: Final = (
     "Default: mean values and phase 0."
 )
 _SAMPLES: Final = (
-    "Run N samples of the walk, each with its own draws, and show the mean Δx and its standard error; with -o DIR also "
-    "write the sweep of these walks and samples.png. A larger N adds samples to DIR."
+    "Run N samples of the walk, each with its own sampled values, and show the mean Δx and its standard error; with "
+    "-o DIR also write the sweep of these walks and samples.png. A larger N adds samples to DIR."
 )
 _CONFIG: Final = "Read preset, scene, options and parameters from a YAML file; command-line options take precedence."
 _LIKE: Final = (

@@ -92,6 +92,7 @@ def draw_grid(
     areas, _ = panel_grid(owner, len(panels), columns, sharex=alike, sharey=alike or are_lines)
     palettes = _palettes(panels)
     lines, maps = list[Axes](), list[Axes]()
+    share = 0.95 * (1.0 - beside * owner.dpi / owner.bbox.width) / columns
     for axes, panel in zip(areas, panels, strict=True):
         axes.set_title(panel.title, fontsize="medium", loc="left")
         if panel.is_map:
@@ -103,7 +104,7 @@ def draw_grid(
             lines.append(axes)
         note = labels.lost_note([vars(panel.cells)])
         name = labels.quantity_label(panel.across.name) if not alike or axes in areas[-columns:] else ""
-        axes.set_xlabel(f"{name}\n{note}".strip())
+        axes.set_xlabel("\n".join(style.wrapped(text, owner, share, " ") for text in (name, note) if text))
         if not (alike or are_lines) or axes in areas[::columns]:
             axes.set_ylabel(labels.quantity_label(panel.along.name) if panel.is_map and panel.along else label)
     if left_out:

@@ -198,7 +198,7 @@ def setting(walk: Walk, symbol: Callable[[str], str] = axis_symbol) -> str:
     setup, drawn = walk.setup, TABLE if walk.seed is not None else {}
     values = {name: value for name, value in (vars(setup.scene) | vars(setup.parameters)).items() if name not in drawn}
     texts = [setup.described.replace(" at ", ", ", 1), *differences(values, setup.preset, symbol)]
-    return ", ".join([*texts, "drawn values"] if drawn else texts)
+    return ", ".join([*texts, "sampled values"] if drawn else texts)
 
 
 def headline(walk: Walk) -> str:

@@ -92,14 +92,17 @@ def columns_on(width: float | None, most: int) -> int:
     return most if width is None else max(1, min(most, int(width / (2.2 * text_scale()))))
 
 
-def wrapped(text: str, figure: AnyFigure, share: float = 0.95) -> str:
-    """A title in as many lines as it takes in a share of the width of a figure; words in $ count as two letters."""
+def wrapped(text: str, figure: AnyFigure, share: float = 0.95, between: Literal[", ", " "] = ", ") -> str:
+    """A text in as many lines as it takes in a share of the width of a figure; words in $ count as two letters.
+
+    Lines end between parts, or between words; a symbol keeps its unit.
+    """
     letters = share * figure.bbox.width / figure.dpi / (0.085 * text_scale())
     lines = [""]
-    for part in text.split(", "):
-        longer = f"{lines[-1]}, {part}".removeprefix(", ")
+    for part in text.split(between) if between == ", " else re.findall(r"(?:\$[^$]*\$| / |\S)+", text):
+        longer = f"{lines[-1]}{between}{part}".removeprefix(between)
         if lines[-1] and len(re.sub(r"\$[^$]*\$", "mm", longer)) > letters:
-            lines[-1] += ","
+            lines[-1] += between.rstrip()
             longer = part
             lines.append("")
         lines[-1] = longer

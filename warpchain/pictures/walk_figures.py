@@ -213,6 +213,9 @@ def _loop(walk: Walk, figure: Figure) -> None:
     pull.set_title(f"$\\rho v^2$ = {carried:.2f} N", fontsize="small", loc="left")
     pull.set(xlim=(low, high), ylabel="tension $T - \\rho v^2$ / N")
     pull.set_xlabel("arc length $s$ from the lowest point / m")
+    if figure.get_figwidth() < NARROW:
+        for axes in (bend, pull):
+            axes.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
     pull.set_ylim(bottom=min(0.0, 1.1 * float(loop.effective_tension[inside].min())))
 
 

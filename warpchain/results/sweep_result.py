@@ -228,8 +228,13 @@ class SweepResult(_OnlyBlock):
         given = [block for block in self.sweep["blocks"] if block["name"] in blocks]
         alike = [differences(block["scene"] | block["parameters"], block.get("preset"), math_symbol) for block in given]
         common = [text for text in alike[0] if all(text in others for others in alike)]
-        samples = sorted({self.blocks[name].shape[-1] for name in blocks})
-        failed = sum(int(self.blocks[name].statistics().failed.sum()) for name in blocks)
+        cells = [self.blocks[name].statistics() for name in blocks]
+        numbers = [
+            self.blocks[name].shape[-1] if each.reached is None else each.count + each.absent + each.failed
+            for name, each in zip(blocks, cells, strict=True)
+        ]
+        samples = sorted({int(number) for each in numbers for number in np.ravel(each)})
+        failed = sum(int(each.failed.sum()) for each in cells)
         many = f"{'–'.join(map(str, samples[:: max(1, len(samples) - 1)]))} sample{'s' * (samples != [1])} in each cell"
         return ", ".join([*common, many, *[f"{failed:,} walks failed"] * (failed > 0)])
 

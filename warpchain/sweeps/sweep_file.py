@@ -185,7 +185,7 @@ class BlockKeys(WalkKeys):
         None, description="errors of means at which a cell stops, see below; by default its samples are all run"
     )
     at_most: Annotated[int, Field(ge=LEAST_GROUPS, le=2**30), validation.WHOLE] | None = Field(
-        None, description=f"most samples in each cell with `until`; default: {AT_MOST}, or `samples` if these are more"
+        None, description=f"most samples in each cell with `until`; default: {AT_MOST}"
     )
     sampler: _Sampler | None = Field(None, description="how samples are drawn, see below; default: random")
     randomisations: Annotated[int, Field(ge=1, le=1024), validation.WHOLE] | None = Field(
@@ -346,7 +346,10 @@ def _block(name: str, path: str, outer: BlockKeys | None, inner: BlockKeys) -> B
         raise InputError(f"{path}.randomisations: {sampler} samples are independent anyway; remove it")
     check_design(sampler, samples, len(drawn), randomisations, path)
     until, at_most = either("until") or {}, either("at_most")
-    most = (at_most or max(AT_MOST, samples)) if until else samples
+    most = (at_most or AT_MOST) if until else samples
+    if until and at_most is None and samples >= AT_MOST:
+        problem = f"the first round has samples: {samples} in each cell, so that no cell could stop early"
+        raise InputError(f"{path}.until: {problem}; use fewer samples, such as 8, or set at_most")
     if until:
         _check_until(sampler, samples, most, len(drawn), randomisations, path)
     elif inner.at_most is not None:
