@@ -92,7 +92,7 @@ def test_what_makes_no_mean_loop_is_refused() -> None:
     before, radius, _ = make_ring(30)
     for joints, problem in (
         (before.frame_joints[:5], "5 frames are too few"),
-        (before.frame_joints[::-1], "does not run clockwise"),
+        (before.frame_joints[::-1], "expected a loop that circulates clockwise"),
         (np.repeat(before.frame_joints[:1], 20, axis=0), "hardly moves"),
     ):
         with pytest.raises(ValueError, match=problem):
