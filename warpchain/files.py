@@ -7,6 +7,7 @@ Content is written to a part beside the file, `.NAME.01234567.part.SUFFIX`; a ki
 (O_TMPFILE) was rejected: it cannot replace another one.
 """
 
+import datetime
 import errno
 import os
 import re
@@ -123,6 +124,11 @@ def clear_parts(path: AnyPath) -> None:
             with open(part, "rb") as file:
                 if time.time() - os.fstat(file.fileno()).st_mtime > UNLOCKED_FOR and _lock(file.fileno()):
                     part.unlink()
+
+
+def now() -> str:
+    """The time, as logs and provenance have it: in the notation of ISO 8601, to a second."""
+    return datetime.datetime.now().astimezone().isoformat(timespec="seconds")
 
 
 def write_whole(path: AnyPath, content: bytes | str, only: FileKind | None = None) -> None:

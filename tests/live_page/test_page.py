@@ -151,6 +151,41 @@ def test_samples_of_two_sides(page: Page) -> None:
     assert page.do("sideA.links") == 40 and page.do("setup.floor_friction") == 0.5
 
 
+def test_samples_are_cancelled(page: Page, server: LiveServer) -> None:
+    """The bar shows how far they are; a button, or another set-up, ends them, and none comes after that."""
+    for ending in ("$('cancel').click()", "$('reset').click()"):
+        shown(page, f"{server.url}{SMALL}&frequency=12")
+        page.do("$('more').click()")
+        page.wait("samples.length >= 1")
+        assert page.do("[$('cancel').hidden, $('bar').hidden, $('bar').value > 0]") == [False, False, True]
+        page.do(f"$('said').textContent = ''; {ending}")
+        page.wait("$('cancel').hidden && !$('more').disabled")
+        count = page.do("samples.length")
+        page.do("new Promise(done => setTimeout(done, 300))")
+        assert page.do("samples.length") == count < 12
+    page.wait(OVER)
+    assert page.do("document.querySelectorAll('.refusal:not(:empty), .problem:not(:empty)').length") == 0
+
+
+def test_a_lesson(page: Page) -> None:
+    """Friction, length, slope, stairs and a pushed link, one after the other on one page."""
+    told = [
+        given(page, "floor_friction", "0.3", "range-"),
+        given(page, "links", "60", "range-"),
+        given(page, "slope", "6"),
+    ]
+    page.do("$('said').textContent = ''; $('shape').value = 'stairs'; $('shape').dispatchEvent(new Event('change'))")
+    page.wait(OVER)
+    assert page.do("$('no-slope').textContent").startswith("scene.slope: not possible with a profile")
+    told.append(given(page, "slope", "0"))
+    page.do("player.toggle(false); player.show(30); $('said').textContent = ''; $('push-do').click()")
+    page.wait(OVER)
+    told.append(page.do("$('said').textContent"))
+    assert len({distance(text) for text in told}) == 5 and page.do("Boolean(ghost)")
+    setup: dict[str, Any] = {"links": 60, "preset": "soft", "start": "ellipse", "floor_friction": 0.3}
+    assert distance(told[3]) == rounded(warpchain.walk(**setup, floor=STAIRS).dx)
+
+
 def test_a_pushed_link(page: Page) -> None:
     """A drag on a paused picture pushes the link, as the form does; the Python lines make the same walk."""
     page.do("player.toggle(false); player.show(20)")
@@ -222,6 +257,11 @@ def test_the_lines_make_the_same_walk(more: dict[str, Any], page: Page, server: 
     answer = command(*shlex.split(page.do("$('line-command').textContent"))[1:], "--json")
     assert json.loads(answer.out)["dx"] == wanted
     text = page.do("$('line-yaml').textContent")
+    page.do("$('lines').open = true")
+    page.do("document.addEventListener('copy', () => { window.copied = getSelection().toString(); })")
+    page.do("[...document.querySelectorAll('#lines button')].at(-1).focus()")
+    page.key("Enter")
+    assert page.do("copied").strip() == text.strip()
     Path("FILE.yaml").write_text(text)
     answer = command(*shlex.split(text.partition("\n")[0])[2:], "--json")
     assert json.loads(answer.out)["dx"] == wanted

@@ -10,6 +10,8 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -199,6 +201,39 @@ def test_whoever_leaves_ends_the_walk(server: LiveServer) -> None:
     assert walking() == before
 
 
+def test_several_tabs(server: LiveServer) -> None:
+    """Requests at the same time, more than walks are computed at once, each get their own walk and its pushes."""
+    asked = [FIRST | {"floor_friction": 0.2 + number / 20, "push": [[0.1, 6, 0.02, 0.01]]} for number in range(6)]
+    alone = [messages(ask(server, "/walk", each)[1])[-1]["end"]["dx"] for each in asked]
+    with ThreadPoolExecutor(len(asked)) as threads:
+        answers = [*threads.map(lambda each: ask(server, "/walk", each)[1], asked)]
+    assert [messages(text)[-1]["end"]["dx"] for text in answers] == alone and len({*alone}) == 6
+
+
+@pytest.mark.parametrize(
+    "request_line",
+    [
+        "PUT /walk HTTP/1.1",
+        "OPTIONS /walk HTTP/1.1",
+        "TRACE / HTTP/1.1",
+        "GET " + "/" * 70_000 + " HTTP/1.1",
+        "GET http://evil.example/ HTTP/1.1",
+        "nonsense",
+    ],
+)
+def test_what_is_not_http(request_line: str, server: LiveServer) -> None:
+    """Other methods, endless addresses and other sites' addresses get an error and no token, and the server goes on."""
+    with socket.create_connection(("127.0.0.1", server.server_port), timeout=10) as line:
+        with suppress(ConnectionError):  # it may answer before it has read everything
+            line.sendall(f"{request_line}\r\nHost: 127.0.0.1:{server.server_port}\r\n\r\n".encode())
+        answer = b""
+        with suppress(ConnectionError):
+            while piece := line.recv(65536):
+                answer += piece
+    assert b" 200 " not in answer and server.token.encode() not in answer
+    assert ask(server, "/walk", {"links": 31})[0] == 200
+
+
 def test_a_walk_without_end_is_ended(server: LiveServer, monkeypatch: pytest.MonkeyPatch) -> None:
     """After its time, or with too many frames, one line says what to give less of."""
     monkeypatch.setattr("warpchain.live_page.asked_walks.MOST_SECONDS", 0.5)
@@ -221,23 +256,20 @@ def test_many_silent_connections(server: LiveServer) -> None:
 
 
 def test_samples_are_those_of_the_library(server: LiveServer) -> None:
-    """Equal seeds of two set-ups, each the walk of `warpchain.walk`; a count that is none is refused."""
-    other = FIRST | {"floor_friction": 0.6}
-    _, text = ask(server, "/samples", {"setups": [FIRST, other], "first": 3, "count": 2})
-    found = {(each["sample"]["side"], each["sample"]["seed"]): each["sample"]["dx"] for each in messages(text)[:-1]}
-    setups = (FIRST, other)
-    assert found == {(side, seed): warpchain.walk(**setups[side], seed=seed).dx for side in (0, 1) for seed in (3, 4)}
-    for wrong in (
-        {"count": 10**6},
-        {"count": 0},
-        {"first": -1},
-        {"first": "x"},
-        {"setups": []},
-        {"setups": [FIRST] * 3},
+    """A sample is the walk of `warpchain.walk` with its seed, without frames; a seed that is none is refused."""
+    for setup, seed in ((FIRST, 3), (FIRST | {"floor_friction": 0.6}, 4)):
+        told = messages(ask(server, "/sample", setup | {"seed": seed})[1])
+        walk = warpchain.walk(**setup, seed=seed)
+        assert [*told[-1]] == ["end", "path"] and told[-1]["end"]["dx"] == walk.dx and len(told) == 1
+        assert 100 < len(told[-1]["path"]) <= 400
+        assert told[-1]["path"][0] == (walk.center[0] * 1e4).round().astype(int).tolist()
+    for wrong, word in (
+        ({"seed": -1}, "seed"),
+        ({"seed": "x"}, "seed"),
+        ({"links": 31}, "scene.links"),
+        ({"index": 0}, "index"),
     ):
-        assert ask(server, "/samples", {"setups": [FIRST], "first": 0, "count": 1} | wrong)[0] == 400
-    _, text = ask(server, "/samples", {"setups": [FIRST | {"links": 31}], "first": 0, "count": 1})
-    assert messages(text)[-1]["error"].startswith("scene.links: expected an even number, got 31")
+        assert messages(ask(server, "/sample", FIRST | {"seed": 0} | wrong)[1])[-1]["error"].startswith(f"{word}: ")
 
 
 def test_what_is_pushed_goes_on_from_its_state(server: LiveServer) -> None:

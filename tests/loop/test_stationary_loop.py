@@ -92,12 +92,12 @@ def test_what_makes_no_mean_loop_is_refused() -> None:
     before, radius, _ = make_ring(30)
     for joints, problem in (
         (before.frame_joints[:5], "5 frames are too few"),
-        (before.frame_joints[::-1], "does not run clockwise"),
-        (np.repeat(before.frame_joints[:1], 20, axis=0), "hardly moves"),
+        (before.frame_joints[::-1], "expected a loop that circulates clockwise"),
+        (np.repeat(before.frame_joints[:1], 20, axis=0), "expected a loop that circulates clockwise"),
     ):
         with pytest.raises(ValueError, match=problem):
             average(frames_of(joints), radius)
-    with pytest.raises(ValueError, match="no free part"):
+    with pytest.raises(ValueError, match="expected a loop that hangs on a sprocket"):
         average_frames(before, SOFT, MASS, np.zeros(2), radius)
     with pytest.raises(ValueError, match="record_before"):
         make_walk().plot("loop")

@@ -126,7 +126,7 @@ def test_pipes_in_a_folder_are_refused(tmp_path: Path, name: str, command: Comma
     if name not in ("log.txt", "lock"):
         answer = command("info", str(tmp_path))
         assert answer.status == 2 and answer.err.count("\n") == 1
-        assert answer.err.startswith(f"error: {tmp_path / name}: a pipe or a device")
+        assert answer.err.startswith(f"error: {tmp_path / name}: expected a file, got a pipe or a device; ")
     with pytest.raises((InputError, OSError), match=str(tmp_path / name)):
         with SweepFolder.open(tmp_path, SWEEP, shard_size=20) as store:
             store.log("begun")

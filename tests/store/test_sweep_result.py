@@ -127,7 +127,7 @@ def test_a_sweep_is_no_saved_walk(tmp_path: Path, single: Path) -> None:
 
 def test_no_sweep_no_result(tmp_path: Path, single: Path) -> None:
     """A folder without a sweep, or none at all, is named; a bad shard is no missing one."""
-    for nothing, problem in ((tmp_path, "no sweep in this folder"), (tmp_path / "none", "is not there")):
+    for nothing, problem in ((tmp_path, "no sweep in this folder"), (tmp_path / "none", "does not exist")):
         with pytest.raises(InputError, match=f"{nothing}: {problem}"):
             load(nothing)
     with pytest.raises(InputError, match=r"sweep\.yaml: not an HDF5 file; use the folder of a sweep"):

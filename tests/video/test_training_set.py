@@ -188,7 +188,7 @@ def test_a_sweep_that_is_no_training_set_is_refused(tmp_path: Path) -> None:
         training("b", phases, same_samples_along=along[:2])
     with pytest.raises(InputError, match="and list no parameter as independent"):
         training("c", phases, same_samples_along=along, independent=["clearance", "inner_mass"])
-    with pytest.raises(InputError, match="grid: its axes are frequency"):
+    with pytest.raises(InputError, match="grid: expected links, frequency and then repetitions, got frequency"):
         training("d", {"frequency": [15]})
     with pytest.raises(InputError, match="training_set: no motion was recorded"):
         training("e", {"links": [40], "frequency": [15]})  # too short

@@ -66,7 +66,7 @@ def test_foreign_files_are_refused(tmp_path: Path) -> None:
         (path.read_bytes(), "not an HDF5 file of warpchain"),
         (b"dx = 0.6\n", "not an HDF5 file"),
         (b"", "not an HDF5 file"),
-        (hdf5_image(Format.of("another kind"), lambda file: None), "a another kind, not a warpchain walk"),
+        (hdf5_image(Format.of("another kind"), lambda file: None), "expected a warpchain walk, got a another kind"),
     ):
         path.write_bytes(content)
         with pytest.raises(ValueError, match=rf"^{path}: {problem}.*; .*$") as caught:

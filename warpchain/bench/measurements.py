@@ -9,24 +9,21 @@ kernels. It has `position` (n, 3), x, y [m] and angle [rad] of each link's centr
 
 import itertools
 import math
-import platform
 import statistics
 import tempfile
 import time
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import warp as wp
 
 from warpchain.chain.start_shapes import ellipse, lay_chain
 from warpchain.engine.batch import Batch
-from warpchain.engine.devices import gpu_turn, start_device
-from warpchain.engine.processors import processors
+from warpchain.engine.devices import gpu_turn
+from warpchain.engine.machine import machine_of
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.options import FIBERS, Options, on_gpu
+from warpchain.inputs.options import Options, on_gpu
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.kernels.methods.method import find_method, method_names
 from warpchain.run.progress_bar import SweepProgress
@@ -152,15 +149,8 @@ def walk_rate(device: str, report: Report) -> Row:
 
 
 def machine(device: str) -> dict[str, str]:
-    """Processor, operating system, GPU if the device is one, and versions; an `InputError` if it is not there."""
-    found, listing = start_device(device).warp, Path("/proc/cpuinfo")
-    lines = listing.read_text(encoding="utf-8").splitlines() if listing.exists() else []
-    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    processor = models[0] if models else platform.processor() or platform.machine()
-    about = {"processor": processor, "processors": str(processors()), "system": platform.system()}
-    if on_gpu(device) and device != FIBERS:
-        about |= {"GPU": found.name, "CUDA driver": ".".join(map(str, wp.get_cuda_driver_version()))}
-    return about | package_versions() | {"scipy": version("scipy")}
+    """Processor, system, GPU if the device is one, and versions; an `InputError` if it is not there."""
+    return machine_of([device]) | package_versions() | {"scipy": version("scipy")}
 
 
 def acceleration(position: Array, velocity: Array, parameters: Parameters) -> Array:

@@ -34,7 +34,6 @@ ONE_OF_MANY: Final = "one of many: any small change alters it, typically by 1 to
 """What a single distance is worth, which has two digits."""
 BYTES_ON_DISK: Final = 500
 """Bytes of a walk in its shard, about, without its motion."""
-_OF_PARTS: Final = ("is_there", "is_missing")
 _MOST_CELLS: Final = 1000
 """Most cells of a sweep that a table lists; one of 100,000 would take minutes to lay out."""
 
@@ -80,9 +79,9 @@ def print_sweep(result: "SweepResult", folder: Path | None, as_json: bool) -> No
         manifest = read_manifest(folder)
         part, parts = manifest.part
         if parts > 1:
-            found, left = ([getattr(block, name).ravel() for block in result.blocks.values()] for name in _OF_PARTS)
-            done, own = np.concatenate(found).sum(), (np.concatenate(left) & manifest.mine).sum()
-            print(f"part {part}/{parts}: {done:,} of {done + own:,} walks")
+            missing = np.concatenate([block.is_missing.ravel() for block in result.blocks.values()])
+            done, left = result.walk_count - missing.sum(), (missing & manifest.mine).sum()
+            print(f"part {part}/{parts}: {done:,} of {done + left:,} walks")
     for fault, remedy in FAULTS.items():
         if number := sum(int(block.faults[fault].sum()) for block in result.blocks.values()):
             print(f"{number:,} inaccurate: {remedy}")

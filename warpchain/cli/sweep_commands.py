@@ -1,21 +1,17 @@
 """The commands for sweeps: sweep, compile, info, plot, report and merge."""
 
 import contextlib
-import re
 import sys
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 import typer
 
-from warpchain.cli.walk_commands import FAILED
+from warpchain.cli.walk_commands import FAILED, exit_if_any_failed
 from warpchain.cli.words import JSON, argument, option, output, output_path
 from warpchain.inputs.figure_kinds import KINDS, FigureWord
-
-if TYPE_CHECKING:
-    from warpchain.results.sweep_result import SweepResult
 
 _FILE: Final = "Sweep file, or the bare name of a sweep that comes with warpchain, e.g. figure6."
 _FILES: Final = "Sweep files, or bare names of sweeps that come with warpchain. Default: all of the latter."
@@ -98,7 +94,6 @@ def sweep(
     from warpchain.cli.output import print_sweep
     from warpchain.run.sweep_run import sweep as run
     from warpchain.run.workers import gpu_workers
-    from warpchain.status import Status
 
     if gpus is not None:
         from warpchain.engine.devices import gpu_count
@@ -127,12 +122,7 @@ def sweep(
         print(f"rerun the same command{', without --fresh,' if fresh else ''} to resume the sweep", file=sys.stderr)
         raise
     print_sweep(result, folder, as_json)
-    counts = result.summary()
-    failed = [status for status in Status if not status.ok and counts.get(status.label)]
-    for status in failed:
-        print(f"{counts[status.label]} {status.label}: {status.sentence}", file=sys.stderr)
-    if failed:
-        raise typer.Exit(FAILED)
+    exit_if_any_failed(result)
 
 
 def _errors(given: Sequence[str]) -> dict[str, str] | None:
@@ -197,7 +187,7 @@ def plot(
     kind: Annotated[FigureWord | None, typer.Option(help=_KIND)] = None,
     width: Annotated[
         str | None,
-        option("WIDTH", "Width on paper, such as 85mm for a column: texts have 6 pt at least. Default: as suits."),
+        option("WIDTH", "Width on paper in mm, such as 85mm: texts have 6 pt at least. Default: as suits."),
     ] = None,
     format: Annotated[
         Literal["png", "pdf", "svg"], typer.Option(help="Format of the files. Default: png.", show_default=False)
@@ -211,19 +201,16 @@ def plot(
     from warpchain.cli.output import draw_figures, saved
     from warpchain.files import make_folder
     from warpchain.inputs.validation import InputError, printable
+    from warpchain.inputs.yaml_files import parse_yaml
     from warpchain.pictures.style import on_paper
     from warpchain.pictures.walk_figures import kinds_of
     from warpchain.reports.sweep_figures import figures
+    from warpchain.results.sweep_result import load
     from warpchain.results.walk_result import WalkResult
 
     path, *others = paths
-    paper = None if width is None else _millimetres(width)
-    if others:
-        from warpchain.results.sweep_result import load
-
-        found: WalkResult | SweepResult = load(paths)
-    else:
-        found = saved(path, "use the folder of a sweep, a merged file, or the file of a saved walk")
+    wanted = "use the folder of a sweep, a merged file, or the file of a saved walk"
+    found = load(paths) if others else saved(path, wanted)
     folder = folder or (path.parent if path.is_file() else path)
     is_walk = isinstance(found, WalkResult)
     if is_walk and quantity is not None:
@@ -231,7 +218,7 @@ def plot(
     if not is_walk and kind is not None:
         raise InputError("--kind: not possible for a sweep; remove it, or use the file of a saved walk")
     count = 0
-    with on_paper(paper) as inches:
+    with on_paper(None if width is None else parse_yaml(width.removesuffix("mm"), "width")) as inches:
         if isinstance(found, WalkResult):
             kinds = kinds_of(found) if kind is None else (kind,)
             drawn = draw_figures(found, folder, kinds, format, inches)
@@ -247,16 +234,6 @@ def plot(
             print(printable(str(drawing)))
     if not count:
         raise typer.Exit(FAILED)
-
-
-def _millimetres(text: str) -> float:
-    """A width on paper [mm], given in mm, cm or in; an `InputError` if it is none."""
-    from warpchain.inputs.validation import InputError, shown
-
-    found = re.fullmatch(r"(\d+(?:\.\d*)?) ?(mm|cm|in|)", text.strip())
-    if found is None:
-        raise InputError(f"--width: expected a width such as 85mm, got {shown(text)}; use mm, cm or in")
-    return float(found[1]) * {"mm": 1.0, "cm": 10.0, "in": 25.4, "": 1.0}[found[2]]
 
 
 def report(

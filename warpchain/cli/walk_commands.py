@@ -6,7 +6,7 @@ import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
@@ -14,6 +14,9 @@ from warpchain.chain.keep import FRAME_INTERVAL
 from warpchain.cli.words import JSON, argument, option, output
 from warpchain.inputs.methods import METHODS
 from warpchain.inputs.starts import STARTS
+
+if TYPE_CHECKING:
+    from warpchain.results.sweep_result import SweepResult
 
 FAILED: Final = 1
 """Exit status of a command whose walks failed."""
@@ -131,14 +134,13 @@ def walk(
             raise InputError("preset: missing; set the parameters to start from, e.g. preset: paper")
     elif index is not None:
         raise InputError("--index: --like is missing; add --like DIR, the sweep that has this walk")
+    sections = {name: {**own.get(name, {}), **values} for name, values in given.items()}
     if samples is not None:
-        sections = {name: {**own.get(name, {}), **values} for name, values in given.items()}
         content = {"preset": preset or DEFAULT_PRESET, "samples": samples, "seed": number or 0, **sections}
         return _run_samples(content, folder, as_json)
     if like is not None and base.start is not None:
         setup = continued(base.start, given)
     else:
-        sections = {name: {**own.get(name, {}), **values} for name, values in given.items()}
         setup = resolve(preset or DEFAULT_PRESET, **sections, seed=number, loads=record_joint_forces)
     if folder is None and (frame_interval is not None or record_joint_forces):
         name = "--record-joint-forces" if frame_interval is None else "--frame-interval"
@@ -172,13 +174,10 @@ def walk(
 
 
 def _run_samples(content: Mapping[str, object], folder: Path | None, as_json: bool) -> None:
-    """Run the samples of one walk as a sweep of one cell, and show their mean; with a folder keep them, and a picture.
-
-    The picture has the median walk, run again.
-    """
+    """Run the samples of one walk as a sweep of one cell, and show their mean; a folder keeps them, and a picture."""
     from warpchain.cli.output import print_samples, print_sweep
     from warpchain.inputs.validation import printable
-    from warpchain.reports.samples_picture import median_sample, samples_picture
+    from warpchain.reports.samples_picture import samples_picture
     from warpchain.run.sweep_run import sweep
     from warpchain.status import Status
 
@@ -188,14 +187,21 @@ def _run_samples(content: Mapping[str, object], folder: Path | None, as_json: bo
         print_sweep(result, None, True)
     else:
         print_samples(result)
-    counts = result.summary()
-    if folder is not None and counts[Status.AT_REST.label]:
+    if folder is not None and result.summary()[Status.AT_REST.label]:
         from warpchain.pictures.style import save_figure
 
         path = folder / "samples.png"
-        save_figure(samples_picture(result, result.walk(sample=median_sample(result.dx))), path)
+        save_figure(samples_picture(result), path)
         print(printable(str(path)))
-    failed = [status for status in Status if not status.ok and counts.get(status.label)]
+    exit_if_any_failed(result)
+
+
+def exit_if_any_failed(result: "SweepResult") -> None:
+    """Say on standard error how many walks failed and what to try, and exit, if any did."""
+    from warpchain.status import Status
+
+    counts = result.summary()
+    failed = [status for status in Status if not status.ok and status.label in counts]
     for status in failed:
         print(f"{counts[status.label]} {status.label}: {status.sentence}", file=sys.stderr)
     if failed:

@@ -1,4 +1,4 @@
-"""What ran a walk or a sweep, for the provenance of results: command, system, processor, GPU and its driver."""
+"""What ran a walk, a sweep or `bench`: command, system, processor, GPU and its driver."""
 
 import contextlib
 import os
@@ -9,24 +9,26 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from warpchain.engine.devices import Gpu, start_device
+from warpchain.engine.devices import start_device
 from warpchain.engine.processors import processors
+from warpchain.inputs.options import FIBERS, on_gpu
 
 
 def made_by(devices: Iterable[str]) -> dict[str, str]:
-    """The command of this process without the folders of its program, and what names the machine, without its name.
-
-    The GPUs among some devices are named with their driver; nothing else of the results depends on any of it.
-    """
+    """The provenance of a result: the command of this process without the folders of its program, and the machine."""
     program, *arguments = sys.argv or [""]
+    return {"command": shlex.join([os.path.basename(program) or "python", *arguments])[:1000], **machine_of(devices)}
+
+
+def machine_of(devices: Iterable[str]) -> dict[str, str]:
+    """System, processor, and the GPUs among some devices with their driver; an `InputError` if one is not there."""
     found = {
-        "command": shlex.join([os.path.basename(program) or "python", *arguments])[:1000],
         "system": f"{platform.system()} {platform.release()} {platform.machine()}",
         "processor": f"{_processor()}, {processors()} usable",
     }
-    started = [start_device(device) for device in dict.fromkeys(devices)]
-    if gpus := [device.warp.name for device in started if isinstance(device, Gpu) and device.warp.is_cuda]:
-        found["GPU"] = ", ".join(gpus)
+    gpus = [device for device in dict.fromkeys(devices) if on_gpu(device) and device != FIBERS]
+    if gpus:
+        found["GPU"] = ", ".join(start_device(device).warp.name for device in gpus)
         with contextlib.suppress(OSError, AttributeError):  # of Linux
             text = Path("/proc/driver/nvidia/version").read_text()
             found["driver"] = re.search(r"\d+(\.\d+)+", text)[0]  # type: ignore[index]

@@ -115,12 +115,9 @@ class World:
             if not setup.scene.is_level:
                 World(int(world), self._host, self._caches).set_floor(setup.floor)
 
-    def set_chain(
-        self, parameters: Parameters, links: int, own: LinkValues | None = None, sprocket: float | None = None
-    ) -> None:
-        """Set the chain and the radius of its sprocket [m], by default its parameter; by default, links alternate."""
-        values = vars(parameters) | ({} if sprocket is None else {"sprocket_radius": sprocket})
-        self._set_chain(values, links, own or alternating(parameters, links))
+    def set_chain(self, parameters: Parameters, links: int, own: LinkValues | None = None) -> None:
+        """Set the chain; by default, links alternate."""
+        self._set_chain(vars(parameters), links, own or alternating(parameters, links))
 
     def _set_chain(self, parameters: dict[str, Any], links: int, own: LinkValues) -> None:
         """Set chains: values of parameters by name, numbers or arrays over the worlds, and what links have."""
@@ -248,16 +245,6 @@ class World:
     def losses(self) -> dict[str, float]:
         """Energy [J] lost since loading, by cause."""
         return dict(zip(LOSSES, self._host["state/losses"][self._at].tolist(), strict=True))
-
-    @property
-    def first_sample(self) -> Array:
-        """The sample taken when the run began: (SAMPLE_COLUMNS,), see :mod:`warpchain.kernels.layout`."""
-        return np.array(self._host["state/first_sample"][self._at])
-
-    @property
-    def last_sample(self) -> Array:
-        """The chain's latest sample: (SAMPLE_COLUMNS,), that of the final state if its run has ended."""
-        return np.array(self._host["state/last_sample"][self._at])
 
     def watched(self, row: int) -> Any:
         """An entry of :attr:`State.watch` that is −1 until it is set, and then not negative; NaN while it is not."""

@@ -6,11 +6,9 @@ of `[time, link, x, y]`: an impulse [N s] on the centre of a link at a time [s] 
 """
 
 import json
-import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -19,11 +17,9 @@ from pydantic import Field, Strict
 
 from warpchain.chain.resolution import resolve
 from warpchain.chain.setup import DEFAULT_PRESET, Setup
-from warpchain.engine.processors import processors
-from warpchain.inputs.arrays import Array
 from warpchain.inputs.fields import SECTIONS, by_section
-from warpchain.inputs.validation import InputError, checked, json_value, shown
-from warpchain.live_page.messages import Film, recipes, summary
+from warpchain.inputs.validation import InputError, checked, shown
+from warpchain.live_page.messages import Frames, change_of_velocity, recipes, summary
 from warpchain.pictures.player import player_data
 from warpchain.results.walk_result import WalkResult
 from warpchain.run.single_walk import walk as run_walk
@@ -40,8 +36,6 @@ MOST_NUMBERS: Final = 4_000_000
 """Most coordinates that the page gets of a walk."""
 INTERVAL: Final = 4e-3
 """Time [s] between two frames: one for each picture of a screen, if the walk is played four times slower."""
-MOST_KEPT: Final = 8
-"""Walks that are kept for what is asked next, such as a push."""
 _PUSHES: Final = Annotated[
     list[Annotated[tuple[float, int, float, float], Strict(False)]], Field(min_length=1, max_length=8)
 ]
@@ -61,8 +55,7 @@ class Walker:
 
     sweep: "SweepResult | None" = None
     folder: Path = Path()
-    _kept: dict[str, WalkResult] = field(default_factory=dict)
-    _lock: threading.Lock = field(default_factory=threading.Lock)
+    _last: tuple[str, WalkResult | None] = ("", None)  # what was asked, and the walk, which may be pushed next
 
     def setup(self, asked: Asked) -> tuple[Setup, int | None]:
         """Set-up and seed of a walk without its pushes; an `InputError` refuses it in the words of `warpchain.walk`."""
@@ -94,15 +87,13 @@ class Walker:
 
     def walk(self, asked: Asked, watch: Callable[[Progress], None], record: Mapping[str, Any]) -> WalkResult:
         """The walk of a set-up, pushes included."""
-        key = json.dumps([asked, record], sort_keys=True)
-        with self._lock:
-            if key in self._kept:
-                return self._kept[key]
+        key, (last, found) = json.dumps([asked, record], sort_keys=True), self._last
+        if key == last and found is not None:
+            return found
         if "push" in asked:
             pushes = checked(asked["push"], "push", _PUSHES)
-            earlier: dict[str, Any] = {**asked, "push": pushes[:-1]}
-            if not pushes[:-1]:
-                del earlier["push"]
+            unpushed = {name: value for name, value in asked.items() if name != "push"}
+            earlier = {**unpushed, "push": pushes[:-1]} if pushes[:-1] else unpushed
             before = self.walk(earlier, lambda progress: watch(replace(progress, frame_time=np.empty(0))), record)
             moment, link, *impulse = pushes[-1]
             kick, state = change_of_velocity(before.setup, link, impulse), before.state(moment)
@@ -112,55 +103,38 @@ class Walker:
         else:
             setup, seed = self.setup(asked)
             found = run_walk(setup=setup, seed=seed, on_progress=watch, **record)
-        with self._lock:
-            self._kept[key] = found
-            for name in [*self._kept][:-MOST_KEPT]:
-                del self._kept[name]
+        self._last = key, found
         return found
 
     def play(self, asked: Asked, send: Send, is_gone: IsGone) -> None:
         """Run a walk and send what the page draws: frames as they come, and at the end results and lines to copy."""
         setup, _ = self.setup(asked)
-        watch, film = _watch(is_gone), Film(setup)
+        watch, frames = _watch(is_gone), Frames(setup)
 
         def show(progress: Progress) -> None:
             watch(progress)
-            if film.size > MOST_NUMBERS:
+            if frames.joints.size > MOST_NUMBERS:
                 raise InputError("scene.walk_limit: the walk is too long for a live page; use less, e.g. 10")
-            send({"phase": progress.phase, **film.message(progress)})
+            send({"phase": progress.phase, **frames.message(progress)})
 
         walk = self.walk(asked, show, {"frame_interval": INTERVAL, "record_before": 0.0})
-        kicks = [change_of_velocity(setup, link, impulse) for _, link, *impulse in asked.get("push", [])]
-        said = summary(walk) | recipes(asked, walk, self.folder, kicks)
-        send({"end": said, "whole": player_data(walk) if len(walk.frame_time) else None})
+        send(
+            {
+                "end": summary(walk) | recipes(asked, walk, self.folder),
+                "whole": player_data(walk) if len(walk.frame_time) else None,
+            }
+        )
 
-    def samples(self, setups: Sequence[Asked], first: int, count: int, send: Send, is_gone: IsGone) -> None:
-        """Run samples of the same seeds for each set-up, and send Δx and path of each as it comes."""
-        for name in ("index", "push"):
-            if any(name in asked for asked in setups):
-                raise InputError(f"{name}: not possible with samples; remove it")
-        watch = _watch(is_gone, count * len(setups))
-
-        def run(seed: int, side: int) -> dict[str, Any]:
-            setup, _ = self.setup({**setups[side], "seed": seed})
-            walk = run_walk(setup=setup, seed=seed, frame_interval=None, on_progress=watch)
-            path = np.rint(walk.center[:: max(1, len(walk.center) // 200)] * 1e4).astype(int).tolist()
-            said = {"seed": seed, "side": side, "dx": walk.dx, "status": walk.status.label, "path": path}
-            return dict(json_value(said))
-
-        with ThreadPoolExecutor(processors()) as threads:
-            try:
-                seeds, sides = range(first, first + count), range(len(setups))
-                for each in as_completed([threads.submit(run, seed, side) for seed in seeds for side in sides]):
-                    send({"sample": each.result()})
-            except BaseException:
-                threads.shutdown(wait=False, cancel_futures=True)
-                raise
-        send({"end": {}})
+    def sample(self, asked: Asked, send: Send, is_gone: IsGone) -> None:
+        """Run a walk of which only results and path are sent: x, y in tenths of a millimetre, some 200 of them."""
+        setup, seed = self.setup(asked)
+        walk = run_walk(setup=setup, seed=seed, frame_interval=None, on_progress=_watch(is_gone))
+        path = np.rint(walk.center[:: max(1, len(walk.center) // 200)] * 1e4).astype(int).tolist()
+        send({"end": summary(walk), "path": path})
 
 
-def _watch(is_gone: IsGone, walks: int = 1) -> Callable[[Progress], None]:
-    """What ends walks after their time, without that of compiling kernels, or when they are no longer wanted."""
+def _watch(is_gone: IsGone) -> Callable[[Progress], None]:
+    """What ends a walk after its time, without that of compiling kernels, or when it is no longer wanted."""
     ends: list[float] = []
 
     def watch(progress: Progress) -> None:
@@ -169,17 +143,9 @@ def _watch(is_gone: IsGone, walks: int = 1) -> Callable[[Progress], None]:
         if progress.phase == "compile":
             return
         if not ends:
-            ends.append(time.monotonic() + walks * MOST_SECONDS)
+            ends.append(time.monotonic() + MOST_SECONDS)
         if time.monotonic() > ends[0]:
-            problem = f"more than {walks * MOST_SECONDS:g} s of computing, too much for a live page"
+            problem = f"more than {MOST_SECONDS:g} s of computing, too much for a live page"
             raise InputError(f"scene.walk_limit: {problem}; use less, e.g. 10, or fewer links")
 
     return watch
-
-
-def change_of_velocity(setup: Setup, link: int, impulse: Sequence[float]) -> Array:
-    """Change [m/s] of the velocity x, y of a link's centre by an impulse [N s]; an `InputError` if there is no link."""
-    masses = setup.link_values.mass
-    if not 0 <= link < len(masses):
-        raise InputError(f"push: expected a link of 0 to {len(masses) - 1}, got {link}; use one of them")
-    return np.asarray(np.array(impulse) / masses[link])

@@ -37,12 +37,10 @@ def export_page(folder: Path) -> Path:
     path = checked_output(folder / "index.html", PAGES)
     with ThreadPoolExecutor(processors()) as threads:
         places = [*itertools.product(*(range(len(values)) for values in AXES.values()))]
-        texts = threads.map(_packed, places)
-        elements = [
-            f'<script type="text/plain" id="walk-{"-".join(map(str, place))}">{text}</script>'
-            for place, text in zip(places, texts, strict=True)
-        ]
-    page = live_page(walks=AXES, data="\n".join([_MARK.decode(), *elements])).replace(' nonce="{{nonce}}"', "")
+        names, texts = ["-".join(map(str, place)) for place in places], threads.map(_packed, places)
+        data = json.dumps(dict(zip(names, texts, strict=True)), indent=0)
+    element = f'{_MARK.decode()}\n<script type="application/json" id="walks">{data}</script>'
+    page = live_page(walks=AXES, data=element).replace(' nonce="{{nonce}}"', "")
     write_whole(path, page, PAGES)
     return path
 
@@ -56,6 +54,6 @@ def _packed(place: tuple[int, ...]) -> str:
     whole = player_data(walk)
     joints = np.array(whole["joints"])
     whole["joints"] = [whole["joints"][0], *np.diff(joints, axis=0).tolist()]
-    end = summary(walk) | recipes(asked, walk, Path(), []) | {"wall_time": None}  # equal walks give equal bytes
+    end = summary(walk) | recipes(asked, walk, Path()) | {"wall_time": None}  # equal walks give equal bytes
     content = json.dumps({"end": end, "whole": whole}, separators=(",", ":"), allow_nan=False)
     return base64.b64encode(gzip.compress(content.encode(), 9, mtime=0)).decode()

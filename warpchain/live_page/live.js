@@ -151,10 +151,16 @@ function tell(end) {
   const texts = [["python", end.python], ["command", end.command], ["yaml", end.yaml]].filter(([, text]) => text);
   $("lines").replaceChildren($("lines").firstElementChild, ...texts.flatMap(([name, text]) => [
     make("pre", { id: "line-" + name, textContent: text }),
-    make("button", { textContent: `Copy ${name}`, onclick: () => navigator.clipboard.writeText(text) }),
+    make("button", { textContent: `Copy ${name}`, onclick: () => copy("line-" + name) }),
   ]));
   values = { ...end.values, seed: end.seed };
   showValues();
+}
+
+// By the selection, as the clipboard's own interface is missing where pages come by plain HTTP or are in a frame.
+function copy(id) {
+  getSelection().selectAllChildren($(id));
+  document.execCommand("copy");
 }
 
 // Controls
@@ -315,17 +321,19 @@ player.shown = moment => {
 // Samples: walks of the same seeds for each side
 async function more() {
   const sides = [setup, ...(sideA ? [sideA] : [])].map(({ seed: _, push: __, ...given }) => given);
-  const first = Math.max(-1, ...samples.map(each => each.seed)) + 1, count = 12, mine = new AbortController();
+  const first = Math.max(-1, ...samples.map(each => each.seed)) + 1, mine = new AbortController();
+  const seeds = Array.from({ length: 12 }, (_, i) => first + i);
   sampling = mine;
   const isBusy = on => { $("bar").hidden = $("cancel").hidden = !on; $("more").disabled = on; };
   isBusy(true);
   $("bar").value = 0;
-  await ask("/samples", { setups: sides, first, count }, mine, ({ sample }) => {
-    if (!sample) return;
-    samples.push(sample);
-    $("bar").value += 1 / (count * sides.length);
+  const run = (seed, side) => ask("/sample", { ...sides[side], seed }, mine, ({ end, path }) => {
+    samples.push({ seed, side, path, dx: end.dx });
+    $("bar").value += 1 / (seeds.length * sides.length);
     showSamples();
-  }).catch(refuse);
+  });
+  await Promise.all(seeds.flatMap(seed => sides.map((_, side) => run(seed, side)))).catch(refuse);
+  mine.abort(); // the others, if one is refused
   if (sampling === mine) isBusy(false);
 }
 
@@ -347,8 +355,8 @@ function showSamples() {
 }
 
 // A page without a server: walks that it brings along
-async function unpacked(id) {
-  const bytes = Uint8Array.from(atob($(id).textContent), letter => letter.charCodeAt(0));
+async function unpacked(name) {
+  const bytes = Uint8Array.from(atob(JSON.parse($("walks").textContent)[name]), letter => letter.charCodeAt(0));
   const walk = await new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).json();
   walk.whole.joints.forEach((joints, i, all) => { if (i) all[i] = joints.map((part, k) => part + all[i - 1][k]); });
   return walk;
@@ -361,7 +369,7 @@ function buildChoices() {
     const places = axes.map(([name]) => $(name).value);
     history.replaceState(null, "", "#" + new URLSearchParams(axes.map(([name], i) => [name, places[i]])));
     setup = Object.fromEntries(axes.map(([name, list], i) => [name, list[places[i]]]));
-    const { whole, end } = await unpacked("walk-" + places.join("-"));
+    const { whole, end } = await unpacked(places.join("-"));
     player.load(whole);
     tell(end);
   };

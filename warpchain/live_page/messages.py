@@ -11,57 +11,53 @@ from typing import Any, Final, cast
 import numpy as np
 import yaml
 
-from warpchain.chain.setup import DEFAULT_PRESET, Setup
+from warpchain.chain.setup import Setup
 from warpchain.inputs.arrays import Array
 from warpchain.inputs.fields import SECTIONS, by_section
-from warpchain.inputs.validation import json_value
+from warpchain.inputs.validation import InputError, json_value
 from warpchain.pictures.player import player_data
 from warpchain.results.walk_result import WalkResult
 from warpchain.walks.walk_numbers import WalkNumbers as Walk
 from warpchain.walks.walk_phases import Progress
 
-_OPTIONS: Final = ("links", "frequency", "start")
-"""Fields with an option of their own on the command line of `warpchain walk`, which come first there."""
+_OPTIONS: Final = ("preset", "seed", "links", "frequency", "start")
+"""Names with an option of their own on the command line of `warpchain walk`, which come first there."""
 
 
-class Film:
+class Frames:
     """The frames of a walk that is being computed, for a player."""
 
     def __init__(self, setup: Setup) -> None:
         """Begin without a frame."""
-        self._setup, self._times, self._joints = setup, list[Array](), list[Array]()
-        self._masses = setup.link_values.mass[:, None]
-        self.size = 0
+        self._setup, self._times = setup, np.empty(0)
+        self.joints: Array = np.empty((0, setup.scene.links, 2))
 
     def message(self, progress: Progress) -> dict[str, Any]:
         """What is new: all that a player needs with the first frames, after that more frames and a larger view."""
-        if not len(progress.frame_time):
+        had, setup = len(self._times), self._setup
+        self._times = np.append(self._times, progress.frame_time)
+        if len(self._times) == had:
             return {}
-        is_first, had = not self._times, sum(map(len, self._times))
-        self._times.append(progress.frame_time)
-        self._joints.append(progress.frame_joints[..., :2])
-        self.size += self._joints[-1].size
-        times, joints = np.concatenate(self._times), np.concatenate(self._joints)
-        links = (joints + np.roll(joints, 1, axis=1)) / 2
-        center = (links * self._masses).sum(axis=1) / self._masses.sum()
-        height, setup = progress.sprocket_height, self._setup
-        is_bare = math.isnan(height)
-        walk = SimpleNamespace(
-            setup=setup,
-            time=times,
-            center=center,
-            frame_time=times,
-            frame_joints=joints,
-            joints_lab=None,
-            sprocket_center=None if is_bare else np.array([0.0, height]),
-            sprocket_radius=math.nan if is_bare else setup.contact_radius,
-        )
-        data = player_data(cast(Walk, walk), len(times))
-        if is_first:
-            return {"first": data}
-        moving = {name: data[name][had:] for name in ("time", "joints", "center")}
-        around = {name: data[name] for name in ("view", "marks", "heights", "floor", "places", "stretches")}
-        return {"more": moving | around}
+        self.joints = np.concatenate([self.joints, progress.frame_joints[..., :2]])
+        links = (self.joints + np.roll(self.joints, 1, axis=1)) / 2
+        has_sprocket = not math.isnan(progress.sprocket_height)
+        walk = SimpleNamespace(setup=setup, time=self._times, frame_time=self._times, frame_joints=self.joints)
+        walk.joints_lab, walk.center = None, np.average(links, axis=1, weights=setup.link_values.mass)
+        walk.sprocket_center = np.array([0.0, progress.sprocket_height]) if has_sprocket else None
+        walk.sprocket_radius = setup.contact_radius if has_sprocket else math.nan
+        data = player_data(cast(Walk, walk), len(self._times))
+        moving = {name: data.pop(name) for name in ("time", "joints", "center")}
+        if not had:
+            return {"first": data | moving}
+        return {"more": data | {name: values[had:] for name, values in moving.items()}}
+
+
+def change_of_velocity(setup: Setup, link: int, impulse: Sequence[float]) -> Array:
+    """Change [m/s] of the velocity x, y of a link's centre by an impulse [N s]; an `InputError` if there is no link."""
+    masses = setup.link_values.mass
+    if not 0 <= link < len(masses):
+        raise InputError(f"push: expected a link of 0 to {len(masses) - 1}, got {link}; use one of them")
+    return np.asarray(np.array(impulse) / masses[link])
 
 
 def summary(walk: WalkResult) -> dict[str, Any]:
@@ -73,35 +69,34 @@ def summary(walk: WalkResult) -> dict[str, Any]:
     return cast(dict[str, Any], json_value(said | told))
 
 
-def recipes(asked: Mapping[str, Any], walk: WalkResult, folder: Path, kicks: Sequence[Array]) -> dict[str, str]:
+def recipes(asked: Mapping[str, Any], walk: WalkResult, folder: Path) -> dict[str, str]:
     """Python lines, command line and YAML file that make the same walk; what cannot is empty."""
-    settings = {name: value for name, value in asked.items() if name != "push"}
-    index, seed, preset = (settings.pop(name, None) for name in ("index", "seed", "preset"))
-    fields = {name: settings[name] for name in sorted(settings, key=lambda name: name not in _OPTIONS)}
+    given = {name: asked[name] for name in (*_OPTIONS, *asked) if name in asked and name not in ("index", "push")}
+    given = {name: value for name, value in given.items() if value is not None or name not in ("preset", "seed")}
+    fields = {name: value for name, value in given.items() if name not in ("preset", "seed")}
+    index, pushes = asked.get("index"), asked.get("push", [])
     words = ["warpchain", "walk", *([] if index is None else ["--like", str(folder), "--index", f"{index}"])]
-    for name, value in {"preset": preset, "seed": seed}.items():
-        words += [] if value is None else [f"--{name}", f"{value}"]
-    for name, value in fields.items():
+    for name, value in given.items():
         text = value if isinstance(value, str) else json.dumps(value)
         words += [f"--{name}", text] if name in _OPTIONS else ["--set", f"{name}={text}"]
-    sections = {name: values for name, values in by_section(fields).items() if values}
-    file = yaml.safe_dump({"preset": preset or DEFAULT_PRESET} | sections, sort_keys=False, default_flow_style=None)
-    note = "# warpchain walk --config FILE.yaml" + f" --seed {seed}" * (seed is not None)
+    sections = {"preset": walk.setup.preset} | {name: values for name, values in by_section(fields).items() if values}
+    file = yaml.safe_dump(sections, sort_keys=False, default_flow_style=None)
+    note = "# warpchain walk --config FILE.yaml" + (f" --seed {given['seed']}" if "seed" in given else "")
     if index is not None and fields:  # the fields of the sweep's walk, one by one
-        preset, dumps = walk.setup.preset, [vars(walk.setup)[name].model_dump() for name in SECTIONS]
-        fields = {name: value for dump in dumps for name, value in dump.items()}
-    keywords = {name: value for name, value in {"preset": preset, "seed": seed}.items() if value is not None} | fields
-    made = f"walk({', '.join(f'{name}={value!r}' for name, value in keywords.items())})"
+        dumps = [vars(walk.setup)[name].model_dump() for name in SECTIONS]
+        given = {"preset": walk.setup.preset} | {name: value for dump in dumps for name, value in dump.items()}
+    made = f"walk({', '.join(f'{name}={value!r}' for name, value in given.items())})"
     if index is not None and not fields:
         made = f"load({str(folder)!r}).walk({index})"
     lines = ["import warpchain\n", f"walk = warpchain.{made}"]
-    for (moment, link, *impulse), kick in zip(asked.get("push", []), kicks, strict=True):
+    for moment, link, *impulse in pushes:
+        kick = change_of_velocity(walk.setup, link, impulse).tolist()
         lines += [
             f"state = walk.state({moment!r})",
             "velocity = state.velocity.copy()",
-            f"velocity[{link}, :2] += {kick.tolist()}  # m/s, by an impulse of {impulse} N s",
+            f"velocity[{link}, :2] += {kick}  # m/s, by an impulse of {impulse} N s",
             "walk = warpchain.walk(start=replace(state, velocity=velocity))",
         ]
-    python = "\n".join([*["from dataclasses import replace\n"] * bool(kicks), *lines])
-    command, is_whole = shlex.join(words) if not kicks else "", not kicks and index is None
+    python = "\n".join([*["from dataclasses import replace\n"] * bool(pushes), *lines])
+    command, is_whole = shlex.join(words) if not pushes else "", not pushes and index is None
     return {"python": python, "command": command, "yaml": f"{note}\n{file}" if is_whole else ""}

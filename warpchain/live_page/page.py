@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 FIRST: Final = {"links": 60, "frequency": 15, "start": "spinning"}
 """The first set-up on the page."""
-_EDGES: Final = [[[step / 5, -0.04 * (step - 1)], [step / 5, -0.04 * step]] for step in range(1, 9)]
+_EDGES: Final = [[[step / 5, 0.04 * (1 - step)], [step / 5, -0.04 * step]] for step in range(1, 9)]
 STAIRS: Final = [[-1.0, 0.0], *([x, round(y, 2)] for edge in _EDGES for x, y in edge), [2.0, -0.32]]
 """A floor that falls in eight steps; beyond the last it is level."""
 MOST_CELLS: Final = 2000

@@ -16,11 +16,10 @@ from contextlib import suppress
 from functools import cached_property
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import parse_qs, urlsplit
 
-from pydantic import Field
-
+from warpchain.engine.processors import processors
 from warpchain.inputs.validation import InputError, checked
 from warpchain.live_page.page import FIRST, live_page
 
@@ -30,21 +29,13 @@ if TYPE_CHECKING:
 ADDRESS: Final = "127.0.0.1"
 MOST_BYTES: Final = 65_536
 """Most bytes of a request; a floor of 256 points takes 10 kB."""
-MOST_SAMPLES: Final = 100
-"""Most samples that are asked for at once."""
 MOST_CONNECTIONS: Final = 32
-WALKS_AT_ONCE: Final = 2
-"""Requests whose walks are computed at the same time; others wait."""
 PATIENCE: Final = 20.0
 """Time [s] after which a client that neither sends nor takes anything is given up."""
 _NO_TOKEN: Final = (
     "This address lacks the token of the server. Open the address that `warpchain live` printed; "
     "`warpchain live 'ADDRESS'` opens the set-up of an older one.\n"
 )
-_Setup = dict[str, Any]
-_Setups = Annotated[list[_Setup], Field(min_length=1, max_length=2)]
-_First = Annotated[int, Field(ge=0)]
-_Count = Annotated[int, Field(ge=1, le=MOST_SAMPLES)]
 
 
 class LiveServer(ThreadingHTTPServer):
@@ -64,7 +55,8 @@ class LiveServer(ThreadingHTTPServer):
 
             sweep = load(folder)
         self.token, self.closing = secrets.token_urlsafe(24), threading.Event()
-        self.slots, self._connections = threading.Semaphore(WALKS_AT_ONCE), threading.Semaphore(MOST_CONNECTIONS)
+        self.slots = threading.Semaphore(max(2, processors()))  # of walks at the same time; other requests wait
+        self._connections = threading.Semaphore(MOST_CONNECTIONS)
         self._sweep, self._folder = sweep, folder or Path()
         super().__init__((ADDRESS, port), _Handler)
         self.page, self.url = live_page(sweep), f"http://{ADDRESS}:{self.server_port}/?token={self.token}"
@@ -100,12 +92,9 @@ class LiveServer(ThreadingHTTPServer):
         self.shutdown()
         self.server_close()
 
-    def process_request(self, request: Any, client_address: Any) -> None:
-        """Begin a thread for a connection, unless there are too many."""
-        if self._connections.acquire(blocking=False):
-            super().process_request(request, client_address)
-        else:
-            self.shutdown_request(request)
+    def verify_request(self, request: Any, client_address: Any) -> bool:
+        """Whether there are few enough connections for one more; else it is closed."""
+        return self._connections.acquire(blocking=False)
 
     def process_request_thread(self, request: Any, client_address: Any) -> None:
         """Serve a connection."""
@@ -138,7 +127,7 @@ class _Handler(BaseHTTPRequestHandler):
             self._reply(200, self.server.page.replace("{{nonce}}", nonce), kind)
 
     def do_POST(self) -> None:
-        """A walk, or samples."""
+        """A walk, or a sample without frames."""
         if not self._is_admitted(self.headers.get("X-Token", "")):
             return
         size = self.headers.get("Content-Length", "")
@@ -146,18 +135,13 @@ class _Handler(BaseHTTPRequestHandler):
             self._reply(413, f"A request has a Content-Length, and at most {MOST_BYTES} bytes.\n")
             return
         try:
-            asked = checked(json.loads(self.rfile.read(int(size))), "request", _Setup)
+            asked = checked(json.loads(self.rfile.read(int(size))), "request", dict[str, Any])
             if self.path == "/walk":
                 self._answer(lambda *to: self.server.walker.play(asked, *to))
-            elif self.path == "/samples":
-                setups = checked(asked.get("setups"), "setups", _Setups)
-                first, count = (
-                    checked(asked.get("first"), "first", _First),
-                    checked(asked.get("count"), "count", _Count),
-                )
-                self._answer(lambda *to: self.server.walker.samples(setups, first, count, *to))
+            elif self.path == "/sample":
+                self._answer(lambda *to: self.server.walker.sample(asked, *to))
             else:
-                self._reply(404, "Ask for /walk or /samples.\n")
+                self._reply(404, "Ask for /walk or /sample.\n")
         except (ValueError, RecursionError) as error:  # not JSON, or something else than what is asked for
             self._reply(400, f"{error}\n")
 

@@ -17,16 +17,7 @@ from warpchain.inputs.arrays import Array
 from warpchain.pictures import chain
 from warpchain.pictures.labels import math_symbol, setting
 from warpchain.pictures.places import center_in_room, checked_joints, circle_radii, walk_box
-from warpchain.pictures.style import (
-    DOTS,
-    GROUND,
-    INK,
-    NARROW,
-    InlineFigure,
-    text_scale,
-    tidy,
-    wrapped,
-)
+from warpchain.pictures.style import DOTS, GROUND, INK, NARROW, InlineFigure, text_scale, tidy, wrapped
 from warpchain.status import Status
 from warpchain.walks.walk_numbers import WalkNumbers as Walk
 
@@ -117,13 +108,8 @@ def film_strip(walk: Walk, figure: Figure | None = None, width: float | None = N
         chain.draw_sprocket(axes, walk, walk.frame_time[frame], facecolor="none", edgecolor=colors[frame])
         chain.draw_ground(axes, walk, line, min(bottom, line[:, 1].min()))
         axes.set(xlim=line[[0, -1], 0], ylim=(bottom, bottom + 2 * half_height), yticks=[], xlabel="x / m")
-        axes.set_xticks(
-            [
-                x
-                for x in MaxNLocator(2 if is_narrow else 4).tick_values(*line[[0, -1], 0])
-                if abs(x - spot[0]) < 0.8 * half
-            ]
-        )
+        ticks = MaxNLocator(2 if is_narrow else 4).tick_values(*line[[0, -1], 0])
+        axes.set_xticks(ticks[np.abs(ticks - spot[0]) < 0.8 * half])
         axes.tick_params(labelsize=10.0 * text)
         title = f"{title},{chr(10) if is_narrow else ' '}{walk.frame_time[frame]:.3f} s"
         axes.set_title(title, fontsize="small" if is_narrow else "medium", loc="left")

@@ -171,10 +171,7 @@ def _panels(cells: "CellStatistics", x: str | None, block: str) -> Iterator[Pane
         return table[..., np.newaxis, :] if along is None else table
 
     tables = {name: arranged(getattr(cells, name)) for name in (*labels.SPREADS, "independent", *labels.COUNTS)}
-    texts = [
-        [f"{math_symbol(axis.name)} = {text} {unit_text(axis.name)}".rstrip() for text in short_texts(axis.values)]
-        for axis in others
-    ]
+    texts = [labels.named_values(axis.name, axis.values) for axis in others]
     for place in np.ndindex(*(len(axis.values) for axis in others)):
         title = ", ".join([*[block] * bool(block), *(own[number] for own, number in zip(texts, place, strict=True))])
         here: dict[str, Any] = {name: table[place] for name, table in tables.items()}

@@ -100,6 +100,11 @@ def quantity_text(name: str) -> str:
     return f"{quantity_name(name)} {symbol}" if symbol.startswith("$") else quantity_name(name)
 
 
+def named_values(name: str, values: Sequence[Any] | NDArray[Any]) -> list[str]:
+    """Values of a quantity for a title: ``$n$ = 60``, ``$ν$ = 15 Hz``."""
+    return [f"{math_symbol(name)} = {text} {unit_text(name)}".rstrip() for text in short_texts(values)]
+
+
 def quantity_label(name: str) -> str:
     """Name, symbol and unit of a field, for an axis of a figure."""
     return with_unit(quantity_text(name), unit_text(name))

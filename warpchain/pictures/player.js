@@ -154,7 +154,8 @@ class Player {
     const marks = walk.marks, every = Math.ceil(60 / ((marks[1] - marks[0]) * 1e4 * scale)) || 1;
     [pen.lineWidth, pen.strokeStyle, pen.lineJoin] = [4, colorOf("ground"), "round"];
     for (const mark of marks.filter((_, i) => i % every === 0)) {
-      const place = [mark + " m", shift + (mark * 1e4 - left) * scale, height - 18];
+      const text = mark + " m", half = pen.measureText(text).width / 2, x = shift + (mark * 1e4 - left) * scale;
+      const place = [text, Math.max(half, Math.min(width - half, x)), height - 18]; // nothing is cut off at the edges
       pen.strokeText(...place);
       pen.fillText(...place);
     }

@@ -15,13 +15,7 @@ from numpy.typing import NDArray
 
 from warpchain.inputs.arrays import Array
 from warpchain.pictures.labels import headline
-from warpchain.pictures.places import (
-    checked_joints,
-    circle_radii,
-    sprocket_centers,
-    stretches,
-    walk_box,
-)
+from warpchain.pictures.places import checked_joints, circle_radii, sprocket_centers, stretches, walk_box
 from warpchain.walks.walk_numbers import WalkNumbers as Walk
 
 INNER, OUTER, EDGE = "#9CCBE6", "#0072B2", "#00385A"

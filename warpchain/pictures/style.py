@@ -64,8 +64,6 @@ class Picture(NamedTuple):
         return path
 
 
-FORMATS: Final = ("png", "pdf", "svg")
-"""Formats of files with figures."""
 _USUAL_WIDTH: Final = 7.0
 """Width [inches] from which on texts have their own size."""
 NARROW: Final = 6.0

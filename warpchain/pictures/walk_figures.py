@@ -53,7 +53,7 @@ def draw(
         raise ValueError(f"kind: unknown kind {kind!r}; use {', '.join(map(repr, KINDS))}")
     if KINDS[kind].needs_series and len(walk.time) == 0:
         raise ValueError(f"walk: it has no time series. {walk.status.sentence}")
-    if ax is not None and kind not in _ON_AXES:
+    if ax is not None and kind != "energy":
         raise ValueError(f"ax: {kind} has several axes; use figure= with an empty Figure or SubFigure")
     if ax is not None and figure is not None:
         raise ValueError("ax: not possible with figure; remove one")
@@ -62,7 +62,7 @@ def draw(
     if ax is not None and not isinstance(ax, Axes):
         raise InputError(f"ax: expected matplotlib Axes, got {shown(ax)}")
     if ax is not None:
-        _ON_AXES[kind](walk, ax)
+        _energy(walk, ax)
         return ax.figure.figure if isinstance(ax.figure, SubFigure) else ax.figure
     if kind == "film_strip":
         return film_strip(walk, figure, width)
@@ -260,5 +260,3 @@ _DRAWN_BY: Final[Mapping[str, tuple[Callable[[Walk, Figure], None], _Size]]] = {
     "tilt": (_tilt, _Size(6.4, 5.0, 5.0)),
 }
 """Each figure of `KINDS` but the film strip, which has a size of its own: what draws it, and its size."""
-_ON_AXES: Final = {"energy": _energy}
-"""Those with one pair of axes draw into given ones, too."""

@@ -3,23 +3,19 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from warpchain.inputs.arrays import Array
 from warpchain.pictures.labels import with_error
 from warpchain.pictures.style import BLUE, FAINT, INK, tidy
 from warpchain.results.sweep_result import SweepResult
-from warpchain.results.walk_result import WalkResult
 
 _ROOM = 1.7
 """Height of the panel of distances with its labels [inches]."""
 
 
-def median_sample(dx: Array) -> int:
-    """Number of the sample with the median distance, of an even number the upper one; NaN of failed walks is last."""
-    return int(np.argsort(dx, kind="stable")[np.isfinite(dx).sum() // 2])
-
-
-def samples_picture(result: SweepResult, median: WalkResult) -> Figure:
-    """The picture, given the samples of one cell, some at rest, and the median one with frames."""
+def samples_picture(result: SweepResult) -> Figure:
+    """The picture of the samples of one cell, some at rest; the median one, of two the upper, is run again."""
+    dx, cells = result.dx.ravel(), result.statistics()
+    rested = np.sort(dx[np.isfinite(dx)])
+    median = result.walk(sample=int(np.flatnonzero(dx == rested[len(rested) // 2])[0]))
     figure = median.plot("film_strip")
     width, height = figure.get_size_inches()
     whole = height + _ROOM
@@ -27,14 +23,13 @@ def samples_picture(result: SweepResult, median: WalkResult) -> Figure:
     for axes in figure.axes:  # keep their size and their distance from the top
         left, bottom, across, up = axes.get_position().bounds
         axes.set_position((left, (bottom * height + _ROOM) / whole, across, up * height / whole))
-    dx, cells = result.dx.ravel(), result.statistics()
-    rested, mean, sd = dx[np.isfinite(dx)], cells.mean.item(), cells.sd.item()
+    mean, sd, error = cells.mean.item(), cells.sd.item(), cells.standard_error.item()
     below = figure.add_axes((0.09, 0.5 / whole, 0.885, (_ROOM - 0.9) / whole))
     below.axvspan(mean - sd, mean + sd, color=FAINT, alpha=0.25, linewidth=0, label="± standard deviation")
     below.plot(rested, np.zeros(len(rested)), "|", color=BLUE, markersize=16, label="walks")
-    below.errorbar(mean, 0.0, xerr=cells.standard_error.item(), fmt="o", color=INK, capsize=4, label="mean ± its error")
-    below.set(xlim=(min(0.0, 1.05 * rested.min()), 1.05 * rested.max()), yticks=[], xlabel="Δx / m")
-    text = f"Δx of {len(rested)} walks: {with_error(mean, cells.standard_error.item())} m; above, the median one"
+    below.errorbar(mean, 0.0, xerr=error, fmt="o", color=INK, capsize=4, label="mean ± its error")
+    below.set(xlim=(min(0.0, 1.05 * rested[0]), 1.05 * rested[-1]), yticks=[], xlabel="Δx / m")
+    text = f"Δx of {len(rested)} walks: {with_error(mean, error)} m; above, the median one"
     below.set_title(text, fontsize="medium", loc="left")
     below.legend(frameon=False, fontsize="small", ncols=3, loc="lower left", bbox_to_anchor=(0.0, -0.02))
     tidy(below)

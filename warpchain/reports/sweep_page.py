@@ -139,8 +139,7 @@ def _walk(result: SweepResult, index: int, device: str | None) -> str:
     from warpchain.run.sweep_run import on_device
 
     block, place = result.located(index)
-    if device is not None:
-        block = replace(block, origin=on_device(block.origin, device))
+    block = replace(block, origin=on_device(block.origin, device))
     planned, frames = block.origin.walk(index), block.origin.recording.frames
     cell = cell_values(block.axes, place[:-1])
     names = [f"block {block.name}"] * (len(result.blocks) > 1) + [cell_text(cell)] * bool(cell)

@@ -327,15 +327,11 @@ class BlockResult(Columns):
 
     def named_sets(self, cells: CellStatistics) -> CellStatistics:
         """The statistics of some cells, with parameter sets named by their values, as figures show them."""
-        from warpchain.pictures.labels import math_symbol, short_texts, unit_text
+        from warpchain.pictures.labels import named_values
 
         if POINT not in self.axes:
             return cells
-        units = {name: unit_text(name) for name in self.block.points}
-        texts = [
-            [f"{math_symbol(name)} = {text} {units[name]}".rstrip() for text in short_texts(values)]
-            for name, values in self.block.points.items()
-        ]
+        texts = [named_values(name, values) for name, values in self.block.points.items()]
         names = [", ".join(parts) for parts in zip(*texts[:_MOST_NAMED], strict=True)]
         if len(texts) > _MOST_NAMED or len(set(names)) < len(names):
             names = [f"{number}: {name}" for number, name in enumerate(names)]

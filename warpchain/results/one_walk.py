@@ -10,6 +10,7 @@ from warpchain.chain.keep import FRAME_INTERVAL, LONGEST_INTERVAL, Keep
 from warpchain.chain.setup import Setup
 from warpchain.engine.devices import gpu_turn
 from warpchain.engine.machine import made_by
+from warpchain.files import now
 from warpchain.inputs.validation import InputError, checked
 from warpchain.kernels.methods.method import find_method
 from warpchain.results.walk_result import WalkResult
@@ -49,7 +50,7 @@ def run_walk(
     report = on_progress or (lambda progress: None)
     with gpu_turn([setup.options.device]):
         compile_kernels([setup], on_compile=lambda: report(Progress("compile", 0.0, 0.0, 0)))
-        started, started_at = time.perf_counter(), time.strftime("%Y-%m-%dT%H:%M:%S%z")
+        started, date = time.perf_counter(), now()
         (((_, run),),) = run_setups([setup], keeps=[keep], watch=lambda run: report(run.progress()))
         return WalkResult(
             **vars(run.outcome()),
@@ -57,6 +58,6 @@ def run_walk(
             setup=setup,
             seed=seed,
             versions=package_versions(),
-            provenance=made_by([setup.options.device]) | {"date": started_at},
+            provenance=made_by([setup.options.device]) | {"date": date},
             wall_time=time.perf_counter() - started,
         )

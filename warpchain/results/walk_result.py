@@ -201,13 +201,13 @@ class WalkResult(WalkNumbers):
         import pandas
 
         columns: dict[str, Any] = {}
-        for name in (name for name, each in MOTION.items() if each.shape in ("t", "t 2") and name != "time"):
+        for name in (name for name, each in MOTION.items() if each.shape in ("t", "t 2")):
             values = getattr(self, name)
-            if values.ndim == 1:
-                columns |= {name: values} if len(values) == len(self.time) else {}
-            else:
+            if values.ndim == 2:
                 columns |= {f"{name}_{axis}": values[:, place] for place, axis in enumerate("xy")}
-        return pandas.DataFrame(columns, pandas.Index(self.time, name="time"))
+            elif len(values) == len(self.time):  # else the plane is fixed
+                columns[name] = values
+        return pandas.DataFrame(columns).set_index("time")
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the walk to an HDF5 file, whole or not at all; an older file of that name is replaced.

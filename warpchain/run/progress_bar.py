@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from datetime import timedelta
-from typing import Protocol, TextIO
+from typing import TextIO
 
 from warpchain.walks.walk_phases import Progress
 
@@ -63,16 +63,9 @@ def counts_text(progress: SweepProgress) -> str:
     return ", ".join(texts + [f"{progress.inaccurate} inaccurate"] * (progress.inaccurate > 0))
 
 
-class Show(Protocol):
-    """Shows a text, see `changing_line`."""
-
-    def __call__(self, text: str, urgent: bool = False) -> None:
-        """Show it."""
-
-
 @contextlib.contextmanager
-def changing_line(in_terminals: bool = True, every: float = math.inf) -> Iterator["Show"]:
-    """Yield a function that shows a text in the place of the one before.
+def changing_line(in_terminals: bool = True, every: float = math.inf) -> Iterator[Callable[..., None]]:
+    """Yield a function `show(text, urgent=False)` that shows a text in the place of the one before.
 
     Without a terminal and a notebook it prints a line on standard error, so often [s], by default never, and at once if
     the text is urgent and a new one. Threads may call it at the same time.

@@ -155,7 +155,7 @@ def _checked_call(
 
     def plan() -> Sweep:
         planned = load_sweep(source, **replaced) if source is not None else sweep_of_keywords(settings, out)
-        return planned if device is None else on_device(planned, device)
+        return on_device(planned, device)
 
     problems, found = list[str](), list[Any]()
     unsaid = {name for name in (*FILE_KEYS, *MAY_BE_NONE) if given.get(name) is None}
@@ -273,7 +273,7 @@ def compile_sweep(source: Source, device: str | None = None, on_compile: Callabl
 
     If any is missing there `on_compile` is called before, perhaps several times.
     """
-    planned = load_sweep(source) if device is None else on_device(load_sweep(source), device)
+    planned = on_device(load_sweep(source), device)
     kinds = kinds_of_kernels(planned)
     for name in {setup.options.device for setup in kinds}:
         start_device(name)
@@ -281,12 +281,14 @@ def compile_sweep(source: Source, device: str | None = None, on_compile: Callabl
     return planned
 
 
-def on_device(planned: Sweep, device: str) -> Sweep:
-    """The same sweep on another device; a method that was named by need is what this means there.
+def on_device(planned: Sweep, device: str | None) -> Sweep:
+    """The same sweep on another device, if one is given; a method that was named by need is what this means there.
 
     The canonical form, in which a folder keeps its sweep, names the method itself, so that the sweep is run again with
     the same method on any device. An `InputError` says that the sweep's grid goes over devices.
     """
+    if device is None:
+        return planned
     if any("device" in block.varied for block in planned.blocks):
         raise InputError(f"device: {device} is not possible with device as an axis of the grid; remove one")
     validated(Options, {"device": device}, "options")

@@ -5,24 +5,19 @@ versions, and an action for each run with its command, its times and its machine
 byte for equal sweeps, like log.txt. What somebody adds to it, such as authors and a licence, stays there.
 """
 
-import datetime
 import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from warpchain.files import AnyPath, naming, write_whole
+from warpchain.files import AnyPath, naming, now, write_whole
 from warpchain.hdf5_files import SWEEP_FILE
 from warpchain.inputs.validation import InputError
 from warpchain.store.shards import CRATE, Manifest
 
-_CONTEXT: Final = "https://w3id.org/ro/crate/1.1/context"
+_PROFILE: Final = "https://w3id.org/ro/crate/1.1"
+_PARTS: Final = {SWEEP_FILE: "File", "sweep.yaml": "File", "shards/": "Dataset"}
 _RUN: Final = "#run-"
-
-
-def now() -> str:
-    """The time in the notation of ISO 8601, to a second."""
-    return datetime.datetime.now().astimezone().isoformat(timespec="seconds")
 
 
 def entities(directory: AnyPath) -> dict[str, dict[str, Any]]:
@@ -48,36 +43,35 @@ def write_crate(directory: Path, manifest: Manifest, run: Mapping[str, str], *, 
 
     `run` has the command of the run, and what names its machine. An `OSError` says that the file cannot be written.
     """
-    known, moment = entities(directory), now()
-    names = [name for name in known if name.startswith(_RUN)]
+    graph, moment = entities(directory), now()
+
+    def put(entity: str, kind: str, **values: Any) -> None:
+        graph[entity] = {**graph.get(entity, {}), "@id": entity, "@type": kind, **values}
+
+    names = [name for name in graph if name.startswith(_RUN)]
     if is_over and names:
-        known[names[-1]]["endTime"] = moment
+        graph[names[-1]]["endTime"] = moment
     else:
         names.append(f"{_RUN}{len(names) + 1}")
         machine = "; ".join(f"{name}: {value}" for name, value in run.items() if name != "command")
-        known[names[-1]] = {
-            **{"@id": names[-1], "@type": "CreateAction", "name": run["command"], "description": machine},
-            **{"startTime": moment, "instrument": {"@id": "#warpchain"}},
-            **{"object": {"@id": "sweep.yaml"}, "result": [{"@id": SWEEP_FILE}, {"@id": "shards/"}]},
-        }
-    versions = ", ".join(f"{name} {version}" for name, version in manifest.versions.items())
-    parts = {SWEEP_FILE: "File", "sweep.yaml": "File", "shards/": "Dataset"}
-    most = "at most " * manifest.sweep.has_rounds
-    walks = f"{most}{manifest.sweep.walk_count:,} walks of roller chains, simulated by warpchain"
-    ours: dict[str, dict[str, Any]] = {
-        CRATE: {
-            **{"@type": "CreativeWork", "about": {"@id": "./"}},
-            "conformsTo": {"@id": _CONTEXT.removesuffix("/context")},
-        },
-        "./": {"@type": "Dataset", "name": manifest.sweep.name, "description": walks, "datePublished": moment[:10]},
-        **{name: {"@type": kind, "name": name} for name, kind in parts.items()},
-        "#warpchain": {
-            **{"@type": "SoftwareApplication", "name": "warpchain", "softwareRequirements": versions},
-            "softwareVersion": manifest.versions.get("warpchain", "unknown"),
-        },
-    }
-    found = {name: {**known.pop(name, {}), "@id": name, **own} for name, own in ours.items()}
-    found["./"] |= {"hasPart": [{"@id": name} for name in parts], "mentions": [{"@id": name} for name in names]}
-    content = {"@context": _CONTEXT, "@graph": [*found.values(), *known.values()]}
-    text = json.dumps(content, indent=1, ensure_ascii=False) + "\n"
-    write_whole(directory / CRATE, text)
+        used: dict[str, Any] = {"instrument": _id("#warpchain"), "object": _id("sweep.yaml")}
+        used["result"] = [_id(SWEEP_FILE), _id("shards/")]
+        put(names[-1], "CreateAction", name=run["command"], description=machine, startTime=moment, **used)
+    walks = f"{manifest.sweep.walk_count:,} walks of roller chains, simulated by warpchain"
+    if manifest.sweep.has_rounds:
+        walks = f"at most {walks}"
+    put(CRATE, "CreativeWork", about=_id("./"), conformsTo=_id(_PROFILE))
+    put("./", "Dataset", name=manifest.sweep.name, description=walks, datePublished=moment[:10])
+    put("./", "Dataset", hasPart=list(map(_id, _PARTS)), mentions=list(map(_id, names)))
+    for name, kind in _PARTS.items():
+        put(name, kind, name=name)
+    needed = ", ".join(f"{name} {version}" for name, version in manifest.versions.items())
+    own = manifest.versions.get("warpchain", "unknown")
+    put("#warpchain", "SoftwareApplication", name="warpchain", softwareVersion=own, softwareRequirements=needed)
+    content = {"@context": f"{_PROFILE}/context", "@graph": list(graph.values())}
+    write_whole(directory / CRATE, json.dumps(content, indent=1, ensure_ascii=False) + "\n")
+
+
+def _id(name: str) -> dict[str, str]:
+    """A reference to an entity."""
+    return {"@id": name}

@@ -14,7 +14,6 @@ A sweep grows when its file is given more samples: the shards that are there sta
 between two of these lines, the next `SweepFolder.open` resumes from there.
 """
 
-import datetime
 import re
 import warnings
 from collections.abc import Callable
@@ -28,7 +27,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from warpchain.files import AnyPath, given_path, make_folder, naming, remove_output, write_whole
+from warpchain.files import AnyPath, given_path, make_folder, naming, now, remove_output, write_whole
 from warpchain.hdf5_files import SWEEP_FILE, WALK_FILE, claims_to_be
 from warpchain.inputs.validation import ChangedFileError, DamagedFileError, InputError, InputWarning
 from warpchain.store import shards
@@ -108,9 +107,8 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
     def log(self, text: str) -> None:
         """Add a line with the time to log.txt; an `OSError` if it cannot be written."""
         path = self.directory / "log.txt"
-        now = datetime.datetime.now().astimezone().isoformat(timespec="seconds")
         with naming(path), open(path, "a", encoding="utf-8") as file:
-            file.write(f"{now}  {text}\n")
+            file.write(f"{now()}  {text}\n")
 
     def missing(self) -> list[Shard]:
         """The shards that are not there yet, in order, with `until` those of a round; errors as of `read_rows`."""

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.sweeps.block import Block
+from warpchain.sweeps.until import LEAST_GROUPS
 from warpchain.walks.cell_statistics import CellStatistics
 from warpchain.walks.rows import MISSING, Rows, derived_columns
 
@@ -56,9 +57,10 @@ class Asked:
                 column = derived[name] if name in derived else columns[name]
                 column = np.reshape(column, status.shape)[at, :size]
                 cells = CellStatistics.of({}, "", column, status[at, :size], block.groups[:size])
-                enough &= target.is_reached(cells)
+                most = target.most(cells.mean)
+                enough &= (cells.independent >= LEAST_GROUPS) & (cells.standard_error <= most)
                 with np.errstate(divide="ignore", invalid="ignore"):
-                    more = np.maximum(more, (cells.standard_error / target.most(cells)) ** 2)  # NaN stays
+                    more = np.maximum(more, (cells.standard_error / most) ** 2)  # NaN stays
                 vain |= (cells.count == 0) & (size >= MOST_IN_VAIN)
             reached[at], over[at] = enough, enough | vain
             going[at] = ~over[at]

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.inputs.validation import InputError, shown, suggestion
-from warpchain.walks.cell_statistics import CellStatistics
 from warpchain.walks.rows import COLUMNS
 
 LEAST_GROUPS: Final = 8
@@ -30,13 +29,9 @@ class Target:
     error: float
     is_relative: bool
 
-    def is_reached(self, cells: CellStatistics) -> NDArray[np.bool_]:
-        """Whether the mean of each cell has it. A mean of zero never has a relative one, unless all walks are alike."""
-        return np.asarray((cells.independent >= LEAST_GROUPS) & (cells.standard_error <= self.most(cells)))
-
-    def most(self, cells: CellStatistics) -> NDArray[np.float64]:
-        """The error in the unit of the column, for the mean of each cell."""
-        return self.error * np.abs(cells.mean) if self.is_relative else np.full(cells.mean.shape, self.error)
+    def most(self, mean: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The error that each of some means is to have, in the unit of the column; a relative one of zero is zero."""
+        return self.error * np.abs(mean) if self.is_relative else np.full(mean.shape, self.error)
 
     def canonical(self) -> float | str:
         """Its form in a sweep file, in SI units."""

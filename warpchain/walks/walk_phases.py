@@ -138,7 +138,7 @@ class WalkRun:
 
     def progress(self) -> Progress:
         """Where the walk is."""
-        now, sample = self.world.time, self.world.last_sample
+        now, sample = self.world.time, self.world.state("last_sample")
         counts = self.world.counts
         attempts = int(_attempts_before([self])[0]) + counts["accepted"] + counts["rejected"]
         if self.is_released:

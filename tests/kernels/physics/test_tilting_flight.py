@@ -95,7 +95,7 @@ def test_flight_keeps_energy_and_momenta_in_the_room(gravity):
     expected = turning(start) + np.cross(path, weight)
     assert_allclose(turning(end), expected, atol=1e-9 * np.linalg.norm(expected), rtol=0)
     # what the kernel's own sample says
-    sample = flight.worlds[0].last_sample
+    sample = flight.worlds[0].state("last_sample")
     assert sample[[layout.KINETIC, layout.GRAVITATIONAL, layout.SPRING]].sum() == pytest.approx(energy(end), rel=1e-13)
     room = mass @ tilting_plane.room_position(end[0], end[2]) / mass.sum()
     assert_allclose(sample[[layout.CENTER_X, layout.CENTER_Y, layout.CENTER_Z]], room, atol=1e-15)
