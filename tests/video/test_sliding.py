@@ -45,8 +45,8 @@ def test_slow_loops_are_known_less() -> None:
         ({"time": EXACT.time - 0.012}, video.Camera(), "expected free fall .*; check unit, fps and release"),
         ({"time": EXACT.time * 8}, video.Camera(fps=30), "expected free fall .*; check unit, fps and release"),
         ({"center": EXACT.center * [-1, 1]}, video.Camera(), r"direction: .* backwards; use the other direction"),
-        ({"time": np.where(EXACT.time > 0.3, np.nan, EXACT.time)}, video.Camera(), r"video\.time: expected finite numbers"),
-        ({"center": np.where(EXACT.center < 0, np.inf, EXACT.center)}, video.Camera(), r"video\.center: expected finite numbers"),
+        ({"time": np.where(EXACT.time > 0.3, np.nan, EXACT.time)}, video.Camera(), r"time: expected finite"),
+        ({"center": np.where(EXACT.center < 0, np.inf, EXACT.center)}, video.Camera(), r"center: expected finite"),
         ({"center": EXACT.center[1:]}, video.Camera(), r"video\.center: expected shape"),
         ({"time": EXACT.time * 1.02}, video.Camera(), r"camera\.fps: .* 235\.3 frames per second, got 240"),
         (
