@@ -130,7 +130,7 @@ def test_content_of_a_sweep(content: Any) -> None:
 def test_command_lines(monkeypatch: pytest.MonkeyPatch, words: list[tuple[str, str]], more: list[str]) -> None:
     """`--set NAME=VALUE` comes to the walk, or ends in one line with exit status 2."""
 
-    def begin(setups: Any) -> Any:
+    def begin(setups: Any, on_compile: Any) -> Any:
         raise SystemExit(0)
 
     monkeypatch.setattr(one_walk, "compile_kernels", begin)

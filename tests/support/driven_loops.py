@@ -60,7 +60,8 @@ def hold(
     scene = setup.scene
     batch = Batch(1, scene.links, setup.options, keep=Keep(series_every=1, frame_every=1))
     other = replace(setup, parameters=parameters)
-    batch.worlds[0].set_chain(parameters, scene.links, own, other.contact_radius)
+    touched = parameters.with_values({"sprocket_radius": other.contact_radius})
+    batch.worlds[0].set_chain(touched, scene.links, own)
     softness = 1.0 if setup.options.soften_drive else 0.0
     batch.worlds[0].load(
         loop.position, loop.velocity, stop_time=duration, stop_status=Status.NOT_STEADY, softness=softness

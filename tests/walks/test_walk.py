@@ -151,8 +151,7 @@ def test_progress_goes_through_all_phases():
     reports = []
     walk = soft_walk(on_progress=reports.append)
     phases = [phase for phase, _ in itertools.groupby(report.phase for report in reports)]
-    assert phases[0] == "compile"
-    assert [phase for phase in phases if phase != "compile"] == ["settle", "spin up", "hold", "walk"]
+    assert phases[phases[0] == "compile" :] == ["settle", "spin up", "hold", "walk"]  # kernels may be compiled already
     attempts = [report.attempts for report in reports]
     assert attempts == sorted(attempts) and attempts[-1] == walk.steps_accepted + walk.steps_rejected
     for _, group in itertools.groupby(reports, key=lambda report: report.phase == "walk"):
