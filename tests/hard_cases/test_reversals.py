@@ -5,6 +5,7 @@ an impact reverse a joint.
 """
 
 import numpy as np
+import pytest
 
 import warpchain
 from tests.hard_cases.starts import PAPER, struck_loop
@@ -29,6 +30,7 @@ def spins_after(method: str, tolerance: float) -> np.ndarray:
     return np.array(found)
 
 
+@pytest.mark.thorough
 def test_fehlberg_errs_far_more_than_others_where_joints_reverse() -> None:
     """Smaller tolerances help `rkf78` little and `dp5` much, with which SciPy on the NumPy model agrees."""
     true = spins_after("dp5", 1e-13)

@@ -144,7 +144,7 @@ def test_a_sum_of_powers_is_found_and_predicts_what_it_has_not_seen() -> None:
         assert np.all(candidates.block_errors(points, free, block) < 1e-3)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_the_command_draws_and_writes_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """From the committed files it draws all figures and writes the committed page."""
     page = (run.FOLDER / "README.md").read_text(encoding="utf-8")

@@ -70,6 +70,7 @@ def test_a_walk_down_a_steep_slope_ends_by_its_distance():
     assert walk.center[-1, 0] >= 0.5 * np.cos(np.radians(30)) > walk.center[-3, 0]
 
 
+@pytest.mark.thorough
 def test_a_loop_wider_than_the_hanging_chain_starts_outside_of_walls():
     """Between walls that the hanging chain clears the spinning one is raised until no circle is in one."""
     walls = [[-1, 0.2], [-0.068, 0.2], [-0.068, 0], [0.068, 0], [0.068, 0.2], [1, 0.2]]

@@ -128,7 +128,10 @@ def test_seed_repeats_its_sample():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("links", "start", "expected"), [(60, "spinning", 1.072), (120, "rest", 0.596)])
+@pytest.mark.parametrize(
+    ("links", "start", "expected"),
+    [(60, "spinning", 1.072), pytest.param(120, "rest", 0.596, marks=pytest.mark.thorough)],
+)
 def test_walks_of_stationary_loops_end_where_an_independent_program_has_them(links, start, expected):
     """At 20 Hz the mean of 40 samples is that of loops held for 30 s by another program, to 5 %, four standard errors.
 

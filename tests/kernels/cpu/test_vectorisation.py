@@ -57,7 +57,7 @@ def remarks_by_function(
 @pytest.mark.parametrize(
     ("method", "fixed_body", "tilts", "precision"),
     [
-        ("dp5", "sprocket", False, "double"),
+        pytest.param("dp5", "sprocket", False, "double", marks=pytest.mark.thorough),
         ("hybrid", "floor", False, "mixed"),
         ("dp5", "floor", True, "mixed"),
     ],

@@ -47,9 +47,9 @@ pytestmark = pytest.mark.usefixtures("without_fused_operations")
 @pytest.mark.parametrize(
     ("method", "fixed_body", "self_contact", "block_dim", "precision"),
     [
-        ("bs32", "floor", False, LINKS, "double"),
+        pytest.param("bs32", "floor", False, LINKS, "double", marks=pytest.mark.thorough),
         ("rkf78", "floor", False, LINKS, "double"),
-        ("os32", "sprocket", True, 5 * LINKS, "double"),
+        pytest.param("os32", "sprocket", True, 5 * LINKS, "double", marks=pytest.mark.thorough),
         ("os32", "terrain", False, LINKS, "mixed"),
         ("os32", "sprocket", True, 5 * LINKS, "mixed"),
     ],
@@ -265,7 +265,11 @@ def compiles_for_gpus(folder: Path, features: Features, block_dim: int, *generat
 
 @pytest.mark.parametrize(
     ("fixed_body", "moves", "generations"),
-    [("sprocket", False, (80, 90)), ("terrain", False, (80,)), ("floor", True, (90,))],
+    [
+        ("sprocket", False, (80, 90)),
+        pytest.param("terrain", False, (80,), marks=pytest.mark.thorough),
+        pytest.param("floor", True, (90,), marks=pytest.mark.thorough),
+    ],
 )
 def test_a_kernel_compiles_for_gpus(tmp_path: Path, fixed_body: str, moves: bool, generations: tuple[int, ...]) -> None:
     """That of the drive compiles for sm_80 and sm_90; those of a profile and of a moving sprocket for one of these."""

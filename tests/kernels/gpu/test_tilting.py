@@ -81,6 +81,7 @@ def test_cuts_change_no_bit() -> None:
         np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.thorough
 def test_it_compiles_for_gpus(tmp_path: Path) -> None:
     """The kernel of a tilting walk compiles for the newer GPUs."""
     compiles_for_gpus(

@@ -58,10 +58,10 @@ def pull(position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
     ("method", "device", "tolerance", "within"),
     [
         ("dp5", "cpu", 1e-10, 2e-8),
-        ("dp5", "cpu", 1e-5, 1e-5),
-        ("os32", "fibers", 1e-10, 2e-8),
+        pytest.param("dp5", "cpu", 1e-5, 1e-5, marks=pytest.mark.thorough),
+        pytest.param("os32", "fibers", 1e-10, 2e-8, marks=pytest.mark.thorough),
         ("os32", "fibers", 1e-5, 1e-5),
-        pytest.param("hybrid", "cpu", 1e-10, 2e-8, marks=pytest.mark.slow),
+        pytest.param("hybrid", "cpu", 1e-10, 2e-8, marks=pytest.mark.thorough),
     ],
 )
 def test_a_load_of_a_script_acts_in_every_stage(
