@@ -95,7 +95,9 @@ class Kink(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StationaryLoop:
-    """The mean loop, as functions of the arc length s at g points; signs as in the module's docstring.
+    """Mean shape and forces of the loop on the sprocket just before the release; `walk.mean_loop()` returns it.
+
+    All quantities are functions of the arc length s at g points; their signs are those of the module's docstring.
 
     Attributes:
         parameters: parameters of the chain, with the friction smoothing that its joints had on the sprocket.

@@ -39,7 +39,10 @@ ENERGIES: Final = {
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Outcome:
-    """The numbers of one walk; units and meanings stand beside them."""
+    """The numbers of one walk, with their units and meanings.
+
+    `outcomes_of` makes them when a walk ends; columns of sweeps, files and the reference have the same fields.
+    """
 
     status: Status
     dx: Annotated[
