@@ -43,7 +43,7 @@ VALUE_TOTALS, VALUE_DRAG = 7, 22
 VALUES = 23
 BOARD_ROWS = 26
 
-# State.watch. Of each watched quantity of a loop on its sprocket, in the order of WATCHED_COLUMNS: the sum over the
+# Worlds.watch. Of each watched quantity of a loop on its sprocket, in the order of WATCHED_COLUMNS: the sum over the
 # samples of a window, and the least and the greatest mean of a window.
 WINDOW_START, WINDOW_COUNT, WINDOW_SUMS, STEADY_SINCE, RANGES = 0, 1, 2, 7, 8
 LOOP_HEIGHT, LOOP_WIDTH, LOOP_X, LOOP_Y, LOOP_ALONG = range(5)
@@ -58,7 +58,7 @@ COLLAPSED_AT, COLLAPSE_BOUNCES, COLLAPSE_FLIGHT = 30, 31, 32
 STRANDS_MET_AT, STRANDS_MET_BOUNCES, STRANDS_MET_FLIGHT = 33, 34, 35
 WATCH_ROWS = 36
 
-# State.plane. First the plane itself: lateral speed u [m/s], rates ω1, ω2 [rad/s] about e1 and e2, the components of
+# Worlds.plane. First the plane itself: lateral speed u [m/s], rates ω1, ω2 [rad/s] about e1 and e2, the components of
 # the room's X and Y axes along e1, e2, e3, and the room's coordinates of the plane's origin [m].
 PLANE_SPEED, PLANE_TURN_X, PLANE_TURN_Y = 0, 1, 2
 AHEAD, UP, ORIGIN = 3, 6, 9
@@ -76,7 +76,7 @@ INVERSE_00, INVERSE_01, INVERSE_02, INVERSE_11, INVERSE_12, INVERSE_22 = range(3
 MOMENTUM, START_XX, RATE_XX, MEAN_RATE_XX = 39, 42, 45, 48
 PLANE_ROWS = 51
 
-# State.counts
+# Worlds.counts
 ACCEPTED, REJECTED, FLOOR_IMPULSES, SPROCKET_IMPULSES, SELF_IMPULSES, BOUNCES, LIST_BUILDS, STRAND_IMPULSES = range(8)
 COUNT_ROWS = 8
 
@@ -84,15 +84,15 @@ COUNT_ROWS = 8
 # 12 to 20 the first touch of long chains comes at the same time.
 STRANDS_APART = 16
 
-# State.extremes
+# Worlds.extremes
 OPENING, FLOOR_DEPTH, SPROCKET_DEPTH, SELF_DEPTH = range(4)
 EXTREME_ROWS = 4
 
-# State.losses
+# Worlds.losses
 LOSS_FRICTION, LOSS_DAMPING, LOSS_FLOOR, LOSS_SPROCKET, LOSS_SELF, LOSS_SOFTENING, LOSS_JOINT_SWITCH = range(7)
 LOSS_ROWS = 7
 
-# Record.samples, State.first_sample, State.last_sample
+# Record.samples, Worlds.first_sample, Worlds.last_sample
 TIME, CENTER_X, CENTER_Y, CENTER_U, CENTER_V = range(5)
 KINETIC, GRAVITATIONAL, SPRING, LOWEST, RMS_SPEED = range(5, 10)
 HEIGHT, WIDTH, LOOP_SPEED = 10, 11, 12

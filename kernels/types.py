@@ -3,7 +3,6 @@
 World (one chain instance) is always axis 0. W: number of worlds; n: links of a world (``link_count``); N: greatest n.
 """
 
-from collections.abc import Callable
 from typing import Any
 
 import warp as wp
@@ -102,45 +101,6 @@ class Drive:
 
 
 @wp.struct
-class State:
-    """What changes during a run. Shapes (W,) unless given.
-
-    A run is bit-identical however it is cut into launches: all that the step loop needs for the next attempt is kept
-    here and in the chain's scratch, which belongs to its world until the run ends.
-    """
-
-    links: wp.array3d(dtype=wp.float64)  # (W, 6, N): x, y [m], θ [rad], and their rates
-    time: wp.array(dtype=wp.float64)  # [s]
-    stop_time: wp.array(dtype=wp.float64)  # the run ends at exactly this time [s]
-    stop_status: wp.array(dtype=wp.int32)  # status of a run that ends there
-    is_fresh: wp.array(dtype=wp.int32)  # 1: the host has set the links, and the scratch is void
-    # 1: the scratch holds the first stage of the next step; on a CPU 2: and its rounded state, see :mod:`cpu.joints`
-    has_first_stage: wp.array(dtype=wp.int32)
-    gap: wp.array(dtype=wp.float64)  # CPU: least distance to floor or sprocket [m]
-    time_to_contact: wp.array(dtype=wp.float64)  # GPU: longest step that cannot miss a contact [s]
-    slack: wp.array(dtype=wp.float64)  # CPU: how far joints may move before the neighbour list is stale [m]
-    step: wp.array(dtype=wp.float64)  # proposed next step [s]
-    last_error: wp.array(dtype=wp.float64)  # error ratio of the last accepted step (PI controller)
-    is_rigid: wp.array(dtype=wp.int32)  # 1: joints are rigid, see cpu.implicit.flights
-    other_step: wp.array(dtype=wp.float64)  # last step proposed for the other model of the joints [s]
-    closing_time: wp.array(dtype=wp.float64)  # earliest time at which joints may close [s]
-    next_sample: wp.array(dtype=wp.int64)  # index of the next sample mark
-    next_frame: wp.array(dtype=wp.int64)  # index of the next frame mark; −1: frames are taken with samples
-    status: wp.array(dtype=wp.int32)
-    watch: wp.array2d(dtype=wp.float64)  # (W, WATCH_ROWS): memory of the watches
-    plane: wp.array2d(dtype=wp.float64)  # (W, PLANE_ROWS): the plane of the chain, if it tilts, see layout
-    softness: wp.array(dtype=wp.float64)  # of the joints: 0 the model's own, 1 soft, 2 softest; see events.softening
-    load_factor: wp.array(dtype=wp.float64)  # of loads on the sprocket, see physics.scaled_loads
-    first_area: wp.array(dtype=wp.float64)  # area inside the loop when its run began [m²]
-    attempts_before: wp.array(dtype=wp.int64)  # attempts of the walk's earlier phases, which its limit includes
-    first_sample: wp.array2d(dtype=wp.float64)  # (W, ALL_COLUMNS): the sample taken when the run began
-    last_sample: wp.array2d(dtype=wp.float64)  # the latest, in the end that of the final state
-    counts: wp.array2d(dtype=wp.int64)  # (W, COUNT_ROWS)
-    extremes: wp.array2d(dtype=wp.float64)  # (W, EXTREME_ROWS) [m]
-    losses: wp.array2d(dtype=wp.float64)  # (W, LOSS_ROWS) [J]
-
-
-@wp.struct
 class Record:
     """Time series, which the host drains between launches. A full one ends the launch; nothing is dropped."""
 
@@ -197,34 +157,64 @@ def read_ground(model: Model, world: int) -> Ground:
     return Ground(model.faces[world], model.cells[world])
 
 
-STEP_ARGUMENTS: dict[str, Any] = {
-    "worlds": Integers,  # (launched,): worlds to carry on
-    "model": Model,
-    "drive": Drive,
-    "state": State,
-    "record": Record,
-    "scratch": wp.array3d(dtype=wp.float64),  # (W, rows, columns): belongs to a world until its run ends, see layout
-    "lists": wp.array2d(dtype=wp.int32),  # (W, size): likewise, see contacts.list_layout
-    "control": Control,
-}
-"""Arguments of every step kernel, in this order."""
+@wp.struct
+class Worlds:
+    """All worlds of a batch: what step kernels hand to events and hooks, with ``world``, the index of one of them.
 
+    Functions of physics take only what they need. The rows K of a chain's links are always an argument of their own,
+    of static shape, because clang does not vectorise loops over an array that it reads from a struct. Kernels hand
+    this struct on as they get it: a copy that also held the index took all registers of a GPU's threads.
 
-def with_step_arguments(function: Callable[..., None]) -> Callable[..., None]:
-    """Decorator that gives a step kernel's function the types of :data:`STEP_ARGUMENTS`."""
-    function.__annotations__.update(STEP_ARGUMENTS)
-    return function
+    Behind the structs of what surrounds the worlds lies their state, which changes during a run. Its arrays have the
+    shape (W,) unless given. A run is bit-identical however it is cut into launches: all that the step loop needs for
+    the next attempt is kept here and in the chain's scratch, which belongs to its world until the run ends.
+    """
+
+    model: Model
+    drive: Drive
+    record: Record
+    control: Control
+    scratch: wp.array3d(dtype=wp.float64)  # (W, rows, columns), see layout
+    lists: wp.array2d(dtype=wp.int32)  # (W, size), see contacts.list_layout
+
+    links: wp.array3d(dtype=wp.float64)  # (W, 6, N): x, y [m], θ [rad], and their rates
+    time: wp.array(dtype=wp.float64)  # [s]
+    stop_time: wp.array(dtype=wp.float64)  # the run ends at exactly this time [s]
+    stop_status: wp.array(dtype=wp.int32)  # status of a run that ends there
+    is_fresh: wp.array(dtype=wp.int32)  # 1: the host has set the links, and the scratch is void
+    # 1: the scratch holds the first stage of the next step; on a CPU 2: and its rounded state, see :mod:`cpu.joints`
+    has_first_stage: wp.array(dtype=wp.int32)
+    gap: wp.array(dtype=wp.float64)  # CPU: least distance to floor or sprocket [m]
+    time_to_contact: wp.array(dtype=wp.float64)  # GPU: longest step that cannot miss a contact [s]
+    slack: wp.array(dtype=wp.float64)  # CPU: how far joints may move before the neighbour list is stale [m]
+    step: wp.array(dtype=wp.float64)  # proposed next step [s]
+    last_error: wp.array(dtype=wp.float64)  # error ratio of the last accepted step (PI controller)
+    is_rigid: wp.array(dtype=wp.int32)  # 1: joints are rigid, see cpu.implicit.flights
+    other_step: wp.array(dtype=wp.float64)  # last step proposed for the other model of the joints [s]
+    closing_time: wp.array(dtype=wp.float64)  # earliest time at which joints may close [s]
+    next_sample: wp.array(dtype=wp.int64)  # index of the next sample mark
+    next_frame: wp.array(dtype=wp.int64)  # index of the next frame mark; −1: frames are taken with samples
+    status: wp.array(dtype=wp.int32)
+    watch: wp.array2d(dtype=wp.float64)  # (W, WATCH_ROWS): memory of the watches
+    plane: wp.array2d(dtype=wp.float64)  # (W, PLANE_ROWS): the plane of the chain, if it tilts, see layout
+    softness: wp.array(dtype=wp.float64)  # of the joints: 0 the model's own, 1 soft, 2 softest; see events.softening
+    load_factor: wp.array(dtype=wp.float64)  # of loads on the sprocket, see physics.scaled_loads
+    first_area: wp.array(dtype=wp.float64)  # area inside the loop when its run began [m²]
+    attempts_before: wp.array(dtype=wp.int64)  # attempts of the walk's earlier phases, which its limit includes
+    first_sample: wp.array2d(dtype=wp.float64)  # (W, ALL_COLUMNS): the sample taken when the run began
+    last_sample: wp.array2d(dtype=wp.float64)  # the latest, in the end that of the final state
+    counts: wp.array2d(dtype=wp.int64)  # (W, COUNT_ROWS)
+    extremes: wp.array2d(dtype=wp.float64)  # (W, EXTREME_ROWS) [m]
+    losses: wp.array2d(dtype=wp.float64)  # (W, LOSS_ROWS) [J]
 
 
 def make_entry(module: wp.Module, is_block: bool):
     """Kernel without a body: name, arguments, threads of a step kernel; ``is_block``: for ``wp.launch_tiled``."""
 
-    @with_step_arguments
-    def advance(worlds, model, drive, state, record, scratch, lists, control):
-        _world = wp.tid()
+    def advance(launched: Integers, worlds: Worlds):
+        _world = launched[wp.tid()]
 
-    @with_step_arguments
-    def advance_block(worlds, model, drive, state, record, scratch, lists, control):
+    def advance_block(launched: Integers, worlds: Worlds):
         _block, _lane = wp.tid()
 
     function = advance_block if is_block else advance

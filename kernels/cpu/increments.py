@@ -35,7 +35,7 @@ class Steps:
     shift_first_stage: Any  # ``(S, before, now)`` changes it from one plane to another
     attempt: Any  # ``(K, S, chain, h, tolerance)`` → bits of the greatest error ratio, see :func:`order_bits`
     commit: Any  # ``(K, S, chain, h)`` takes the new state and places its ends
-    first_stage_is_finite: Any  # ``(S, n)``
+    start_is_finite: Any  # ``(S, n)``
 
 
 @functools.cache
@@ -426,11 +426,11 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
                     S[wp.static(power_rows[0]) + row, n] = S[wp.static(power_rows[-1]) + row, n]
 
     @wp.func
-    def first_stage_is_finite(S: Numbers, n: int):
+    def start_is_finite(S: Numbers, n: int):
         finite = bool(True)
         for i in range(n):
             for row in range(3):
                 finite = finite and wp.isfinite(S[wp.static(rows[0]) + row, i])
         return finite
 
-    return Steps(take_constants, begin, first_stage, shift_first_stage, attempt, commit, first_stage_is_finite)
+    return Steps(take_constants, begin, first_stage, shift_first_stage, attempt, commit, start_is_finite)

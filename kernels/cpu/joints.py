@@ -13,10 +13,10 @@ from warpchain.kernels.hooks import Hooks, hook
 from warpchain.kernels.methods.controller import step_controller
 from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.physics.elementary import ZERO
-from warpchain.kernels.types import Chain, Control, Rows, State
+from warpchain.kernels.types import Chain, Rows, Worlds
 
 NOTHING_KNOWN, STAGE_KNOWN, ROUNDED = 0, 1, 2
-"""Of the start of a step, in ``State.has_first_stage``: the first stage is known; the state is rounded as well."""
+"""Of the start of a step, in ``Worlds.has_first_stage``: the first stage is known; the state is rounded as well."""
 
 
 @dataclass(frozen=True)
@@ -26,26 +26,24 @@ class Joints(Hooks):
     # when the constants of links and joints have changed
     take_constants: Any = hook(K=Rows, chain=Chain)
     # before a step
-    settle: Any = hook(K=Rows, chain=Chain, state=State, world=int)
+    settle: Any = hook(K=Rows, chain=Chain, worlds=Worlds, world=int)
     # evaluates the first stage of a step on springs, if it is not known
-    first_stage: Any = hook(K=Rows, chain=Chain, state=State, world=int)
+    first_stage: Any = hook(K=Rows, chain=Chain, worlds=Worlds, world=int)
     # changes the first stage from one plane to another
     shift_first_stage: Any = hook(K=Rows, before=Chain, now=Chain)
     # → error ratio as ordered bits
-    attempt: Any = hook(
-        K=Rows, chain=Chain, state=State, control=Control, world=int, h=wp.float64, tolerance=wp.float64
-    )
+    attempt: Any = hook(K=Rows, chain=Chain, worlds=Worlds, world=int, h=wp.float64, tolerance=wp.float64)
     # → factor of the step after rejection, see methods.controller
-    shrinkage: Any = hook(state=State, world=int, error=wp.float64)
+    shrinkage: Any = hook(worlds=Worlds, world=int, error=wp.float64)
     # accepts the state that the last attempt found and places its ends → factor of the step, whether the joints may
     # stay as they are
-    accept: Any = hook(K=Rows, chain=Chain, state=State, control=Control, world=int, h=wp.float64, error=wp.float64)
+    accept: Any = hook(K=Rows, chain=Chain, worlds=Worlds, world=int, h=wp.float64, error=wp.float64)
     # → skin of the neighbour list [m], least slack with which the list is kept [m]
-    margins: Any = hook(state=State, control=Control, world=int)
+    margins: Any = hook(worlds=Worlds, world=int)
     # after a step with impulses, or in which the joints may not stay
-    react: Any = hook(K=Rows, chain=Chain, state=State, world=int)
+    react: Any = hook(K=Rows, chain=Chain, worlds=Worlds, world=int)
     # whether all accelerations at the start of the step are finite
-    rates_are_finite: Any = hook(K=Rows, chain=Chain, state=State, world=int)
+    start_is_finite: Any = hook(K=Rows, chain=Chain, worlds=Worlds, world=int)
 
 
 @functools.cache
@@ -63,47 +61,45 @@ def springs(name: str, columns: int, is_mixed: bool, load: Any) -> Joints:
         steps.take_constants(K, rows(K), chain)
 
     @wp.func
-    def nothing(_K: Rows, _chain: Chain, _state: State, _world: int):
+    def nothing(_K: Rows, _chain: Chain, _worlds: Worlds, _world: int):
         return
 
     @wp.func
-    def first_stage(K: Rows, chain: Chain, state: State, world: int):
-        known = state.has_first_stage[world]
+    def first_stage(K: Rows, chain: Chain, worlds: Worlds, world: int):
+        known = worlds.has_first_stage[world]
         if known != wp.static(ROUNDED):
             S = rows(K)
             steps.begin(K, S, chain)
             if known == wp.static(NOTHING_KNOWN):
                 steps.first_stage(K, S, chain)
-            state.has_first_stage[world] = wp.static(ROUNDED)
+            worlds.has_first_stage[world] = wp.static(ROUNDED)
 
     @wp.func
     def shift_first_stage(K: Rows, before: Chain, now: Chain):
         steps.shift_first_stage(rows(K), before, now)
 
     @wp.func
-    def attempt(
-        K: Rows, chain: Chain, _state: State, _control: Control, _world: int, h: wp.float64, tolerance: wp.float64
-    ):
+    def attempt(K: Rows, chain: Chain, _worlds: Worlds, _world: int, h: wp.float64, tolerance: wp.float64):
         return steps.attempt(K, rows(K), chain, h, tolerance)
 
     @wp.func
-    def shrinkage(_state: State, _world: int, error: wp.float64):
+    def shrinkage(_worlds: Worlds, _world: int, error: wp.float64):
         return wp.float64(shrink(real(error)))
 
     @wp.func
-    def accept(K: Rows, chain: Chain, state: State, control: Control, world: int, h: wp.float64, error: wp.float64):
+    def accept(K: Rows, chain: Chain, worlds: Worlds, world: int, h: wp.float64, error: wp.float64):
         steps.commit(K, rows(K), chain, h)
-        state.has_first_stage[world] = wp.static(after_step)
-        factor = growth(real(error), real(state.last_error[world]), control.proportional)
+        worlds.has_first_stage[world] = wp.static(after_step)
+        factor = growth(real(error), real(worlds.last_error[world]), worlds.control.proportional)
         return wp.float64(factor), bool(True)
 
     @wp.func
-    def margins(_state: State, control: Control, _world: int):
-        return control.skin, ZERO
+    def margins(worlds: Worlds, _world: int):
+        return worlds.control.skin, ZERO
 
     @wp.func
-    def rates_are_finite(K: Rows, chain: Chain, _state: State, _world: int):
-        return steps.first_stage_is_finite(rows(K), chain.link_count)
+    def start_is_finite(K: Rows, chain: Chain, _worlds: Worlds, _world: int):
+        return steps.start_is_finite(rows(K), chain.link_count)
 
     return Joints(
         take_constants,
@@ -115,5 +111,5 @@ def springs(name: str, columns: int, is_mixed: bool, load: Any) -> Joints:
         accept,
         margins,
         nothing,
-        rates_are_finite,
+        start_is_finite,
     )

@@ -33,18 +33,18 @@ from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step
 from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.physics.elementary import ONE, ZERO
 from warpchain.kernels.physics.scaled_loads import write_links
-from warpchain.kernels.types import Chain, Control, Drive, Model, Record, Rows, State, read_ground, with_step_arguments
+from warpchain.kernels.types import Chain, Integers, Rows, Worlds, read_ground
 
 
 @wp.func
-def load_state(K: Rows, model: Model, state: State, chain: Chain, world: int):
+def load_state(K: Rows, worlds: Worlds, chain: Chain, world: int):
     """Fills the rows of the state; rows of losses start at zero, columns behind the links are links without mass."""
     for i in range((chain.link_count + wp.static(2 * layout.LANES - 1)) & wp.static(-2 * layout.LANES)):
         for row in range(wp.static(layout.SCRATCH_ROWS)):
             K[row, i] = ZERO
             if row < 6 and i < chain.link_count:
-                K[row, i] = state.links[world, row, i]
-    write_links(K, model, world, state.load_factor[world])
+                K[row, i] = worlds.links[world, row, i]
+    write_links(K, worlds.model, world, worlds.load_factor[world])
 
 
 @wp.func
@@ -83,108 +83,107 @@ def make_advance(features: Features):
     write_sample = observation(features)
 
     @wp.func
-    def take_sample(
-        K: Rows, chain: Chain, model: Model, drive: Drive, state: State, record: Record, control: Control, world: int
-    ) -> Chain:
+    def take_sample(K: Rows, chain: Chain, worlds: Worlds, world: int) -> Chain:
         """Takes a sample → the chain as the sample has left it."""
-        softness = state.softness[world]
-        load_factor = state.load_factor[world]
-        state.status[world] = sample(K, chain, drive, state, record, control, world, state.time[world])
+        softness = worlds.softness[world]
+        load_factor = worlds.load_factor[world]
+        worlds.status[world] = sample(K, chain, worlds, world, worlds.time[world])
         after = chain
-        if has_changed(state, world, softness, load_factor):
-            after = present_chain(model, state, control, world)
-            book_softening(chain, after, state, world)
+        if has_changed(worlds, world, softness, load_factor):
+            after = present_chain(worlds, world)
+            book_softening(chain, after, worlds, world)
             if wp.static(is_driven):
-                write_links(K, model, world, state.load_factor[world])
+                write_links(K, worlds.model, world, worlds.load_factor[world])
                 joints.take_constants(K, after)
-            state.has_first_stage[world] = 0
+            worlds.has_first_stage[world] = 0
         return after
 
     @wp.func
-    def reject(K: Rows, chain: Chain, state: State, control: Control, world: int, h: wp.float64, error: wp.float64):
+    def reject(K: Rows, chain: Chain, worlds: Worlds, world: int, h: wp.float64, error: wp.float64):
         """Proposes a shorter step, or ends the run."""
-        add_count(state, world, layout.REJECTED, wp.int64(1))
+        add_count(worlds, world, layout.REJECTED, wp.int64(1))
         step = h * LEAST_SHRINKAGE
         if wp.isfinite(error):
-            step = h * joints.shrinkage(state, world, error)
-        elif not (state_is_finite(K, chain) and joints.rates_are_finite(K, chain, state, world)):
-            state.status[world] = NOT_FINITE
-        state.step[world] = step
-        if state.status[world] == RUNNING and step < control.smallest_step:
-            state.status[world] = STEP_TOO_SMALL
+            step = h * joints.shrinkage(worlds, world, error)
+        elif not (state_is_finite(K, chain) and joints.start_is_finite(K, chain, worlds, world)):
+            worlds.status[world] = NOT_FINITE
+        worlds.step[world] = step
+        if worlds.status[world] == RUNNING and step < worlds.control.smallest_step:
+            worlds.status[world] = STEP_TOO_SMALL
 
     @wp.kernel(
         name="advance", module="unique", enable_backward=False, module_options={"cpu_compiler_flags": COMPILER_FLAGS}
     )
-    @with_step_arguments
-    def advance(worlds, model, drive, state, record, scratch, lists, control):
-        world = worlds[wp.tid()]
-        if state.status[world] != RUNNING:
+    def advance(launched: Integers, worlds: Worlds):
+        world = launched[wp.tid()]
+        if worlds.status[world] != RUNNING:
             return
-        memory = scratch[world]
+        memory = worlds.scratch[world]
         K = wp.array(ptr=memory.ptr, shape=(wp.static(rows), wp.static(columns)), dtype=wp.float64)
-        list_memory = lists[world]
+        list_memory = worlds.lists[world]
         L = wp.array(ptr=list_memory.ptr, shape=(wp.static(list_size),), dtype=wp.int32)
-        P = state.plane[world]
-        ground = read_ground(model, world)
+        P = worlds.plane[world]
+        ground = read_ground(worlds.model, world)
         still = face_of(ground)
-        chain = present_chain(model, state, control, world)
-        if state.is_fresh[world] != 0:
-            load_state(K, model, state, chain, world)
+        chain = present_chain(worlds, world)
+        if worlds.is_fresh[world] != 0:
+            load_state(K, worlds, chain, world)
             joints.take_constants(K, chain)
             place_ends(K, chain)
             plane.begin_run(K, P, chain)
-            state.gap[world] = plane.gap(K, plane.at_start(P, chain), ground, still)
+            worlds.gap[world] = plane.gap(K, plane.at_start(P, chain), ground, still)
             L[wp.static(list_layout(columns).count)] = 0
-            make_list(K, L, chain, state, world, control.skin, greatest_opening(K, chain))
-            state.has_first_stage[world] = 0
-            state.is_fresh[world] = 0
+            make_list(K, L, chain, worlds, world, worlds.control.skin, greatest_opening(K, chain))
+            worlds.has_first_stage[world] = 0
+            worlds.is_fresh[world] = 0
         attempts = int(0)
-        while state.status[world] == RUNNING and attempts < control.attempts and not record_is_full(record, world):
-            if state.time[world] >= next_mark(state, control, world):
-                chain = take_sample(K, chain, model, drive, state, record, control, world)
-            time = state.time[world]
-            stop_time = state.stop_time[world]
-            if state.status[world] == RUNNING and time >= stop_time:
-                state.status[world] = state.stop_status[world]
-            if state.status[world] != RUNNING:
+        while (
+            worlds.status[world] == RUNNING and attempts < worlds.control.attempts and not record_is_full(worlds, world)
+        ):
+            if worlds.time[world] >= next_mark(worlds, world):
+                chain = take_sample(K, chain, worlds, world)
+            time = worlds.time[world]
+            stop_time = worlds.stop_time[world]
+            if worlds.status[world] == RUNNING and time >= stop_time:
+                worlds.status[world] = worlds.stop_status[world]
+            if worlds.status[world] != RUNNING:
                 break
 
-            joints.settle(K, chain, state, world)
-            longest = contact_step(state, control, world, wp.static(is_driven))
-            bound = bound_of_step(K, L, plane.at_start(P, chain), still, control, state, world, longest)
-            h = wp.min(state.step[world], bound)
+            joints.settle(K, chain, worlds, world)
+            longest = contact_step(worlds, world, wp.static(is_driven))
+            bound = bound_of_step(K, L, plane.at_start(P, chain), still, worlds, world, longest)
+            h = wp.min(worlds.step[world], bound)
             reaches_stop = time + h >= stop_time
             if reaches_stop:
                 h = stop_time - time
-            felt = plane.begin_step(K, P, chain, state, world, h)
-            tolerance = spring_tolerance(drive, state, control, world, wp.static(is_driven))
-            error = wp.cast(joints.attempt(K, felt, state, control, world, h, tolerance), wp.float64)
+            felt = plane.begin_step(K, P, chain, worlds, world, h)
+            tolerance = spring_tolerance(worlds, world, wp.static(is_driven))
+            error = wp.cast(joints.attempt(K, felt, worlds, world, h, tolerance), wp.float64)
             attempts += 1
             if error <= ONE:
-                factor, joints_may_stay = joints.accept(K, felt, state, control, world, h, error)
-                add_count(state, world, layout.ACCEPTED, wp.int64(1))
-                state.time[world] = wp.where(reaches_stop, stop_time, time + h)
-                state.step[world] = next_step(state.step[world], h, factor)
-                state.last_error[world] = wp.max(error, wp.float64(1e-4))
+                factor, joints_may_stay = joints.accept(K, felt, worlds, world, h, error)
+                add_count(worlds, world, layout.ACCEPTED, wp.int64(1))
+                worlds.time[world] = wp.where(reaches_stop, stop_time, time + h)
+                worlds.step[world] = next_step(worlds.step[world], h, factor)
+                worlds.last_error[world] = wp.max(error, wp.float64(1e-4))
                 opening = greatest_opening(K, chain)
-                raise_extreme(state, world, layout.OPENING, opening)
+                raise_extreme(worlds, world, layout.OPENING, opening)
                 plane.end_step(K, P, chain, h)
-                impulses = meet_bodies(K, P, chain, felt, ground, still, drive, state, world)
-                impulses += meet_links(K, L, chain, state, control, world, opening)
+                impulses = meet_bodies(K, P, chain, felt, ground, still, worlds, world)
+                impulses += meet_links(K, L, chain, worlds, world, opening)
                 if impulses > wp.int64(0) or not joints_may_stay:
-                    state.has_first_stage[world] = 0
-                    joints.react(K, chain, state, world)
+                    worlds.has_first_stage[world] = 0
+                    joints.react(K, chain, worlds, world)
             else:
-                reject(K, chain, state, control, world, h, error)
-            if state.status[world] == RUNNING and attempts_made(state, world) >= control.step_limit:
-                state.status[world] = STEP_LIMIT
-        if lacks_last_sample(state, world, state.time[world], state.status[world]):
+                reject(K, chain, worlds, world, h, error)
+            if worlds.status[world] == RUNNING and attempts_made(worlds, world) >= worlds.control.step_limit:
+                worlds.status[world] = STEP_LIMIT
+        if lacks_last_sample(worlds, world, worlds.time[world], worlds.status[world]):
             place_ends(K, chain)
-            write_sample(K, chain, state, record, world, state.time[world])
+            write_sample(K, chain, worlds, world, worlds.time[world])
         for i in range(chain.link_count):
             for row in range(6):
-                state.links[world, row, i] = K[row, i]
-        store_losses(K, layout.LOST_FRICTION, state, world, chain.link_count, wp.static(fixed_loss))
+                worlds.links[world, row, i] = K[row, i]
+        store_losses(K, layout.LOST_FRICTION, worlds, world, chain.link_count, wp.static(fixed_loss))
 
     return advance

@@ -14,7 +14,7 @@ from warpchain.kernels.layout import LEFT_X, LOST_FIXED, SUMS, SUMS_OF_MOTION, U
 from warpchain.kernels.physics import plane
 from warpchain.kernels.physics.elementary import ZERO, from_order_key, order_key
 from warpchain.kernels.physics.geometry import LANES, whole_lanes
-from warpchain.kernels.types import Chain, Ground, Row, Rows, State, with_circles
+from warpchain.kernels.types import Chain, Ground, Row, Rows, Worlds, with_circles
 
 SUMMED_IN_CONTACT = 3
 """Impulse on the plane and its two moments."""
@@ -143,12 +143,12 @@ def tilting_plane(joints: Joints) -> PlaneHooks:
         return plane.on_plane(chain, P, 0)
 
     @wp.func
-    def begin_step(K: Rows, P: Row, chain: Chain, state: State, world: int, h: wp.float64) -> Chain:
+    def begin_step(K: Rows, P: Row, chain: Chain, worlds: Worlds, world: int, h: wp.float64) -> Chain:
         before = plane.on_plane(chain, P, wp.static(layout.PLANE_MID))
         plane.begin_step(P, chain.gravity, h)
         felt = plane.on_plane(chain, P, wp.static(layout.PLANE_MID))
-        was_known = state.has_first_stage[world] != 0
-        joints.first_stage(K, felt, state, world)
+        was_known = worlds.has_first_stage[world] != 0
+        joints.first_stage(K, felt, worlds, world)
         if was_known:
             joints.shift_first_stage(K, before, felt)
         return felt

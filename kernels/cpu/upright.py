@@ -10,19 +10,19 @@ from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.cpu.contacts.proximity import fixed_contacts
 from warpchain.kernels.cpu.joints import Joints
 from warpchain.kernels.hooks import Hooks, hook
-from warpchain.kernels.types import Chain, Ground, Row, Rows, State
+from warpchain.kernels.types import Chain, Ground, Row, Rows, Worlds
 
 
 @dataclass(frozen=True)
 class PlaneHooks(Hooks):
-    """Warp functions of a chain's plane and of the floor or sprocket that it meets. P: a row of ``State.plane``."""
+    """Warp functions of a chain's plane and of the floor or sprocket that it meets. P: a row of ``Worlds.plane``."""
 
     # when the host has set the links
     begin_run: Any = hook(K=Rows, P=Row, chain=Chain)
     # → the chain on the plane where the step begins
     at_start: Any = hook(P=Row, chain=Chain)
     # evaluates the first stage → the chain on the plane that its links feel in this step
-    begin_step: Any = hook(K=Rows, P=Row, chain=Chain, state=State, world=int, h=wp.float64)
+    begin_step: Any = hook(K=Rows, P=Row, chain=Chain, worlds=Worlds, world=int, h=wp.float64)
     # carries the plane to the end of an accepted step, whose ends are placed
     end_step: Any = hook(K=Rows, P=Row, chain=Chain, h=wp.float64)
     # → least gap [m] of the chain on its plane
@@ -45,8 +45,8 @@ def upright_plane(fixed_body: str, joints: Joints) -> PlaneHooks:
         return chain
 
     @wp.func
-    def begin_step(K: Rows, _P: Row, chain: Chain, state: State, world: int, _h: wp.float64) -> Chain:
-        joints.first_stage(K, chain, state, world)
+    def begin_step(K: Rows, _P: Row, chain: Chain, worlds: Worlds, world: int, _h: wp.float64) -> Chain:
+        joints.first_stage(K, chain, worlds, world)
         return chain
 
     @wp.func

@@ -32,7 +32,7 @@ from warpchain.kernels import layout
 from warpchain.kernels.codes import FINISHED
 from warpchain.kernels.physics.elementary import HALF, ONE, ZERO
 from warpchain.kernels.physics.scaled_loads import DRAG_PER_CROSSING, DRAG_PER_TURN, crossing_time
-from warpchain.kernels.types import LOADING_TIME, Chain, Drive, Row, State
+from warpchain.kernels.types import LOADING_TIME, Chain, Row, Worlds
 
 LITTLE_SLIP = wp.constant(wp.float64(0.006))
 """Slip above which a free loop is watched for as long as slow waves need.
@@ -54,9 +54,9 @@ Watched = wp.types.vector(length=WATCHED, dtype=wp.float64)
 
 
 @wp.func
-def is_watched(state: State, drive: Drive, world: int, time: wp.float64):
+def is_watched(worlds: Worlds, world: int, time: wp.float64):
     """Whether the loop is held and its release is not set yet; ``stop_status == FINISHED`` marks that it is."""
-    return state.stop_status[world] != FINISHED and time >= drive.hold_start[world]
+    return worlds.stop_status[world] != FINISHED and time >= worlds.drive.hold_start[world]
 
 
 @wp.func
@@ -82,38 +82,38 @@ def widen(watch: Row, k: int, mean: wp.float64, is_first: bool):
 
 
 @wp.func
-def load_at(state: State, drive: Drive, world: int, time: wp.float64):
+def load_at(worlds: Worlds, world: int, time: wp.float64):
     """Factor of the loads at this moment of the drive."""
-    if state.watch[world, layout.HOLD_LOAD] < ONE:
-        state.watch[world, layout.HOLD_LOAD] = wp.max(drive.load_factor[world], ONE)
-    if time < drive.hold_start[world]:
+    if worlds.watch[world, layout.HOLD_LOAD] < ONE:
+        worlds.watch[world, layout.HOLD_LOAD] = wp.max(worlds.drive.load_factor[world], ONE)
+    if time < worlds.drive.hold_start[world]:
         return ONE
-    load = state.watch[world, layout.HOLD_LOAD]
-    since = state.watch[world, layout.UNLOADED_SINCE]
+    load = worlds.watch[world, layout.HOLD_LOAD]
+    since = worlds.watch[world, layout.UNLOADED_SINCE]
     if since < ZERO:
         return load
     return wp.pow(load, wp.clamp(ONE - (time - since) / LOADING_TIME, ZERO, ONE))
 
 
 @wp.func
-def drag_rate(chain: Chain, state: State, drive: Drive, world: int, height: wp.float64):
+def drag_rate(chain: Chain, worlds: Worlds, world: int, height: wp.float64):
     """Rate γ [1/s] of the drag on the shape of a chain under its present loads."""
-    full = state.watch[world, layout.HOLD_LOAD]
-    present = state.load_factor[world]
+    full = worlds.watch[world, layout.HOLD_LOAD]
+    present = worlds.load_factor[world]
     gravity = chain.gravity * full / present
-    crossing = crossing_time(drive.loop_speed[world], gravity, chain.sprocket_radius, height)
-    turns = drive.loop_speed[world] / height
+    crossing = crossing_time(worlds.drive.loop_speed[world], gravity, chain.sprocket_radius, height)
+    turns = worlds.drive.loop_speed[world] / height
     return (DRAG_PER_CROSSING / crossing + DRAG_PER_TURN * turns) * (present - ONE) / full
 
 
 @wp.func
-def watch_steadiness(chain: Chain, state: State, drive: Drive, world: int, sample: Row):
+def watch_steadiness(chain: Chain, worlds: Worlds, world: int, sample: Row):
     """Adds a sample to its window. At the end of a window loads may begin to fall, or the moment of release is set."""
     time = sample[layout.TIME]
-    if not is_watched(state, drive, world, time):
+    if not is_watched(worlds, world, time):
         return
-    watch = state.watch[world]
-    is_free = state.load_factor[world] == ONE
+    watch = worlds.watch[world]
+    is_free = worlds.load_factor[world] == ONE
     is_loaded = not is_free and watch[layout.UNLOADED_SINCE] < ZERO
     if not (is_free or is_loaded):
         watch[layout.WINDOW_START] = -ONE  # nothing is watched while loads fall
@@ -126,17 +126,17 @@ def watch_steadiness(chain: Chain, state: State, drive: Drive, world: int, sampl
     for k in range(wp.static(WATCHED)):
         watch[layout.WINDOW_SUMS + k] = watch[layout.WINDOW_SUMS + k] + sample[wp.static(layout.WATCHED_COLUMNS[k])]
 
-    target = drive.loop_speed[world]
+    target = worlds.drive.loop_speed[world]
     crossing = crossing_time(target, chain.gravity, chain.sprocket_radius, sample[layout.HEIGHT])
-    window = drive.steady_window[world]
-    wanted = drive.steady_time[world]
+    window = worlds.drive.steady_window[world]
+    wanted = worlds.drive.steady_time[world]
     if is_loaded:
         window = wp.max(SHORTEST_WINDOW, HALF * crossing)
         wanted = crossing
     elif wanted < ZERO:
         slips = target - sample[layout.LOOP_SPEED] > LITTLE_SLIP * target
         was_loaded = watch[layout.HOLD_LOAD] > ONE
-        wanted = wp.where(was_loaded and not slips, drive.loop_period[world], crossing)
+        wanted = wp.where(was_loaded and not slips, worlds.drive.loop_period[world], crossing)
     if time - watch[layout.WINDOW_START] < window:
         return
 
@@ -152,7 +152,7 @@ def watch_steadiness(chain: Chain, state: State, drive: Drive, world: int, sampl
     drift = wp.max(vertical, horizontal)
     watch[layout.DRIFT] = drift
     speed = mean[layout.LOOP_ALONG]
-    tolerance = drive.steady_tolerance[world]
+    tolerance = worlds.drive.steady_tolerance[world]
     is_fast_enough = wp.abs(speed - target) <= wp.max(MOST_SLIP * target, SLOWEST_STEADY)
     keeps_speed = is_fast_enough and width[layout.LOOP_ALONG] <= wp.max(tolerance * target, SLOWEST_STEADY)
     keeps_shape = drift <= tolerance
@@ -169,9 +169,9 @@ def watch_steadiness(chain: Chain, state: State, drive: Drive, world: int, sampl
         watch[layout.UNLOADED_SINCE] = time
         watch[layout.STEADY_SINCE] = time + LOADING_TIME
     elif is_over:
-        wait = drive.extra_hold[world] + drive.release_phase[world] * drive.loop_period[world]
-        state.stop_time[world] = time + wait
-        state.stop_status[world] = FINISHED
+        wait = worlds.drive.extra_hold[world] + worlds.drive.release_phase[world] * worlds.drive.loop_period[world]
+        worlds.stop_time[world] = time + wait
+        worlds.stop_status[world] = FINISHED
     leaves_shape = is_free and watch[layout.HOLD_LOAD] > ONE and not (is_first or keeps_shape)
     loses_time = is_loaded and not is_over and time - watch[layout.LOADED_SINCE] > MOST_CROSSINGS * crossing
     if leaves_shape or loses_time:

@@ -19,15 +19,15 @@ from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.physics.geometry import read_link
 from warpchain.kernels.physics.load import LOADS, no_energy
 from warpchain.kernels.physics.scaled_loads import drag_shape
-from warpchain.kernels.types import Chain, Control, Drive, Record, Rows, State
+from warpchain.kernels.types import Chain, Rows, Worlds
 
 
 @wp.func
-def next_mark(state: State, control: Control, world: int):
+def next_mark(worlds: Worlds, world: int):
     """Time [s] from which the next sample or frame is due."""
-    due = wp.float64(state.next_sample[world]) * control.sample_interval
-    if state.next_frame[world] >= wp.int64(0):
-        due = wp.min(due, wp.float64(state.next_frame[world]) * control.frame_interval)
+    due = wp.float64(worlds.next_sample[world]) * worlds.control.sample_interval
+    if worlds.next_frame[world] >= wp.int64(0):
+        due = wp.min(due, wp.float64(worlds.next_frame[world]) * worlds.control.frame_interval)
     return due
 
 
@@ -41,14 +41,14 @@ def observation(features: Features, summarise: Any = summarise):
     has_energy = energy is not no_energy
 
     @wp.func
-    def observe(K: Rows, chain: Chain, state: State, record: Record, world: int, time: wp.float64):
-        area = summarise(K, chain, state.last_sample[world])
+    def observe(K: Rows, chain: Chain, worlds: Worlds, world: int, time: wp.float64):
+        area = summarise(K, chain, worlds.last_sample[world])
         if wp.static(has_energy):
             for i in range(chain.link_count):
-                state.last_sample[world, GRAVITATIONAL] += energy(chain, i, read_link(K, chain, i))
+                worlds.last_sample[world, GRAVITATIONAL] += energy(chain, i, read_link(K, chain, i))
         if wp.static(features.tilts):
-            move_into_room(K, state.plane[world], chain, state.last_sample[world])
-        keep_sample(state, record, world, time)
+            move_into_room(K, worlds.plane[world], chain, worlds.last_sample[world])
+        keep_sample(worlds, world, time)
         return area
 
     return observe
@@ -73,44 +73,41 @@ def sampling(features: Features, summarise: Any = summarise, drag_shape: Any = d
     def sample(
         K: Rows,
         chain: Chain,
-        drive: Drive,
-        state: State,
-        record: Record,
-        control: Control,
+        worlds: Worlds,
         world: int,
         time: wp.float64,
     ):
-        frame_mark = state.next_frame[world]
-        if frame_mark >= wp.int64(0) and time >= wp.float64(frame_mark) * control.frame_interval:
-            append_frame(K, chain, state, record, world, time)
-            frames_passed = wp.int64(wp.floor(time / control.frame_interval))
-            state.next_frame[world] = wp.max(frame_mark, frames_passed) + wp.int64(1)
-        mark = state.next_sample[world]
-        if time < wp.float64(mark) * control.sample_interval:
+        frame_mark = worlds.next_frame[world]
+        if frame_mark >= wp.int64(0) and time >= wp.float64(frame_mark) * worlds.control.frame_interval:
+            append_frame(K, chain, worlds, world, time)
+            frames_passed = wp.int64(wp.floor(time / worlds.control.frame_interval))
+            worlds.next_frame[world] = wp.max(frame_mark, frames_passed) + wp.int64(1)
+        mark = worlds.next_sample[world]
+        if time < wp.float64(mark) * worlds.control.sample_interval:
             return RUNNING
-        last_time = state.last_sample[world, TIME]
+        last_time = worlds.last_sample[world, TIME]
         is_first = last_time < ZERO
-        area = write(K, chain, state, record, world, time)
-        if frame_mark < wp.int64(0) and mark % control.frame_every == wp.int64(0):
-            append_frame(K, chain, state, record, world, time)
-        passed = wp.int64(wp.floor(time / control.sample_interval))
-        state.next_sample[world] = wp.max(mark, passed) + wp.int64(1)
+        area = write(K, chain, worlds, world, time)
+        if frame_mark < wp.int64(0) and mark % worlds.control.frame_every == wp.int64(0):
+            append_frame(K, chain, worlds, world, time)
+        passed = wp.int64(wp.floor(time / worlds.control.sample_interval))
+        worlds.next_sample[world] = wp.max(mark, passed) + wp.int64(1)
         if wp.static(not is_driven):
-            watch_ending(state, world, time, area, is_first)
+            watch_ending(worlds, world, time, area, is_first)
         if wp.static(has_floor):
-            watch_stiffening(state, drive, control, world, time)
-            watch_collapse(chain, state, control, world, time, area, is_first)
+            watch_stiffening(worlds, world, time)
+            watch_collapse(chain, worlds, world, time, area, is_first)
         if wp.static(features.tilts):
-            watch_fall(state, world, time)
+            watch_fall(worlds, world, time)
         if wp.static(has_floor):
-            return watch_rest(state, drive, control, world, state.last_sample[world])
+            return watch_rest(worlds, world, worlds.last_sample[world])
         if wp.static(is_driven):
-            if state.load_factor[world] > wp.float64(1.0):
-                rate = drag_rate(chain, state, drive, world, state.last_sample[world, HEIGHT])
+            if worlds.load_factor[world] > wp.float64(1.0):
+                rate = drag_rate(chain, worlds, world, worlds.last_sample[world, HEIGHT])
                 drag_shape(K, chain, wp.exp(-rate * (time - last_time)))
-            watch_steadiness(chain, state, drive, world, state.last_sample[world])
-            state.load_factor[world] = load_at(state, drive, world, time)
-            watch_drive(state, drive, control, world, time)
+            watch_steadiness(chain, worlds, world, worlds.last_sample[world])
+            worlds.load_factor[world] = load_at(worlds, world, time)
+            watch_drive(worlds, world, time)
         return RUNNING
 
     return sample

@@ -27,7 +27,7 @@ import warp as wp
 from warpchain.kernels.layout import HOLD_LOAD, LOSS_SOFTENING, SOFTENED_AT, SPRING, TIME
 from warpchain.kernels.physics.elementary import HALF, ONE, TWO, ZERO
 from warpchain.kernels.physics.softness import is_stiffer, softened
-from warpchain.kernels.types import Chain, Control, Drive, State
+from warpchain.kernels.types import Chain, Worlds
 
 TEN = wp.constant(wp.float64(10.0))
 ROUGHEST = wp.constant(wp.float64(0.05))
@@ -35,78 +35,76 @@ ROUGHEST = wp.constant(wp.float64(0.05))
 
 
 @wp.func
-def contact_step(state: State, control: Control, world: int, is_driven: bool):
+def contact_step(worlds: Worlds, world: int, is_driven: bool):
     """Longest step [s] near a contact; longer on the softest joints, in the drive also on soft ones."""
-    softness = state.softness[world]
+    softness = worlds.softness[world]
     if softness < ONE or (softness == ONE and not is_driven):
-        return control.contact_step
-    return wp.max(control.contact_step, control.soft_contact_step)
+        return worlds.control.contact_step
+    return wp.max(worlds.control.contact_step, worlds.control.soft_contact_step)
 
 
 @wp.func
-def spring_tolerance(drive: Drive, state: State, control: Control, world: int, is_driven: bool):
+def spring_tolerance(worlds: Worlds, world: int, is_driven: bool):
     """Tolerance of steps on springs, until the next sample.
 
     Ten times looser on the sprocket, until the loop is held under its own loads: the stationary loop does not depend on
     how it was reached, and steps are twice as long.
     """
-    tolerance = wp.where(state.softness[world] >= ONE, control.soft_tolerance, control.tolerance)
+    tolerance = wp.where(worlds.softness[world] >= ONE, worlds.control.soft_tolerance, worlds.control.tolerance)
     if is_driven:
-        is_spun_up = state.last_sample[world, TIME] >= drive.hold_start[world]
-        if not is_spun_up or state.load_factor[world] > ONE:
+        is_spun_up = worlds.last_sample[world, TIME] >= worlds.drive.hold_start[world]
+        if not is_spun_up or worlds.load_factor[world] > ONE:
             tolerance = wp.max(tolerance, wp.min(TEN * tolerance, ROUGHEST))
     return tolerance
 
 
 @wp.func
-def book_softening(before: Chain, after: Chain, state: State, world: int):
+def book_softening(before: Chain, after: Chain, worlds: Worlds, world: int):
     """Books the energy that a change of the joints' stiffness at the last sample has released."""
-    freed = state.last_sample[world, SPRING] * (ONE - after.joint_stiffness / before.joint_stiffness)
-    state.losses[world, LOSS_SOFTENING] = state.losses[world, LOSS_SOFTENING] + freed
+    freed = worlds.last_sample[world, SPRING] * (ONE - after.joint_stiffness / before.joint_stiffness)
+    worlds.losses[world, LOSS_SOFTENING] = worlds.losses[world, LOSS_SOFTENING] + freed
 
 
 @wp.func
-def watch_collapse(
-    chain: Chain, state: State, control: Control, world: int, time: wp.float64, area: wp.float64, is_first: bool
-):
+def watch_collapse(chain: Chain, worlds: Worlds, world: int, time: wp.float64, area: wp.float64, is_first: bool):
     """Makes joints soft, for good, when the loop's area [m²] has fallen below a fraction of that at the first sample.
 
     Below half of that fraction they become softest. Joints that are as soft themselves stay so, and no time is noted.
     """
     if is_first:
         return
-    softness = state.softness[world]
-    is_collapsed = state.watch[world, SOFTENED_AT] >= ZERO
+    softness = worlds.softness[world]
+    is_collapsed = worlds.watch[world, SOFTENED_AT] >= ZERO
     if softness >= TWO or (softness > ZERO and not is_collapsed):
         return
-    share = area / state.first_area[world]
+    share = area / worlds.first_area[world]
     wanted = ZERO
-    if share < control.soften_area:
+    if share < worlds.control.soften_area:
         wanted = ONE
-    if share < HALF * control.soften_area:
+    if share < HALF * worlds.control.soften_area:
         wanted = TWO
-    if wanted > softness and is_stiffer(chain, softened(chain, control, wanted)):
-        state.softness[world] = wanted
+    if wanted > softness and is_stiffer(chain, softened(chain, worlds.control, wanted)):
+        worlds.softness[world] = wanted
         if not is_collapsed:
-            state.watch[world, SOFTENED_AT] = time
+            worlds.watch[world, SOFTENED_AT] = time
 
 
 @wp.func
-def watch_stiffening(state: State, drive: Drive, control: Control, world: int, time: wp.float64):
+def watch_stiffening(worlds: Worlds, world: int, time: wp.float64):
     """Returns joints that were soft on the sprocket to their own values, in the first moments after the release."""
-    if state.softness[world] > ZERO and state.watch[world, SOFTENED_AT] < ZERO:
-        left = wp.max(ZERO, ONE - time / control.stiffening_time)
-        state.softness[world] = drive.hold_softness[world] * left
+    if worlds.softness[world] > ZERO and worlds.watch[world, SOFTENED_AT] < ZERO:
+        left = wp.max(ZERO, ONE - time / worlds.control.stiffening_time)
+        worlds.softness[world] = worlds.drive.hold_softness[world] * left
 
 
 @wp.func
-def watch_drive(state: State, drive: Drive, control: Control, world: int, time: wp.float64):
+def watch_drive(worlds: Worlds, world: int, time: wp.float64):
     """Makes joints softest until the sprocket has spun up, and as soft as the hold allows by the time it begins."""
-    hold = drive.hold_softness[world]
+    hold = worlds.drive.hold_softness[world]
     if hold == ZERO:
         return
-    ahead = (drive.hold_start[world] - time) / control.stiffening_time
-    if state.load_factor[world] > ONE:
-        share = wp.log(state.load_factor[world]) / wp.log(state.watch[world, HOLD_LOAD])
-        hold += (drive.loaded_softness[world] - hold) * share
-    state.softness[world] = hold + (TWO - hold) * wp.clamp(ahead, ZERO, ONE)
+    ahead = (worlds.drive.hold_start[world] - time) / worlds.control.stiffening_time
+    if worlds.load_factor[world] > ONE:
+        share = wp.log(worlds.load_factor[world]) / wp.log(worlds.watch[world, HOLD_LOAD])
+        hold += (worlds.drive.loaded_softness[world] - hold) * share
+    worlds.softness[world] = hold + (TWO - hold) * wp.clamp(ahead, ZERO, ONE)

@@ -7,7 +7,7 @@ from warpchain.kernels.events.record import write_frame
 from warpchain.kernels.layout import AHEAD, FELL_AT, GREATEST_LEAN, LEFT_X, LEFT_Y, ORIGIN, PLANE_VALUES, UP, X, Y
 from warpchain.kernels.physics.elementary import ONE, ZERO, from_order_key, order_key
 from warpchain.kernels.physics.plane import plane_energy
-from warpchain.kernels.types import Chain, Record, Row, Rows, State
+from warpchain.kernels.types import Chain, Row, Rows, Worlds
 
 FALLEN = wp.constant(wp.float64(0.7071067811865476))
 """Sine of the tilt beyond which a chain has fallen over: 45°."""
@@ -74,21 +74,21 @@ def move_into_room(K: Rows, P: Row, chain: Chain, sample: Row):
 
 
 @wp.func
-def write_frame_in_room(K: Rows, chain: Chain, state: State, record: Record, world: int, time: wp.float64):
+def write_frame_in_room(K: Rows, chain: Chain, worlds: Worlds, world: int, time: wp.float64):
     """Appends joint positions and behind them the plane, if frames are kept."""
-    row = record.frame_count[world]
-    write_frame(K, chain, state, record, world, time)
-    if record.frames.shape[1] == 0:
+    row = worlds.record.frame_count[world]
+    write_frame(K, chain, worlds, world, time)
+    if worlds.record.frames.shape[1] == 0:
         return
-    first = record.frames.shape[2] - PLANE_VALUES
+    first = worlds.record.frames.shape[2] - PLANE_VALUES
     for k in range(PLANE_VALUES):
-        record.frames[world, row, first + k] = state.plane[world, k]
+        worlds.record.frames[world, row, first + k] = worlds.plane[world, k]
 
 
 @wp.func
-def watch_fall(state: State, world: int, time: wp.float64):
+def watch_fall(worlds: Worlds, world: int, time: wp.float64):
     """Notes when the plane first tilts by 45°, and how far it tilts."""
-    lean = wp.abs(state.plane[world, UP + 2])
-    state.watch[world, GREATEST_LEAN] = wp.max(state.watch[world, GREATEST_LEAN], lean)
-    if state.watch[world, FELL_AT] < ZERO and lean > FALLEN:
-        state.watch[world, FELL_AT] = time
+    lean = wp.abs(worlds.plane[world, UP + 2])
+    worlds.watch[world, GREATEST_LEAN] = wp.max(worlds.watch[world, GREATEST_LEAN], lean)
+    if worlds.watch[world, FELL_AT] < ZERO and lean > FALLEN:
+        worlds.watch[world, FELL_AT] = time

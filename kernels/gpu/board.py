@@ -6,7 +6,7 @@ from warpchain.kernels.gpu.stage import Run, read_link
 from warpchain.kernels.layout import BOARD_VALUES, COSINE, LEFT_X, THETA, X
 from warpchain.kernels.physics.elementary import ZERO, cos_sin
 from warpchain.kernels.physics.geometry import Link, end_positions, put, two
-from warpchain.kernels.types import Chain, Rows, State
+from warpchain.kernels.types import Chain, Rows, Worlds
 
 
 @wp.func
@@ -26,7 +26,7 @@ def find_link(empty: Run, chain: Chain, lane: int) -> Run:
 
 
 @wp.func
-def load_link(run: Run, state: State):
+def load_link(run: Run, worlds: Worlds):
     """Writes a thread's link on the board; threads without a link get one at the origin that no joint acts on.
 
     Its direction is that of the launch before, or of its angle if that is void.
@@ -36,8 +36,8 @@ def load_link(run: Run, state: State):
         run.K[row, run.lane] = ZERO
     if run.lane < run.links:
         for k in range(6):
-            run.K[X + k, run.lane] = state.links[run.world, X + k, run.lane]
-    if run.lane >= run.links or state.is_fresh[run.world] != 0 or state.has_first_stage[run.world] == 0:
+            run.K[X + k, run.lane] = worlds.links[run.world, X + k, run.lane]
+    if run.lane >= run.links or worlds.is_fresh[run.world] != 0 or worlds.has_first_stage[run.world] == 0:
         cosine, sine = cos_sin(run.K[THETA, run.lane])
         direction = wp.vec2d(cosine, sine)
     put(run.K, COSINE, run.lane, direction)

@@ -50,7 +50,7 @@ def real_of(features: Features) -> Any:
 class BlockSteps:
     """Warp functions of the steps of a block, for all its threads."""
 
-    write_constants: Any  # ``(run)`` rounds a link's constants, when those on the board have changed
+    take_constants: Any  # ``(run)`` rounds a link's constants, when those on the board have changed
     common_of: Any  # ``(run)`` → what links and stages have in common until the chain's constants change
     begin: Any  # ``(run, common, keeps rates)`` forms the joints from the state on the board; a barrier has passed
     attempt: Any  # ``(run, common, h, 1/tolerance)`` → Attempt
@@ -135,7 +135,7 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
         return read_pair(run.S, part * wp.static(block_dim) + column)
 
     @wp.func
-    def write_constants(run: Run):
+    def take_constants(run: Run):
         K = run.K
         lane = run.lane
         put(run, FRICTION, real(0.0), real(0.0))
@@ -446,5 +446,5 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
                 if run.lane < run.links:
                     write_pair(kept_start(run), part * run.kept.shape[1] + run.lane, pair[0], pair[1])
 
-    functions = (write_constants, common_of, begin, attempt, accept, renew_direction, start_is_finite, opening)
+    functions = (take_constants, common_of, begin, attempt, accept, renew_direction, start_is_finite, opening)
     return BlockSteps(*functions, load_start, store_start)

@@ -28,12 +28,12 @@ from warpchain.kernels.gpu.increments import EXCHANGED, block_steps, real_of, ve
 from warpchain.kernels.gpu.run import block_run, block_sample
 from warpchain.kernels.gpu.stage import Run, constants
 from warpchain.kernels.gpu.threads import address_at, barrier, block_maxima, tile_address, vec4i
-from warpchain.kernels.gpu.tilting import block_tilting
-from warpchain.kernels.gpu.upright import block_upright
+from warpchain.kernels.gpu.tilting import tilting_plane
+from warpchain.kernels.gpu.upright import upright_plane
 from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step, step_controller
 from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.physics.elementary import TWO
-from warpchain.kernels.types import read_ground, with_step_arguments
+from warpchain.kernels.types import Integers, Worlds, read_ground
 
 
 @functools.cache
@@ -70,7 +70,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     common_of, begin, attempt, accept = steps.common_of, steps.begin, steps.attempt, steps.accept
     renew_direction, start_is_finite, opening_of = steps.renew_direction, steps.start_is_finite, steps.opening
     renewed = increments.RENEWED
-    plane = block_tilting(block_dim, touch.votes) if tilts else block_upright(features.fixed_body)
+    plane = tilting_plane(block_dim, touch.votes) if tilts else upright_plane(features.fixed_body)
     growth, shrinkage = step_controller(tableau.order, tableau.error_order, wp.float32)
     begin_contacts, look, meet = block_contact_pass(features, block_dim, touch, plane)
     load_run, store_run = block_run(features, touch, plane, steps)
@@ -99,27 +99,26 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         cuda_max_registers=registers,
         module_options={"cpu_compiler_flags": COMPILER_FLAGS},
     )
-    @with_step_arguments
-    def advance_block(worlds, model, drive, state, record, scratch, lists, control):
+    def advance_block(launched: Integers, worlds: Worlds):
         block, lane = wp.tid()
-        world = worlds[block]
+        world = launched[block]
         exchange = wp.tile_empty(shape=(wp.static(EXCHANGED * block_dim),), dtype=real, storage="shared")
         starts = wp.tile_empty(shape=(wp.static(starts_size),), dtype=real, storage="shared")
         errors = wp.tile_empty(shape=(wp.static(block_dim),), dtype=wp.int32, storage="shared")
         maxima = wp.tile_empty(shape=(wp.static(block_dim),), dtype=vec4i, storage="shared")
         board = wp.tile_empty(shape=(wp.static(board_doubles),), dtype=wp.float64, storage="shared")
         touches = wp.tile_empty(shape=(wp.static(touch_size),), dtype=wp.int32, storage="shared")
-        if state.status[world] != RUNNING:
+        if worlds.status[world] != RUNNING:
             return
-        memory = scratch[world]
-        list_row = lists[world]
+        memory = worlds.scratch[world]
+        list_row = worlds.lists[world]
         board_start = board_address(board)
         touch_start = touch_address(touches)
         if wp.static(not is_shared):
             board_start = memory.ptr
             touch_start = list_row.ptr
         K = wp.array(ptr=board_start, shape=(wp.static(layout.BOARD_ROWS), wp.static(width)), dtype=wp.float64)
-        stored_plane = state.plane[world]
+        stored_plane = worlds.plane[world]
         P = stored_plane
         if wp.static(tilts):
             P = wp.array(
@@ -128,7 +127,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 dtype=wp.float64,
             )
         run = Run()
-        run.ground = read_ground(model, world)
+        run.ground = read_ground(worlds.model, world)
         run.world = world
         run.K = K
         run.kept = wp.array(ptr=memory.ptr, shape=(layout.BOARD_VALUES, wp.static(kept_width)), dtype=wp.float64)
@@ -144,32 +143,32 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         run.E = wp.array(ptr=run.exchange, shape=(5, wp.static(block_dim)), dtype=wp.float64)
         run.F = wp.array(ptr=behind, shape=(3, wp.static(block_dim)), dtype=wp.float64)
         run.M = wp.array(ptr=run.exchange, shape=(wp.static(5 * block_dim),), dtype=wp.float64)
-        run.skin = wp.float32(control.skin)
+        run.skin = wp.float32(worlds.control.skin)
         run.maxima = maxima_address(maxima)
-        run = find_link(run, model.chains[world], lane)
+        run = find_link(run, worlds.model.chains[world], lane)
 
-        load_run(run, model, drive, state, control)
+        load_run(run, worlds)
         common = common_of(run)
-        if state.is_fresh[world] != 0 or state.has_first_stage[world] == 0:
+        if worlds.is_fresh[world] != 0 or worlds.has_first_stage[world] == 0:
             begin(run, common, False)
         proximity = measure_proximity(run)
-        pairs, reach, status, spare = begin_contacts(run, state, control, proximity)
-        time = state.time[world]
-        step = wp.float32(state.step[world])  # and its length is exact in single precision
-        last_error = wp.float32(state.last_error[world])
-        attempts_before = attempts_made(state, world)
-        attempts_left = int(wp.min(wp.int64(control.attempts), control.step_limit - attempts_before))
-        if record_is_full(record, world):
+        pairs, reach, status, spare = begin_contacts(run, worlds, proximity)
+        time = worlds.time[world]
+        step = wp.float32(worlds.step[world])  # and its length is exact in single precision
+        last_error = wp.float32(worlds.last_error[world])
+        attempts_before = attempts_made(worlds, world)
+        attempts_left = int(wp.min(wp.int64(worlds.control.attempts), worlds.control.step_limit - attempts_before))
+        if record_is_full(worlds, world):
             attempts_left = 0
         attempts = int(0)
         accepted = int(0)
-        since = int(state.counts[world, layout.ACCEPTED] % wp.int64(wp.static(renewed)))
+        since = int(worlds.counts[world, layout.ACCEPTED] % wp.int64(wp.static(renewed)))
         opening = wp.float32(0.0)
-        smallest_step = wp.float32(control.smallest_step)
+        smallest_step = wp.float32(worlds.control.smallest_step)
         barrier()
         while status == RUNNING and attempts < attempts_left:
             if time >= K[wp.static(layout.BOARD_VALUES), layout.VALUE_NEXT_SAMPLE]:
-                changed, pauses, status = take_sample(run, model, drive, state, record, control, time)
+                changed, pauses, status = take_sample(run, worlds, time)
                 if changed:
                     barrier()  # drag has changed velocities
                     common = common_of(run)
@@ -178,7 +177,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     break
             stop_time = K[wp.static(layout.BOARD_VALUES), layout.VALUE_STOP_TIME]
             if time >= stop_time:
-                status = state.stop_status[world]
+                status = worlds.stop_status[world]
                 break
             # steps until there is something else to do
             mark = wp.min(stop_time, K[wp.static(layout.BOARD_VALUES), layout.VALUE_NEXT_SAMPLE])
@@ -206,7 +205,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     accepted += 1
                     accept(run, result)
                     time = later
-                    step = next_step(step, length, growth(error, last_error, control.proportional))
+                    step = next_step(step, length, growth(error, last_error, worlds.control.proportional))
                     last_error = wp.max(error, wp.float32(1e-4))
                     proximity = read_proximity(run)
                     opening = wp.max(opening, proximity.opening)
@@ -227,9 +226,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     since = int(0)
                     renew_direction(run)
                 if is_near:
-                    is_hit, pairs, reach, status, spare = meet(
-                        run, drive, state, control, time, proximity, own_gap, pairs, spare
-                    )
+                    is_hit, pairs, reach, status, spare = meet(run, worlds, time, proximity, own_gap, pairs, spare)
                 if is_hit or renews:
                     if not is_hit:
                         barrier()
@@ -243,16 +240,16 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                         status = int(NOT_FINITE)
                 if status == RUNNING and step < smallest_step:
                     status = int(STEP_TOO_SMALL)
-        if status == RUNNING and attempts_made(state, world) + wp.int64(attempts) >= control.step_limit:
+        if status == RUNNING and attempts_made(worlds, world) + wp.int64(attempts) >= worlds.control.step_limit:
             status = int(STEP_LIMIT)
         if lane == 0:
             raise_value(K, layout.VALUE_OPENING, opening)
-        store_run(run, state, record, time, status, accepted, attempts)
+        store_run(run, worlds, time, status, accepted, attempts)
         if lane == 0:
-            state.time_to_contact[world] = wp.float64(reach)
-            state.time[world] = time
-            state.step[world] = wp.float64(step)
-            state.last_error[world] = wp.float64(last_error)
-            state.status[world] = status
+            worlds.time_to_contact[world] = wp.float64(reach)
+            worlds.time[world] = time
+            worlds.step[world] = wp.float64(step)
+            worlds.last_error[world] = wp.float64(last_error)
+            worlds.status[world] = status
 
     return advance_block

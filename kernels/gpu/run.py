@@ -17,25 +17,25 @@ from warpchain.kernels.gpu.contacts.self_contacts import TouchLayout
 from warpchain.kernels.gpu.increments import BlockSteps
 from warpchain.kernels.gpu.stage import Run, constants, write_constants
 from warpchain.kernels.gpu.threads import barrier, clock
-from warpchain.kernels.gpu.upright import BlockPlane
+from warpchain.kernels.gpu.upright import PlaneHooks
 from warpchain.kernels.layout import BOARD_LOST_SELF, BOARD_VALUES, SELF_IMPULSES, STRAND_IMPULSES, VALUE_DEADLINE
 from warpchain.kernels.physics.elementary import ONE, ZERO
 from warpchain.kernels.physics.scaled_loads import drag_link, write_link
-from warpchain.kernels.types import Chain, Control, Drive, Integers, Model, Record, Row, Rows, State
+from warpchain.kernels.types import Chain, Integers, Row, Rows, Worlds
 
 SHARES = 5
 """Doubles of a thread in the memory in which stages exchange ends."""
 
 
 @wp.func
-def write_bounds(run: Run, drive: Drive, state: State, control: Control, is_driven: bool):
+def write_bounds(run: Run, worlds: Worlds, is_driven: bool):
     """For one thread: writes on the board what bounds steps, when the next sample or frame is due, and when to stop."""
     K = run.K
-    K[BOARD_VALUES, layout.VALUE_CONTACT_STEP] = contact_step(state, control, run.world, is_driven)
-    tolerance = spring_tolerance(drive, state, control, run.world, is_driven)
+    K[BOARD_VALUES, layout.VALUE_CONTACT_STEP] = contact_step(worlds, run.world, is_driven)
+    tolerance = spring_tolerance(worlds, run.world, is_driven)
     K[BOARD_VALUES, layout.VALUE_INVERSE_TOLERANCE] = ONE / tolerance
-    K[BOARD_VALUES, layout.VALUE_STOP_TIME] = state.stop_time[run.world]
-    K[BOARD_VALUES, layout.VALUE_NEXT_SAMPLE] = next_mark(state, control, run.world)
+    K[BOARD_VALUES, layout.VALUE_STOP_TIME] = worlds.stop_time[run.world]
+    K[BOARD_VALUES, layout.VALUE_NEXT_SAMPLE] = next_mark(worlds, run.world)
 
 
 @functools.cache
@@ -44,10 +44,10 @@ def hits_booking(features: Features, touch: TouchLayout):
     _, _, fixed_count = of_fixed_body(features.is_driven)
 
     @wp.func
-    def book_hits(T: Integers, state: State, world: int):
-        add_count(state, world, fixed_count, wp.int64(T[wp.static(touch.fixed_hits)]))
-        add_count(state, world, SELF_IMPULSES, wp.int64(T[wp.static(touch.self_hits)]))
-        add_count(state, world, STRAND_IMPULSES, wp.int64(T[wp.static(touch.strand_hits)]))
+    def book_hits(T: Integers, worlds: Worlds, world: int):
+        add_count(worlds, world, fixed_count, wp.int64(T[wp.static(touch.fixed_hits)]))
+        add_count(worlds, world, SELF_IMPULSES, wp.int64(T[wp.static(touch.self_hits)]))
+        add_count(worlds, world, STRAND_IMPULSES, wp.int64(T[wp.static(touch.strand_hits)]))
         T[wp.static(touch.fixed_hits)] = 0
         T[wp.static(touch.self_hits)] = 0
         T[wp.static(touch.strand_hits)] = 0
@@ -103,7 +103,7 @@ def note_drag(K: Rows, _chain: Chain, left: wp.float64):
 
 
 @functools.cache
-def block_run(features: Features, touch: TouchLayout, plane: BlockPlane, steps: BlockSteps):
+def block_run(features: Features, touch: TouchLayout, plane: PlaneHooks, steps: BlockSteps):
     """Warp functions for all threads of a block that load a chain's run and store it.
 
     ``load(run, model, drive, state, control)``, which ends with a barrier, and
@@ -115,44 +115,44 @@ def block_run(features: Features, touch: TouchLayout, plane: BlockPlane, steps: 
     write_sample = observation(features, read_totals)
 
     @wp.func
-    def load(run: Run, model: Model, drive: Drive, state: State, control: Control):
+    def load(run: Run, worlds: Worlds):
         K = run.K
         lane = run.lane
         world = run.world
-        load_link(run, state)
+        load_link(run, worlds)
         if lane < run.links:
-            write_link(K, model, world, lane, state.load_factor[world])
-            is_fresh = state.is_fresh[world] != 0
+            write_link(K, worlds.model, world, lane, worlds.load_factor[world])
+            is_fresh = worlds.is_fresh[world] != 0
             for row in range(BOARD_LOST_SELF, wp.static(BOARD_VALUES)):
                 K[row, lane] = wp.where(is_fresh, ZERO, run.kept[row, lane])
         wp.static(steps.load_start)(run)
-        wp.static(steps.write_constants)(run)
+        wp.static(steps.take_constants)(run)
         if lane == 0:
-            write_constants(K, present_chain(model, state, control, world))
+            write_constants(K, present_chain(worlds, world))
             plane.load(run)
-            write_bounds(run, drive, state, control, wp.static(is_driven))
-            K[BOARD_VALUES, layout.VALUE_OPENING] = state.extremes[world, layout.OPENING]
-            K[BOARD_VALUES, layout.VALUE_FIXED_DEPTH] = state.extremes[world, fixed_depth]
+            write_bounds(run, worlds, wp.static(is_driven))
+            K[BOARD_VALUES, layout.VALUE_OPENING] = worlds.extremes[world, layout.OPENING]
+            K[BOARD_VALUES, layout.VALUE_FIXED_DEPTH] = worlds.extremes[world, fixed_depth]
             for k in range(wp.static(touch.touching), wp.static(touch.size)):
                 run.T[k] = 0
-            K[BOARD_VALUES, VALUE_DEADLINE] = clock() + control.launch_time
+            K[BOARD_VALUES, VALUE_DEADLINE] = clock() + worlds.control.launch_time
         barrier()  # the chain's constants are on the board
         publish(run)
         barrier()
 
     @wp.func
-    def store(run: Run, state: State, record: Record, time: wp.float64, status: int, accepted: int, attempts: int):
+    def store(run: Run, worlds: Worlds, time: wp.float64, status: int, accepted: int, attempts: int):
         K = run.K
         lane = run.lane
         world = run.world
-        is_last = lacks_last_sample(state, world, time, status)
+        is_last = lacks_last_sample(worlds, world, time, status)
         publish(run)
         barrier()
         if is_last:
             write_totals(run)
         if lane < run.links:
             for k in range(6):
-                state.links[world, layout.X + k, lane] = K[layout.X + k, lane]
+                worlds.links[world, layout.X + k, lane] = K[layout.X + k, lane]
             for row in range(layout.COSINE, wp.static(layout.SINE + 1)):
                 run.kept[row, lane] = K[row, lane]
             for row in range(BOARD_LOST_SELF, wp.static(BOARD_VALUES)):
@@ -161,24 +161,24 @@ def block_run(features: Features, touch: TouchLayout, plane: BlockPlane, steps: 
         if lane == 0:
             plane.store(run)
             if is_last:
-                write_sample(K, constants(K), state, record, world, time)
-            store_losses(K, layout.BOARD_LOST_FRICTION, state, world, run.links, wp.static(fixed_loss))
-            state.losses[world, layout.LOSS_SELF] = row_total(K, BOARD_LOST_SELF, run.links)
-            add_count(state, world, layout.ACCEPTED, wp.int64(accepted))
-            add_count(state, world, layout.REJECTED, wp.int64(attempts - accepted))
-            book_hits(run.T, state, world)
-            state.extremes[world, layout.OPENING] = K[BOARD_VALUES, layout.VALUE_OPENING]
-            state.extremes[world, fixed_depth] = K[BOARD_VALUES, layout.VALUE_FIXED_DEPTH]
+                write_sample(K, constants(K), worlds, world, time)
+            store_losses(K, layout.BOARD_LOST_FRICTION, worlds, world, run.links, wp.static(fixed_loss))
+            worlds.losses[world, layout.LOSS_SELF] = row_total(K, BOARD_LOST_SELF, run.links)
+            add_count(worlds, world, layout.ACCEPTED, wp.int64(accepted))
+            add_count(worlds, world, layout.REJECTED, wp.int64(attempts - accepted))
+            book_hits(run.T, worlds, world)
+            worlds.extremes[world, layout.OPENING] = K[BOARD_VALUES, layout.VALUE_OPENING]
+            worlds.extremes[world, fixed_depth] = K[BOARD_VALUES, layout.VALUE_FIXED_DEPTH]
             deepest = wp.cast(run.T[wp.static(touch.deepest)], wp.float32)
-            raise_extreme(state, world, layout.SELF_DEPTH, wp.float64(deepest))
-            state.is_fresh[world] = 0
-            state.has_first_stage[world] = 1
+            raise_extreme(worlds, world, layout.SELF_DEPTH, wp.float64(deepest))
+            worlds.is_fresh[world] = 0
+            worlds.has_first_stage[world] = 1
 
     return load, store
 
 
 @functools.cache
-def block_sample(features: Features, touch: TouchLayout, plane: BlockPlane, steps: BlockSteps):
+def block_sample(features: Features, touch: TouchLayout, plane: PlaneHooks, steps: BlockSteps):
     """Warp function of a sample, for all threads of a block.
 
     ``take_sample(run, model, drive, state, record, control, time)`` → whether the chain has changed, so that its first
@@ -189,13 +189,11 @@ def block_sample(features: Features, touch: TouchLayout, plane: BlockPlane, step
     book_hits = hits_booking(features, touch)
 
     @wp.func
-    def take_sample(
-        run: Run, model: Model, drive: Drive, state: State, record: Record, control: Control, time: wp.float64
-    ):
+    def take_sample(run: Run, worlds: Worlds, time: wp.float64):
         T = run.T
         world = run.world
-        softness = state.softness[world]
-        load_factor = state.load_factor[world]
+        softness = worlds.softness[world]
+        load_factor = worlds.load_factor[world]
         K = run.K
         publish(run)
         barrier()
@@ -203,28 +201,28 @@ def block_sample(features: Features, touch: TouchLayout, plane: BlockPlane, step
         if run.lane == 0:
             K[BOARD_VALUES, layout.VALUE_DRAG] = ONE
             plane.store(run)
-            book_hits(T, state, world)
+            book_hits(T, worlds, world)
             chain = constants(K)
-            state.status[world] = sample(K, chain, drive, state, record, control, world, time)
-            if has_changed(state, world, softness, load_factor):
-                after = present_chain(model, state, control, world)
-                book_softening(chain, after, state, world)
+            worlds.status[world] = sample(K, chain, worlds, world, time)
+            if has_changed(worlds, world, softness, load_factor):
+                after = present_chain(worlds, world)
+                book_softening(chain, after, worlds, world)
                 write_constants(K, after)
-            write_bounds(run, drive, state, control, wp.static(is_driven))
+            write_bounds(run, worlds, wp.static(is_driven))
             if clock() > K[BOARD_VALUES, VALUE_DEADLINE]:
                 T[wp.static(touch.is_late)] = 1
         barrier()
-        status = state.status[world]
-        pauses = record_is_full(record, world) or T[wp.static(touch.is_late)] != 0
+        status = worlds.status[world]
+        pauses = record_is_full(worlds, world) or T[wp.static(touch.is_late)] != 0
         barrier()
-        changed = has_changed(state, world, softness, load_factor)
+        changed = has_changed(worlds, world, softness, load_factor)
         if wp.static(is_driven):
             if run.lane < run.links:
                 if K[BOARD_VALUES, layout.VALUE_DRAG] != ONE:
                     drag_link(K, run.lane, run.before, run.after, K[BOARD_VALUES, layout.VALUE_DRAG])
                 if changed:
-                    write_link(K, model, world, run.lane, state.load_factor[world])
-                    wp.static(steps.write_constants)(run)
+                    write_link(K, worlds.model, world, run.lane, worlds.load_factor[world])
+                    wp.static(steps.take_constants)(run)
         return changed, pauses, status
 
     return take_sample

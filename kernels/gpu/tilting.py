@@ -1,6 +1,6 @@
 """A chain whose plane may tilt, in a block of threads: see :mod:`cpu.tilting`.
 
-The first thread of the block moves the plane, a row of :attr:`State.plane` that lies behind the board meanwhile. Sums
+The first thread of the block moves the plane, a row of :attr:`Worlds.plane` that lies behind the board meanwhile. Sums
 over the links are those of the hardware warps, added up by the first thread, and round otherwise than on a CPU.
 """
 
@@ -13,12 +13,12 @@ from warpchain.kernels.contacts import tilting_floor
 from warpchain.kernels.gpu.contacts.proximity import touching_link
 from warpchain.kernels.gpu.stage import Run, constants
 from warpchain.kernels.gpu.threads import barrier, barrier_count, warp_width
-from warpchain.kernels.gpu.upright import BlockPlane
+from warpchain.kernels.gpu.upright import PlaneHooks
 from warpchain.kernels.layout import U
 from warpchain.kernels.physics import plane
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.physics.geometry import put
-from warpchain.kernels.types import Drive, Row, with_circles
+from warpchain.kernels.types import Row, Worlds, with_circles
 
 SUMS = layout.SUMS_OF_PLACES + layout.SUMS_OF_MOTION
 vec8d = wp.types.vector(length=8, dtype=wp.float64)
@@ -85,7 +85,7 @@ def copy_plane(target: Row, source: Row):
 
 
 @functools.cache
-def block_tilting(block_dim: int, votes: int) -> BlockPlane:
+def tilting_plane(block_dim: int, votes: int) -> PlaneHooks:
     """A plane that may tilt above a flat floor; votes: slot of :func:`gpu.threads.barrier_count`."""
 
     @wp.func
@@ -133,7 +133,7 @@ def block_tilting(block_dim: int, votes: int) -> BlockPlane:
             plane.end_step(run.P, constants(run.K).gravity, h)
 
     @wp.func
-    def meet(run: Run, _drive: Drive, _time: wp.float64, _gap: wp.float32):
+    def meet(run: Run, _worlds: Worlds, _time: wp.float64, _gap: wp.float32):
         K = run.K
         P = run.P
         lane = run.lane
@@ -172,4 +172,4 @@ def block_tilting(block_dim: int, votes: int) -> BlockPlane:
                 K[layout.BOARD_LOST_FIXED, 0] = K[layout.BOARD_LOST_FIXED, 0] + lost
         return hits
 
-    return BlockPlane(meet, load, store, begin_run, begin_step, end_step)
+    return PlaneHooks(meet, load, store, begin_run, begin_step, end_step)

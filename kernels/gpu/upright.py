@@ -9,7 +9,7 @@ import warp as wp
 from warpchain.kernels.gpu.contacts.proximity import block_contact
 from warpchain.kernels.gpu.stage import Run
 from warpchain.kernels.hooks import Hooks, hook
-from warpchain.kernels.types import Drive
+from warpchain.kernels.types import Worlds
 
 
 @wp.func
@@ -25,7 +25,7 @@ def no_motion(_run: Run, _h: wp.float64):
 
 
 @dataclass(frozen=True)
-class BlockPlane(Hooks):
+class PlaneHooks(Hooks):
     """Warp functions of a chain's plane and of the floor or sprocket that it meets, for all threads of a block.
 
     Between a function that uses ``run.M`` and any other use of that memory there must be a barrier.
@@ -33,7 +33,7 @@ class BlockPlane(Hooks):
 
     # applies the impulses of the floor or sprocket, from which this thread's link has that gap [m] → number of those of
     # this thread
-    meet: Any = hook(run=Run, drive=Drive, time=wp.float64, gap=wp.float32)
+    meet: Any = hook(run=Run, worlds=Worlds, time=wp.float64, gap=wp.float32)
     # loads the plane, and stores it; for one thread
     load: Any = hook(run=Run, otherwise=nothing)
     store: Any = hook(run=Run, otherwise=nothing)
@@ -46,15 +46,15 @@ class BlockPlane(Hooks):
 
 
 @functools.cache
-def block_upright(fixed_body: str) -> BlockPlane:
+def upright_plane(fixed_body: str) -> PlaneHooks:
     """A plane that stays upright, for a key of :data:`contacts.fixed_body.BODIES`."""
     meet_body = block_contact(fixed_body)
 
     @wp.func
-    def meet(run: Run, drive: Drive, time: wp.float64, gap: wp.float32):
+    def meet(run: Run, worlds: Worlds, time: wp.float64, gap: wp.float32):
         hits = int(0)
         if run.lane < run.links and gap < wp.float32(0.0):
-            hits = meet_body(run, drive, time)
+            hits = meet_body(run, worlds, time)
         return hits
 
-    return BlockPlane(meet)
+    return PlaneHooks(meet)

@@ -35,7 +35,7 @@ the last two steps. An upright plane at rest stays so exactly. With contacts bef
 method of first order: in a walk of 20 links at 1e-9 that falls over the ledger of energy missed 8e-7 of the energy at
 the release, and misses 1e-9 as it is.
 
-Functions here work on one row of :attr:`State.plane`, see :mod:`layout`.
+Functions here work on one row of :attr:`Worlds.plane`, see :mod:`layout`.
 """
 
 import warp as wp

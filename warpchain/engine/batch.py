@@ -13,14 +13,14 @@ from warpchain.engine.control import control_of
 from warpchain.engine.devices import Gpu, start_device
 from warpchain.engine.kernel_choice import block_threads, step_kernel
 from warpchain.engine.mirror import Mirror
-from warpchain.engine.world import World
+from warpchain.engine.world import CACHES, World
 from warpchain.inputs.options import Options
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.cpu.implicit.rigid_layout import scratch_rows
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.functions import board_rows
-from warpchain.kernels.types import Drive, Model, Record, State
+from warpchain.kernels.types import Drive, Model, Record, Worlds
 from warpchain.status import Status
 
 LANES = 3
@@ -39,7 +39,8 @@ CAPACITY_FRAMES = 64
 """Frames of a chain that a device can hold between two launches, if frames are kept."""
 
 
-_STRUCTS: dict[str, Any] = {"model": Model, "drive": Drive, "state": State, "record": Record}
+_STRUCTS: dict[str, Any] = {"model": Model, "drive": Drive, "state": Worlds, "record": Record}
+"""Structs whose arrays have a copy on the host, by the first part of the names of the copies."""
 
 
 class Batch:
@@ -99,19 +100,21 @@ class Batch:
         fields: dict[str, tuple[tuple[int, ...], Any]] = {"worlds": ((worlds,), wp.int32)}  # of a launch, by groups
         for group, struct in _STRUCTS.items():
             for name, field in struct.vars.items():
-                fields[f"{group}/{name}"] = (worlds, *shapes.get(f"{group}/{name}", ())), field.type.dtype
+                if wp.types.is_array(field.type) and name not in CACHES:
+                    fields[f"{group}/{name}"] = (worlds, *shapes.get(f"{group}/{name}", ())), field.type.dtype
         parts = [{name: fields.pop(name) for name in recorded}, fields]
         self._recorded, self._numbers = (Mirror(part, self.device, self._stream) for part in parts)
         self._host, arrays = self._numbers.host | self._recorded.host, self._numbers.arrays | self._recorded.arrays
         self._launched = arrays.pop("worlds")
-        structs = {group: struct() for group, struct in _STRUCTS.items()}
+        self.state = Worlds()
+        self.model, self.drive, self.record = self.state.model, self.state.drive, self.state.record
         for path, array in arrays.items():
             group, _, name = path.partition("/")
-            setattr(structs[group], name, array)
-        self.model, self.drive, self.state, self.record = structs.values()
+            setattr(getattr(self, group), name, array)
         self._host["state/status"][:] = int(Status.FINISHED)
 
-        self.control = control_of(options)
+        self.control = self.state.control
+        self.control.assign(control_of(options))
         self.control.launch_time = LAUNCH_SECONDS
         self.control.frame_every = keep.frame_every or 1
         self.control.frame_interval = keep.frame_interval
@@ -120,6 +123,7 @@ class Batch:
         rows = board_rows(self.threads, width) if self._gpu else scratch_rows(options.method, width, options.is_mixed)
         self.scratch = wp.zeros((worlds, rows, width), dtype=wp.float64, device=self.device.warp)
         self.lists = wp.zeros((worlds, list_layout(width).size), dtype=wp.int32, device=self.device.warp)
+        self.state.scratch, self.state.lists = self.scratch, self.lists
         self.bytes: int = self._numbers.bytes + self._recorded.bytes + self.scratch.capacity + self.lists.capacity
         self._caches = {"scratch": self.scratch, "lists": self.lists}
         self.worlds = [World(number, self._host, self._caches) for number in range(worlds)]
@@ -161,12 +165,11 @@ class Batch:
         Until :meth:`finish` the host may not read the worlds. On a GPU this returns at once.
         """
         self.control.attempts = attempts or self.attempts_of_launch
-        arrays = [self.model, self.drive, self.state, self.record, self.scratch, self.lists, self.control]
         kernels = [step_kernel(self.device, features, self.threads) for features in groups]
         if self._gpu is None:
             for kernel, worlds in zip(kernels, groups.values(), strict=True):
                 numbers = wp.array(np.asarray(worlds, dtype=np.int32), dtype=wp.int32, device=self.device.warp)
-                wp.launch(kernel, dim=len(worlds), inputs=[numbers, *arrays], device=self.device.warp)
+                wp.launch(kernel, dim=len(worlds), inputs=[numbers, self.state], device=self.device.warp)
             return
         order = np.concatenate([*groups.values()])
         self._host["worlds"][: len(order)] = order
@@ -178,7 +181,7 @@ class Batch:
         first = 0
         for kernel, worlds, lane in zip(kernels, groups.values(), itertools.cycle(self._lanes), strict=False):
             numbers = self._launched[first : first + len(worlds)]
-            self._gpu.launch(kernel, len(worlds), [numbers, *arrays], self.threads, lane)
+            self._gpu.launch(kernel, len(worlds), [numbers, self.state], self.threads, lane)
             first += len(worlds)
         for lane in self._lanes:
             self._stream.wait_event(lane.record_event())

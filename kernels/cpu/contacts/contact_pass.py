@@ -17,7 +17,7 @@ from warpchain.kernels.cpu.upright import PlaneHooks
 from warpchain.kernels.events.tallies import add_count, book_loss, note_floor_impulse, of_fixed_body, raise_extreme
 from warpchain.kernels.features import Features
 from warpchain.kernels.physics.elementary import ZERO
-from warpchain.kernels.types import Chain, Control, Drive, Ground, Integers, Row, Rows, State
+from warpchain.kernels.types import Chain, Ground, Integers, Row, Rows, Worlds
 
 
 @functools.cache
@@ -36,28 +36,28 @@ def body_pass(features: Features, plane: PlaneHooks):
 
     @wp.func
     def meet_bodies(
-        K: Rows, P: Row, chain: Chain, felt: Chain, ground: Ground, still: Face, drive: Drive, state: State, world: int
+        K: Rows, P: Row, chain: Chain, felt: Chain, ground: Ground, still: Face, worlds: Worlds, world: int
     ):
-        time = state.time[world]
+        time = worlds.time[world]
         impulses = wp.int64(0)
         gap = plane.gap(K, felt, ground, still)
         if gap < ZERO:
-            raise_extreme(state, world, depth, -gap)
-            impulses = plane.meet(K, P, chain, ground, face_at(still, drive, world, time))
-            add_count(state, world, count, impulses)
+            raise_extreme(worlds, world, depth, -gap)
+            impulses = plane.meet(K, P, chain, ground, face_at(still, worlds.drive, world, time))
+            add_count(worlds, world, count, impulses)
             if wp.static(features.has_floor):
                 if impulses > wp.int64(0):
-                    note_floor_impulse(state, world, time)
+                    note_floor_impulse(worlds, world, time)
         if wp.static(moves):
-            moved = sprocket_at(Face(), drive, world, time)
+            moved = sprocket_at(Face(), worlds.drive, world, time)
             overlap = -sprocket_gap(K, chain, ground, moved)
             if overlap > ZERO:
-                raise_extreme(state, world, layout.SPROCKET_DEPTH, overlap)
+                raise_extreme(worlds, world, layout.SPROCKET_DEPTH, overlap)
                 on_sprocket = resolve_sprocket(K, P, chain, ground, moved)
-                add_count(state, world, layout.SPROCKET_IMPULSES, on_sprocket)
+                add_count(worlds, world, layout.SPROCKET_IMPULSES, on_sprocket)
                 impulses += on_sprocket
             gap = wp.min(gap, ZERO)  # the sprocket may come nearer by itself: steps stay short
-        state.gap[world] = gap
+        worlds.gap[world] = gap
         return impulses
 
     return meet_bodies
@@ -76,28 +76,30 @@ def link_pass(features: Features, joints: Joints):
     lists = list_layout(features.columns)
 
     @wp.func
-    def make_list(K: Rows, L: Integers, chain: Chain, state: State, world: int, skin: wp.float64, opening: wp.float64):
+    def make_list(
+        K: Rows, L: Integers, chain: Chain, worlds: Worlds, world: int, skin: wp.float64, opening: wp.float64
+    ):
         if wp.static(has_self):
             if not build_list(K, L, chain, skin, opening):
-                state.status[world] = LIST_OVERFLOW
-            state.slack[world] = list_slack(K, chain, L[wp.static(lists.nearest)], opening)
+                worlds.status[world] = LIST_OVERFLOW
+            worlds.slack[world] = list_slack(K, chain, L[wp.static(lists.nearest)], opening)
 
     @wp.func
-    def meet_links(K: Rows, L: Integers, chain: Chain, state: State, control: Control, world: int, opening: wp.float64):
+    def meet_links(K: Rows, L: Integers, chain: Chain, worlds: Worlds, world: int, opening: wp.float64):
         impulses = wp.int64(0)
         if wp.static(has_self):
-            skin, least_slack = joints.margins(state, control, world)
-            if state.slack[world] > ZERO:
-                state.slack[world] = list_slack(K, chain, L[wp.static(lists.nearest)], opening)
-            if not state.slack[world] > least_slack:
-                add_count(state, world, layout.LIST_BUILDS, wp.int64(1))
-                make_list(K, L, chain, state, world, skin, opening)
+            skin, least_slack = joints.margins(worlds, world)
+            if worlds.slack[world] > ZERO:
+                worlds.slack[world] = list_slack(K, chain, L[wp.static(lists.nearest)], opening)
+            if not worlds.slack[world] > least_slack:
+                add_count(worlds, world, layout.LIST_BUILDS, wp.int64(1))
+                make_list(K, L, chain, worlds, world, skin, opening)
             if L[wp.static(lists.count)] > 0:
                 hits, strands, lost, depth = resolve(K, L, chain, opening)
-                add_count(state, world, layout.SELF_IMPULSES, hits)
-                add_count(state, world, layout.STRAND_IMPULSES, strands)
-                raise_extreme(state, world, layout.SELF_DEPTH, depth)
-                book_loss(state, world, layout.LOSS_SELF, lost)
+                add_count(worlds, world, layout.SELF_IMPULSES, hits)
+                add_count(worlds, world, layout.STRAND_IMPULSES, strands)
+                raise_extreme(worlds, world, layout.SELF_DEPTH, depth)
+                book_loss(worlds, world, layout.LOSS_SELF, lost)
                 impulses = hits
         return impulses
 

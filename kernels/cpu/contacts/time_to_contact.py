@@ -17,7 +17,7 @@ from warpchain.kernels.cpu.contacts.proximity import greatest_speed
 from warpchain.kernels.features import Features
 from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, OMEGA, RADIUS, RIGHT_X, RIGHT_Y, SINE, U, V
 from warpchain.kernels.physics.elementary import HALF, ONE, TWO, ZERO, order_bits
-from warpchain.kernels.types import Chain, Control, Integers, Rows, State, with_circles
+from warpchain.kernels.types import Chain, Integers, Rows, Worlds, with_circles
 
 FLIGHT_SKIN = wp.constant(wp.float64(4.0))
 """The skin of the neighbour list is so many times as wide in a flight, whose steps may move joints by half of it."""
@@ -106,15 +106,13 @@ def step_bound(features: Features, has_flight: bool):
         approaching = fastest_approach(features.fixed_body)
 
     @wp.func
-    def bound(
-        K: Rows, L: Integers, chain: Chain, face: Face, control: Control, state: State, world: int, longest: wp.float64
-    ):
+    def bound(K: Rows, L: Integers, chain: Chain, face: Face, worlds: Worlds, world: int, longest: wp.float64):
         if wp.static(not (has_fixed or has_self)):
             return wp.float64(wp.inf)
-        gap = state.gap[world]
-        slack = state.slack[world]
+        gap = worlds.gap[world]
+        slack = worlds.slack[world]
         if wp.static(has_flight):
-            if state.is_rigid[world] != 0:
+            if worlds.is_rigid[world] != 0:
                 approach = ZERO
                 if wp.static(is_plane):
                     approach = approaching(K, chain, face)
@@ -126,14 +124,14 @@ def step_bound(features: Features, has_flight: bool):
                     approach = wp.max(approach, greatest_speed(K, chain) / wp.max(slack, SMALLEST_GAP))
                 approach = wp.max(approach, wp.sqrt(HALF * chain.gravity / FALL))
                 return wp.max(longest, ONE / approach)
-        distance = control.skin
+        distance = worlds.control.skin
         is_near = bool(False)
         if wp.static(has_fixed):
-            is_near = gap < control.skin
+            is_near = gap < worlds.control.skin
             distance = HALF * gap
         if wp.static(has_self):
             is_near = is_near or L[wp.static(count)] > 0
-            distance = wp.min(distance, wp.min(slack, MOST_WAY * control.skin))
+            distance = wp.min(distance, wp.min(slack, MOST_WAY * worlds.control.skin))
         if is_near:
             return longest
         return wp.max(longest, distance / greatest_speed(K, chain))

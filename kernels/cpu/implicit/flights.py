@@ -28,7 +28,7 @@ from warpchain.kernels.methods.controller import classical_controller
 from warpchain.kernels.methods.w_tableaus import ERROR_ORDER
 from warpchain.kernels.physics.elementary import ONE, TWO, ZERO
 from warpchain.kernels.physics.geometry import put, two
-from warpchain.kernels.types import Chain, Control, Rows, State
+from warpchain.kernels.types import Chain, Rows, Worlds
 
 QUIET_TIME = wp.constant(wp.float64(5e-5))
 """A chain may close its joints after no impulse for this long [s].
@@ -100,16 +100,16 @@ def joint_switch(columns: int, first_row: int):
 
 
 @wp.func
-def swap_models(K: Rows, chain: Chain, state: State, world: int, is_rigid: int, lost: wp.float64):
+def swap_models(K: Rows, chain: Chain, worlds: Worlds, world: int, is_rigid: int, lost: wp.float64):
     """Goes on with the other model of the joints, and with the last step that was proposed for it."""
-    state.is_rigid[world] = is_rigid
-    step = state.step[world]
-    state.step[world] = state.other_step[world]
-    state.other_step[world] = step
-    state.slack[world] = wp.float64(-1.0)  # flights have a greater skin: the list is built anew
-    state.last_error[world] = ONE
+    worlds.is_rigid[world] = is_rigid
+    step = worlds.step[world]
+    worlds.step[world] = worlds.other_step[world]
+    worlds.other_step[world] = step
+    worlds.slack[world] = wp.float64(-1.0)  # flights have a greater skin: the list is built anew
+    worlds.last_error[world] = ONE
     place_ends(K, chain)
-    book_loss(state, world, layout.LOSS_JOINT_SWITCH, lost)
+    book_loss(worlds, world, layout.LOSS_JOINT_SWITCH, lost)
 
 
 @functools.cache
@@ -122,59 +122,57 @@ def rigid_in_flight(on_springs: Joints, columns: int) -> Joints:
     growth, shrink = classical_controller(ERROR_ORDER)
 
     @wp.func
-    def settle(K: Rows, chain: Chain, state: State, world: int):
+    def settle(K: Rows, chain: Chain, worlds: Worlds, world: int):
         # soft joints are not made rigid: their springs still ring when the next impulse comes
-        time = state.time[world]
-        if state.is_rigid[world] == 0 and time >= state.closing_time[world] and state.softness[world] == ZERO:
+        time = worlds.time[world]
+        if worlds.is_rigid[world] == 0 and time >= worlds.closing_time[world] and worlds.softness[world] == ZERO:
             closed, lost = close_joints(K, chain)
-            state.closing_time[world] = time + QUIET_TIME
+            worlds.closing_time[world] = time + QUIET_TIME
             if closed:
-                swap_models(K, chain, state, world, 1, lost)
+                swap_models(K, chain, worlds, world, 1, lost)
 
     @wp.func
-    def first_stage(K: Rows, chain: Chain, state: State, world: int):
-        if state.is_rigid[world] == 0:
-            on_springs.first_stage(K, chain, state, world)
+    def first_stage(K: Rows, chain: Chain, worlds: Worlds, world: int):
+        if worlds.is_rigid[world] == 0:
+            on_springs.first_stage(K, chain, worlds, world)
 
     @wp.func
-    def attempt(
-        K: Rows, chain: Chain, state: State, control: Control, world: int, h: wp.float64, tolerance: wp.float64
-    ):
-        if state.is_rigid[world] == 0:
-            return on_springs.attempt(K, chain, state, control, world, h, tolerance)
-        return attempt_flight(K, chain, h, control.flight_tolerance)
+    def attempt(K: Rows, chain: Chain, worlds: Worlds, world: int, h: wp.float64, tolerance: wp.float64):
+        if worlds.is_rigid[world] == 0:
+            return on_springs.attempt(K, chain, worlds, world, h, tolerance)
+        return attempt_flight(K, chain, h, worlds.control.flight_tolerance)
 
     @wp.func
-    def shrinkage(state: State, world: int, error: wp.float64):
-        if state.is_rigid[world] == 0:
-            return on_springs.shrinkage(state, world, error)
+    def shrinkage(worlds: Worlds, world: int, error: wp.float64):
+        if worlds.is_rigid[world] == 0:
+            return on_springs.shrinkage(worlds, world, error)
         return shrink(error)
 
     @wp.func
-    def accept(K: Rows, chain: Chain, state: State, control: Control, world: int, h: wp.float64, error: wp.float64):
-        if state.is_rigid[world] == 0:
-            return on_springs.accept(K, chain, state, control, world, h, error)
+    def accept(K: Rows, chain: Chain, worlds: Worlds, world: int, h: wp.float64, error: wp.float64):
+        if worlds.is_rigid[world] == 0:
+            return on_springs.accept(K, chain, worlds, world, h, error)
         may_stay = commit_flight(K, chain, h)
         place_ends(K, chain)
-        return growth(error, state.last_error[world], control.proportional), may_stay
+        return growth(error, worlds.last_error[world], worlds.control.proportional), may_stay
 
     @wp.func
-    def margins(state: State, control: Control, world: int):
-        if state.is_rigid[world] == 0:
-            return on_springs.margins(state, control, world)
-        skin = FLIGHT_SKIN * control.skin
+    def margins(worlds: Worlds, world: int):
+        if worlds.is_rigid[world] == 0:
+            return on_springs.margins(worlds, world)
+        skin = FLIGHT_SKIN * worlds.control.skin
         return skin, LEAST_SLACK * skin
 
     @wp.func
-    def react(K: Rows, chain: Chain, state: State, world: int):
-        state.closing_time[world] = state.time[world] + QUIET_TIME
-        if state.is_rigid[world] != 0:
-            swap_models(K, chain, state, world, 0, open_joints(K, chain))
+    def react(K: Rows, chain: Chain, worlds: Worlds, world: int):
+        worlds.closing_time[world] = worlds.time[world] + QUIET_TIME
+        if worlds.is_rigid[world] != 0:
+            swap_models(K, chain, worlds, world, 0, open_joints(K, chain))
 
     @wp.func
-    def rates_are_finite(K: Rows, chain: Chain, state: State, world: int):
-        if state.is_rigid[world] == 0:
-            return on_springs.rates_are_finite(K, chain, state, world)
+    def start_is_finite(K: Rows, chain: Chain, worlds: Worlds, world: int):
+        if worlds.is_rigid[world] == 0:
+            return on_springs.start_is_finite(K, chain, worlds, world)
         S = rows(K)
         finite = bool(True)
         for c in range(8, end_column(chain)):
@@ -191,5 +189,5 @@ def rigid_in_flight(on_springs: Joints, columns: int) -> Joints:
         accept=accept,
         margins=margins,
         react=react,
-        rates_are_finite=rates_are_finite,
+        start_is_finite=start_is_finite,
     )

@@ -15,15 +15,15 @@ from warpchain.kernels.gpu.contacts.proximity import block_contact, block_proxim
 from warpchain.kernels.gpu.contacts.self_contacts import TouchLayout, block_self_contacts
 from warpchain.kernels.gpu.stage import Proximity, Run, constants
 from warpchain.kernels.gpu.threads import barrier_count
-from warpchain.kernels.gpu.upright import BlockPlane
-from warpchain.kernels.types import Control, Drive, State
+from warpchain.kernels.gpu.upright import PlaneHooks
+from warpchain.kernels.types import Worlds
 
 MARGIN = wp.constant(wp.float32(1.0 + 2e-6))
 """More than the roundings of lengths in single precision."""
 
 
 @functools.cache
-def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, plane: BlockPlane):
+def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, plane: PlaneHooks):
     """Warp functions (begin, look, meet) of the contacts, for all threads of a block.
 
     ``begin(run, state, control, proximity)`` → number of listed pairs, longest step [s] that cannot miss a contact (see
@@ -41,9 +41,9 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
     meet_sprocket = block_contact("moving sprocket")
 
     @wp.func
-    def list_pairs(run: Run, control: Control, opening: wp.float32, is_far: bool):
+    def list_pairs(run: Run, worlds: Worlds, opening: wp.float32, is_far: bool):
         """Builds the neighbour list; the number of its pairs, and the status."""
-        pairs = build_list(run, control.skin, upper_bound(opening), is_far)
+        pairs = build_list(run, worlds.control.skin, upper_bound(opening), is_far)
         status = wp.where(pairs > wp.static(lists.capacity), LIST_OVERFLOW, RUNNING)
         return wp.min(pairs, wp.static(lists.capacity)), status
 
@@ -59,18 +59,18 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
         return spare - MARGIN * (wp.abs(spare) * wp.static(wp.float32(1e-6)) + opening + displacement)
 
     @wp.func
-    def begin(run: Run, state: State, control: Control, proximity: Proximity):
+    def begin(run: Run, worlds: Worlds, proximity: Proximity):
         status = int(RUNNING)
         pairs = int(0)
         # kept from the last launch, since recomputing could round differently
-        reach = wp.float32(state.time_to_contact[run.world])
+        reach = wp.float32(worlds.time_to_contact[run.world])
         spare = wp.float32(0.0)
-        if state.is_fresh[run.world] == 0:
+        if worlds.is_fresh[run.world] == 0:
             if wp.static(has_self):
                 pairs = run.L[wp.static(lists.count)]
         else:
             if wp.static(has_self):
-                pairs, status = list_pairs(run, control, proximity.opening, True)
+                pairs, status = list_pairs(run, worlds, proximity.opening, True)
             plane.begin_run(run)
             if wp.static(has_self):
                 spare = spare_of(run)
@@ -93,9 +93,7 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
     @wp.func
     def meet(
         run: Run,
-        drive: Drive,
-        state: State,
-        control: Control,
+        worlds: Worlds,
         time: wp.float64,
         proximity: Proximity,
         own_gap: wp.float32,
@@ -117,16 +115,16 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
         if wp.static(has_fixed):
             if gap < wp.float32(0.0):
                 is_near = bool(True)
-                hits = plane.meet(run, drive, time, own_gap)
+                hits = plane.meet(run, worlds, time, own_gap)
                 if hits > 0:
                     wp.atomic_add(T, wp.static(touch.fixed_hits), hits)
         if wp.static(features.moving_sprocket):
             is_near = bool(True)
             if lane < run.links:
-                struck = meet_sprocket(run, drive, time)
+                struck = meet_sprocket(run, worlds, time)
                 hits += struck
                 if struck > 0:
-                    wp.atomic_add(state.counts, run.world, wp.static(layout.SPROCKET_IMPULSES), wp.int64(struck))
+                    wp.atomic_add(worlds.counts, run.world, wp.static(layout.SPROCKET_IMPULSES), wp.int64(struck))
         if wp.static(has_self):
             is_stale = not still > wp.float32(0.0)
             if is_stale or pairs > 0:
@@ -140,12 +138,12 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
                 raise_value(run.K, layout.VALUE_FIXED_DEPTH, -gap)
                 if wp.static(features.has_floor):
                     if is_hit:
-                        note_floor_impulse(state, run.world, time)
+                        note_floor_impulse(worlds, run.world, time)
         if wp.static(has_self):
             if is_stale:
                 if lane == 0:
-                    add_count(state, run.world, layout.LIST_BUILDS, wp.int64(1))
-                pairs, status = list_pairs(run, control, opening, pairs == 0)
+                    add_count(worlds, run.world, layout.LIST_BUILDS, wp.int64(1))
+                pairs, status = list_pairs(run, worlds, opening, pairs == 0)
                 spare = spare_of(run)
                 still = slack(spare, opening, wp.float32(0.0))
             if pairs > 0:

@@ -22,7 +22,7 @@ from warpchain.kernels.physics.elementary import (
     quick_quotient,
 )
 from warpchain.kernels.physics.geometry import Link, put
-from warpchain.kernels.types import Drive, with_circles
+from warpchain.kernels.types import Worlds, with_circles
 
 OPENING_MARGIN = wp.constant(wp.float64(1.0 + 1e-6))
 vec3d = wp.types.vector(length=3, dtype=wp.float64)
@@ -149,10 +149,10 @@ def block_contact(fixed_body: str):
     face_of, face_at = BODIES[fixed_body].face, BODIES[fixed_body].motion
 
     @wp.func
-    def meet_body(run: Run, drive: Drive, time: wp.float64):
+    def meet_body(run: Run, worlds: Worlds, time: wp.float64):
         K = run.K
         chain = with_circles(constants(K), K[RADIUS, run.lane])
-        face = face_at(face_of(run.ground), drive, run.world, time)
+        face = face_at(face_of(run.ground), worlds.drive, run.world, time)
         link = meet(chain, run.ground, face, touching_link(run))
         put(K, U, run.lane, wp.vec3d(link.u, link.v, link.omega))
         K[layout.BOARD_LOST_FIXED, run.lane] = link.lost
