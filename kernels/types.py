@@ -208,6 +208,10 @@ class Worlds:
     losses: wp.array2d(dtype=wp.float64)  # (W, LOSS_ROWS) [J]
 
 
+STATE: tuple[str, ...] = tuple(Worlds.vars)[6:]  # type: ignore[attr-defined]
+"""Names of the arrays of the worlds' state."""
+
+
 def make_entry(module: wp.Module, is_block: bool):
     """Kernel without a body: name, arguments, threads of a step kernel; ``is_block``: for ``wp.launch_tiled``."""
 

@@ -37,7 +37,7 @@ from warpchain.kernels.types import Chain, Integers, Rows, Worlds, read_ground
 
 
 @wp.func
-def load_state(K: Rows, worlds: Worlds, chain: Chain, world: int):
+def load_state(K: Rows, chain: Chain, worlds: Worlds, world: int):
     """Fills the rows of the state; rows of losses start at zero, columns behind the links are links without mass."""
     for i in range((chain.link_count + wp.static(2 * layout.LANES - 1)) & wp.static(-2 * layout.LANES)):
         for row in range(wp.static(layout.SCRATCH_ROWS)):
@@ -127,7 +127,7 @@ def make_advance(features: Features):
         still = face_of(ground)
         chain = present_chain(worlds, world)
         if worlds.is_fresh[world] != 0:
-            load_state(K, worlds, chain, world)
+            load_state(K, chain, worlds, world)
             joints.take_constants(K, chain)
             place_ends(K, chain)
             plane.begin_run(K, P, chain)

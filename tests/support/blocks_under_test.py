@@ -111,8 +111,7 @@ def batch_of(
 def launch_kernel(batch: Batch, kernel: wp.Kernel, worlds: Sequence[int], attempts: int, *, block_dim: int) -> None:
     """Carry worlds on by at most this many attempts each in a GPU kernel."""
     batch.control.attempts = attempts
-    arrays = [batch.model, batch.drive, batch.state, batch.record, batch.scratch, batch.lists, batch.control]
-    inputs = [wp.array(worlds, dtype=wp.int32, device="cpu"), *arrays]
+    inputs = [wp.array(worlds, dtype=wp.int32, device="cpu"), batch.state]
     with fibers():
         wp.launch_tiled(kernel, dim=[len(worlds)], inputs=inputs, block_dim=block_dim, device="cpu")
 
@@ -126,8 +125,7 @@ def launch_blocks(batch: Batch, features: Features, attempts: int, *, block_dim:
 def launch_chains(batch: Batch, features: Features, attempts: int) -> None:
     """Carry all worlds on in the CPU kernel for these features."""
     batch.control.attempts = attempts
-    arrays = [batch.model, batch.drive, batch.state, batch.record, batch.scratch, batch.lists, batch.control]
-    inputs = [wp.array(range(len(batch.worlds)), dtype=wp.int32, device="cpu"), *arrays]
+    inputs = [wp.array(range(len(batch.worlds)), dtype=wp.int32, device="cpu"), batch.state]
     wp.launch(cpu_loop.make_advance(features), dim=len(batch.worlds), inputs=inputs, device="cpu")
 
 

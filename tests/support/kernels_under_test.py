@@ -28,7 +28,7 @@ from warpchain.kernels.cpu.contacts.self_contacts import self_contacts
 from warpchain.kernels.cpu.loop import load_state
 from warpchain.kernels.cpu.placing import place_ends
 from warpchain.kernels.features import COMPILER_FLAGS
-from warpchain.kernels.types import Model, State, read_ground
+from warpchain.kernels.types import Model, Worlds, read_ground
 
 DEVICE = start_device("cpu").warp
 POISONED_JOINT = 2**30
@@ -57,12 +57,13 @@ def model_of(chains: Sequence[tuple[int, Parameters | UnlikeLinks]]) -> Model:
     return batch.model
 
 
-def chain_on_cpu(position: Array, velocity: Array, parameters: Parameters | UnlikeLinks) -> tuple[Model, State]:
-    """Structs of one chain; of its state only the links and the factor of its loads are set."""
-    state = State()
-    state.load_factor = wp.ones(1, dtype=wp.float64, device=DEVICE)
-    state.links = wp.array(np.hstack([position, velocity]).T[None], dtype=wp.float64, device=DEVICE)
-    return model_of([(len(position), parameters)]), state
+def chain_on_cpu(position: Array, velocity: Array, parameters: Parameters | UnlikeLinks) -> Worlds:
+    """One chain; of its state only the links and the factor of its loads are set."""
+    worlds = Worlds()
+    worlds.model = model_of([(len(position), parameters)])
+    worlds.load_factor = wp.ones(1, dtype=wp.float64, device=DEVICE)
+    worlds.links = wp.array(np.hstack([position, velocity]).T[None], dtype=wp.float64, device=DEVICE)
+    return worlds
 
 
 # --- the contact pass ---
@@ -87,8 +88,7 @@ def _contact_pass(columns: int) -> wp.Kernel:
 
     @compiled
     def contact_pass(
-        model: Model,
-        state: State,
+        worlds: Worlds,
         scratch: wp.array3d(dtype=wp.float64),
         lists: wp.array2d(dtype=wp.int32),
         skin: wp.float64,
@@ -98,18 +98,18 @@ def _contact_pass(columns: int) -> wp.Kernel:
         results: wp.array2d(dtype=wp.float64),
     ):
         world = wp.tid()
-        chain = model.chains[world]
+        chain = worlds.model.chains[world]
         chain.push_rate = push_rate
         block = scratch[world]
         row = lists[world]
         plane = results[world]  # none of these bodies tilts
         pairs = wp.array(ptr=row.ptr, shape=(wp.static(layout_of_list.size),), dtype=wp.int32)
-        load_state(block, model, state, chain, world)
+        load_state(block, chain, worlds, world)
         place_ends(block, chain)
         opening = greatest_opening(block, chain)
         results[world, 0] = opening
         face = Face()
-        ground = read_ground(model, world)
+        ground = read_ground(worlds.model, world)
         face.turning = sprocket_speed
         face.push_rate = push_rate
         results[world, 1] = floor_gap(block, chain, ground, face)
@@ -171,9 +171,10 @@ class ContactPass:
             same = np.repeat(rows[None], len(chains), axis=0)
             setattr(self.model, name, wp.array(same, dtype=wp.float64, device=DEVICE))
         worlds, rows, size = len(chains), layout.SCRATCH_ROWS, list_layout(self.columns).size
-        self.state = State()
-        self.state.load_factor = wp.ones(worlds, dtype=wp.float64, device=DEVICE)
-        self.state.links = poisoned(worlds, 6, max(self.links))
+        self.worlds = Worlds()
+        self.worlds.model = self.model
+        self.worlds.load_factor = wp.ones(worlds, dtype=wp.float64, device=DEVICE)
+        self.worlds.links = poisoned(worlds, 6, max(self.links))
         self.scratch = poisoned(worlds, rows, self.columns)
         self.lists = wp.full((worlds, size), POISONED_JOINT, dtype=wp.int32, device=DEVICE)
         self.place(chains)
@@ -181,13 +182,13 @@ class ContactPass:
     def place(self, chains: Sequence[Placed]) -> None:
         """Give the chains other positions and velocities; neighbour lists stay."""
         for world, chain in enumerate(chains):
-            self.state.links.numpy()[world, :, : len(chain.position)] = np.hstack([chain.position, chain.velocity]).T
+            self.worlds.links.numpy()[world, :, : len(chain.position)] = np.hstack([chain.position, chain.velocity]).T
 
     def run(self, parts: int) -> list[dict[str, float]]:
         """Run parts of a pass from the states placed last: `RESULTS` of each chain, NaN if not computed."""
         results = poisoned(len(self.links), len(RESULTS))
         speeds = [self.sprocket_speed, self.push_rate]
-        inputs = [self.model, self.state, self.scratch, self.lists, self.skin, *speeds, parts]
+        inputs = [self.worlds, self.scratch, self.lists, self.skin, *speeds, parts]
         kernel = _contact_pass(self.columns)
         wp.launch(kernel, dim=len(self.links), inputs=[*inputs, results], device=DEVICE)
         return [dict(zip(RESULTS, map(float, row), strict=True)) for row in results.numpy()]

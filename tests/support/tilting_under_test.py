@@ -20,7 +20,7 @@ from warpchain.kernels.cpu.loop import load_state
 from warpchain.kernels.cpu.placing import place_ends
 from warpchain.kernels.cpu.tilting import resolve_tilting_floor, tilting_gap, write_plane_sums
 from warpchain.kernels.physics.plane import on_plane
-from warpchain.kernels.types import Ground, Model, State
+from warpchain.kernels.types import Ground, Worlds
 from warpchain.status import Status
 
 Start = tuple[Array, Array, Plane]
@@ -105,18 +105,17 @@ class FloorOutcome(NamedTuple):
 def _floor_pass(columns: int) -> wp.Kernel:
     @compiled
     def floor_pass(
-        model: Model,
-        state: State,
+        worlds: Worlds,
         scratch: wp.array3d(dtype=wp.float64),
         planes: wp.array2d(dtype=wp.float64),
         push_rate: wp.float64,
         results: wp.array(dtype=wp.float64),
     ):
-        chain = model.chains[0]
+        chain = worlds.model.chains[0]
         chain.push_rate = push_rate
         block = scratch[0]
         row = planes[0]
-        load_state(block, model, state, chain, 0)
+        load_state(block, chain, worlds, 0)
         place_ends(block, chain)
         write_plane_sums(block, row, chain)
         results[0] = tilting_gap(block, on_plane(chain, row, 0), Ground(), Face())
@@ -131,13 +130,13 @@ def floor_pass(
     """One pass over all rollers at the floor, in memory poisoned with NaN; the plane's width is that of parameters."""
     links = len(position)
     columns = layout.padded_width(links)
-    model, state = chain_on_cpu(position, velocity, parameters)
+    worlds = chain_on_cpu(position, velocity, parameters)
     scratch = poisoned(1, layout.SCRATCH_ROWS, columns)
     values = np.full((1, layout.PLANE_ROWS), np.nan)
     values[0, : layout.PLANE_VALUES] = row_of(plane)
     planes = wp.array(values, dtype=wp.float64, device=DEVICE)
     results = poisoned(2)
-    wp.launch(_floor_pass(columns), dim=1, inputs=[model, state, scratch, planes, push_rate, results], device=DEVICE)
+    wp.launch(_floor_pass(columns), dim=1, inputs=[worlds, scratch, planes, push_rate, results], device=DEVICE)
     rows = scratch.numpy()[0, :, :links]
     return FloorOutcome(
         velocity=rows[[layout.U, layout.V, layout.OMEGA]].T.copy(),

@@ -1,7 +1,7 @@
 """A batch of chains in arrays on a device, carried on in bounded launches. No other module launches kernels."""
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,14 +13,14 @@ from warpchain.engine.control import control_of
 from warpchain.engine.devices import Gpu, start_device
 from warpchain.engine.kernel_choice import block_threads, step_kernel
 from warpchain.engine.mirror import Mirror
-from warpchain.engine.world import CACHES, World
+from warpchain.engine.world import World
 from warpchain.inputs.options import Options
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.cpu.implicit.rigid_layout import scratch_rows
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.functions import board_rows
-from warpchain.kernels.types import Drive, Model, Record, Worlds
+from warpchain.kernels.types import STATE, Drive, Model, Record, Worlds
 from warpchain.status import Status
 
 LANES = 3
@@ -39,8 +39,13 @@ CAPACITY_FRAMES = 64
 """Frames of a chain that a device can hold between two launches, if frames are kept."""
 
 
-_STRUCTS: dict[str, Any] = {"model": Model, "drive": Drive, "state": Worlds, "record": Record}
-"""Structs whose arrays have a copy on the host, by the first part of the names of the copies."""
+_GROUPS: dict[str, tuple[Any, Iterable[str]]] = {
+    "model": (Model, Model.vars),  # type: ignore[attr-defined, unused-ignore]
+    "drive": (Drive, Drive.vars),  # type: ignore[attr-defined, unused-ignore]
+    "state": (Worlds, STATE),
+    "record": (Record, Record.vars),  # type: ignore[attr-defined, unused-ignore]
+}
+"""Structs and those of their arrays that have a copy on the host, by the first part of the names of the copies."""
 
 
 class Batch:
@@ -98,10 +103,10 @@ class Batch:
             "state/losses": (layout.LOSS_ROWS,),
         }
         fields: dict[str, tuple[tuple[int, ...], Any]] = {"worlds": ((worlds,), wp.int32)}  # of a launch, by groups
-        for group, struct in _STRUCTS.items():
-            for name, field in struct.vars.items():
-                if wp.types.is_array(field.type) and name not in CACHES:
-                    fields[f"{group}/{name}"] = (worlds, *shapes.get(f"{group}/{name}", ())), field.type.dtype
+        for group, (struct, names) in _GROUPS.items():
+            for name in names:
+                dtype = struct.vars[name].type.dtype
+                fields[f"{group}/{name}"] = (worlds, *shapes.get(f"{group}/{name}", ())), dtype
         parts = [{name: fields.pop(name) for name in recorded}, fields]
         self._recorded, self._numbers = (Mirror(part, self.device, self._stream) for part in parts)
         self._host, arrays = self._numbers.host | self._recorded.host, self._numbers.arrays | self._recorded.arrays

@@ -24,7 +24,7 @@ from warpchain.inputs.validation import InputError
 from warpchain.kernels import layout
 from warpchain.kernels.cpu import stage_rows
 from warpchain.kernels.cpu.implicit import rigid_layout
-from warpchain.kernels.types import LOADING_TIME, Drive, State
+from warpchain.kernels.types import LOADING_TIME, STATE, Drive
 from warpchain.status import Status
 
 Snapshot = Mapping[str, NDArray[Any]]
@@ -42,7 +42,7 @@ FIRST_STEP = 1e-7  # s; it may grow fivefold per step
 
 
 def _beginning() -> dict[str, Any]:
-    """Fields of :class:`State` of a chain whose clock is at zero."""
+    """Fields of :class:`Worlds` of a chain whose clock is at zero."""
     watch, sample = np.full(layout.WATCH_ROWS, -1.0), np.zeros(layout.ALL_COLUMNS)
     watch[layout.GREATEST_LEAN], watch[layout.LAST_FLOOR_IMPULSE], sample[layout.TIME] = 0.0, -np.inf, -1.0
     zeros = ("time", "gap", "time_to_contact", "slack", "next_sample", "counts", "extremes", "losses", "closing_time")
@@ -60,7 +60,7 @@ def _layout_digest() -> NDArray[np.uint8]:
         sorted((name, value) for name, value in vars(module).items() if name.isupper() and isinstance(value, int))
         for module in (layout, stage_rows, rigid_layout)
     ]
-    text = repr((rows, [*State.vars], [*Drive.vars]))  # type: ignore[attr-defined, unused-ignore]
+    text = repr((rows, [*STATE], [*Drive.vars]))  # type: ignore[attr-defined, unused-ignore]
     return np.frombuffer(hashlib.sha256(text.encode()).digest(), dtype=np.uint8)
 
 
@@ -166,7 +166,7 @@ class World:
         self.resume(stop_time, stop_status)
 
     def set_state(self, **values: ArrayLike) -> None:
-        """Set fields of :class:`State`."""
+        """Set fields of :class:`Worlds`."""
         for name, value in values.items():
             self._host[f"state/{name}"][self._at] = value
 
@@ -218,7 +218,7 @@ class World:
         return float(self._host["state/time"][self._at])
 
     def state(self, name: str) -> NDArray[Any]:
-        """A field of :class:`State`."""
+        """A field of :class:`Worlds`."""
         return np.array(self._host[f"state/{name}"][self._at])
 
     def constant(self, name: str) -> NDArray[Any]:
@@ -247,7 +247,7 @@ class World:
         return dict(zip(LOSSES, self._host["state/losses"][self._at].tolist(), strict=True))
 
     def watched(self, row: int) -> Any:
-        """An entry of :attr:`State.watch` that is −1 until it is set, and then not negative; NaN while it is not."""
+        """An entry of :attr:`Worlds.watch` that is −1 until it is set, and then not negative; NaN while it is not."""
         entry = self._host["state/watch"][self._at, row]
         return np.where(entry >= 0, entry, math.nan)[()]
 

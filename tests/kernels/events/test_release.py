@@ -23,7 +23,7 @@ from warpchain.kernels.events.release import (
     watch_steadiness,
 )
 from warpchain.kernels.physics.scaled_loads import under_load
-from warpchain.kernels.types import Drive, Model, State
+from warpchain.kernels.types import Worlds
 
 CPU = start_device("cpu").warp
 STEP = 1 / 1024  # s between two samples; sums of it are exact
@@ -35,16 +35,14 @@ FALL = float(LOADING_TIME)
 
 
 @wp.kernel(module="unique", enable_backward=False)
-def _watch(
-    model: Model, drive: Drive, state: State, samples: wp.array2d(dtype=wp.float64), loads: wp.array(dtype=wp.float64)
-):
+def _watch(worlds: Worlds, samples: wp.array2d(dtype=wp.float64), loads: wp.array(dtype=wp.float64)):
     """Feeds one made-up sample after the other to the release rule, as `events.sample` does."""
     for i in range(samples.shape[0]):
         time = samples[i, layout.TIME]
-        chain = under_load(model.chains[0], state.load_factor[0])
-        watch_steadiness(chain, state, drive, 0, samples[i])
-        state.load_factor[0] = load_at(state, drive, 0, time)
-        loads[i] = state.load_factor[0]
+        chain = under_load(worlds.model.chains[0], worlds.load_factor[0])
+        watch_steadiness(chain, worlds, 0, samples[i])
+        worlds.load_factor[0] = load_at(worlds, 0, time)
+        loads[i] = worlds.load_factor[0]
 
 
 @dataclass
@@ -79,8 +77,7 @@ class Watched:
             rows[:, column] = value
         loads = wp.full(len(rows), np.nan, dtype=wp.float64, device=CPU)
         samples = wp.array(rows, dtype=wp.float64, device=CPU)
-        inputs = [self.batch.model, self.batch.drive, self.batch.state, samples, loads]
-        wp.launch(_watch, dim=1, inputs=inputs, device=CPU)
+        wp.launch(_watch, dim=1, inputs=[self.batch.state, samples, loads], device=CPU)
         self.loads[of] = loads.numpy()
         return self
 

@@ -20,7 +20,7 @@ from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu import loop
 from warpchain.kernels.gpu.loop import make_advance_block
-from warpchain.kernels.types import State
+from warpchain.kernels.types import STATE
 from warpchain.status import Status
 
 LINKS = 24
@@ -43,7 +43,7 @@ def piles() -> Batch:
 
 def everything(batch: Batch, world: int) -> dict[str, NDArray[np.generic]]:
     """All that is kept of a world: its state, what its board leaves, its list and its time series."""
-    found = {name: getattr(batch.state, name).numpy()[world].copy() for name in State.vars}
+    found = {name: getattr(batch.state, name).numpy()[world].copy() for name in STATE}
     found["board"] = batch.scratch.numpy()[world, layout.BOARD_LOST_SELF : layout.BOARD_VALUES, :LINKS].copy()
     found["pairs"] = np.array(sorted(listed_pairs(batch, world)))
     found["samples"] = batch.worlds[world].drain().samples
