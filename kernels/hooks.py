@@ -1,4 +1,24 @@
-"""Hooks: Warp functions that a step loop calls where chains differ, collected in dataclasses with checked arguments."""
+"""The step protocol: what both step loops do with a world, in which order, and the hooks that they call.
+
+:mod:`cpu.loop` and :mod:`gpu.loop` carry a world on in these parts; comments in both name them.
+
+- *Load*: the links, their constants under the present loads, and the plane. After the host has set the links, also
+  the sums of the plane (``begin_run``), the neighbour list and the distance to the floor or sprocket.
+- *Sample*, when a mark is due: what is recorded and watched, see :mod:`events.sample`. It may change softness and
+  loads, whose constants links and joints then take (``take_constants``). The run may end here.
+- *Length*: the step is the proposed one, unless that could miss a contact or passes the stop time.
+- *Attempt*: the plane moves to the middle of the step (``begin_step``), where it stays for all stages (``attempt``).
+- *Accept*, if the error is at most 1: links, time and proposed step (``accept``), then the plane (``end_step``).
+- *Reject*, otherwise: nothing but the proposed step changes, and the run may end.
+- *Contacts* after an accepted step: first with floor or sprocket (``meet``), then of links with one another. An impulse
+  makes the first stage void.
+- *Store*: a last sample, if the run has ended between two; links, losses and counters.
+
+A GPU repeats length, attempt and accept or reject until a sample is due or something is near.
+
+Hooks are Warp functions for those parts in which chains differ: ``PlaneHooks`` of both devices, ``Joints`` of a CPU,
+``BlockSteps`` of a GPU. Hooks of the same name have the same task on both devices. Dataclasses collect them.
+"""
 
 from dataclasses import MISSING, field, fields
 from typing import Any

@@ -1,8 +1,7 @@
 """The CPU loop over steps: one thread carries one chain through a bounded number of attempts.
 
-A method attempts a step and estimates its error; the step controller (methods/controller.py) accepts or refuses it and
-proposes the next step. A contact pass follows each accepted step. Every sample interval the chain is recorded and
-watched. A rejected attempt changes nothing but its counter and the step.
+The parts of a step and their order are those of :mod:`hooks`. The step controller (methods/controller.py) accepts or
+rejects an attempt and proposes the next step.
 """
 
 import functools
@@ -126,6 +125,7 @@ def make_advance(features: Features):
         ground = read_ground(worlds.model, world)
         still = face_of(ground)
         chain = present_chain(worlds, world)
+        # load
         if worlds.is_fresh[world] != 0:
             load_state(K, chain, worlds, world)
             joints.take_constants(K, chain)
@@ -140,6 +140,7 @@ def make_advance(features: Features):
         while (
             worlds.status[world] == RUNNING and attempts < worlds.control.attempts and not record_is_full(worlds, world)
         ):
+            # sample
             if worlds.time[world] >= next_mark(worlds, world):
                 chain = take_sample(K, chain, worlds, world)
             time = worlds.time[world]
@@ -148,7 +149,7 @@ def make_advance(features: Features):
                 worlds.status[world] = worlds.stop_status[world]
             if worlds.status[world] != RUNNING:
                 break
-
+            # length
             joints.settle(K, chain, worlds, world)
             longest = contact_step(worlds, world, wp.static(is_driven))
             bound = bound_of_step(K, L, plane.at_start(P, chain), still, worlds, world, longest)
@@ -156,11 +157,13 @@ def make_advance(features: Features):
             reaches_stop = time + h >= stop_time
             if reaches_stop:
                 h = stop_time - time
+            # attempt
             felt = plane.begin_step(K, P, chain, worlds, world, h)
             tolerance = spring_tolerance(worlds, world, wp.static(is_driven))
             error = wp.cast(joints.attempt(K, felt, worlds, world, h, tolerance), wp.float64)
             attempts += 1
             if error <= ONE:
+                # accept
                 factor, joints_may_stay = joints.accept(K, felt, worlds, world, h, error)
                 add_count(worlds, world, layout.ACCEPTED, wp.int64(1))
                 worlds.time[world] = wp.where(reaches_stop, stop_time, time + h)
@@ -169,6 +172,7 @@ def make_advance(features: Features):
                 opening = greatest_opening(K, chain)
                 raise_extreme(worlds, world, layout.OPENING, opening)
                 plane.end_step(K, P, chain, h)
+                # contacts
                 impulses = meet_bodies(K, P, chain, felt, ground, still, worlds, world)
                 impulses += meet_links(K, L, chain, worlds, world, opening)
                 if impulses > wp.int64(0) or not joints_may_stay:
@@ -178,6 +182,7 @@ def make_advance(features: Features):
                 reject(K, chain, worlds, world, h, error)
             if worlds.status[world] == RUNNING and attempts_made(worlds, world) >= worlds.control.step_limit:
                 worlds.status[world] = STEP_LIMIT
+        # store
         if lacks_last_sample(worlds, world, worlds.time[world], worlds.status[world]):
             place_ends(K, chain)
             write_sample(K, chain, worlds, world, worlds.time[world])

@@ -21,7 +21,7 @@ class PlaneHooks(Hooks):
     begin_run: Any = hook(K=Rows, P=Row, chain=Chain)
     # → the chain on the plane where the step begins
     at_start: Any = hook(P=Row, chain=Chain)
-    # evaluates the first stage → the chain on the plane that its links feel in this step
+    # moves the plane to the middle of a step, evaluates the first stage there → the chain on that plane
     begin_step: Any = hook(K=Rows, P=Row, chain=Chain, worlds=Worlds, world=int, h=wp.float64)
     # carries the plane to the end of an accepted step, whose ends are placed
     end_step: Any = hook(K=Rows, P=Row, chain=Chain, h=wp.float64)

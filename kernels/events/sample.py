@@ -58,7 +58,7 @@ def observation(features: Features, summarise: Any = summarise):
 def sampling(features: Features, summarise: Any = summarise, drag_shape: Any = drag_shape):
     """Warp function of a sample of a chain whose ends are placed: time series, frame, watches.
 
-    ``sample(K, chain, drive, state, record, control, world, time)`` → status. It is called at or after
+    ``sample(K, chain, worlds, world, time)`` → status. It is called at or after
     :func:`next_mark`. If only a frame is due, nothing but the record changes. It may also change the softness of the
     joints, and on a sprocket the chain's loads and the velocities of its links.
 
@@ -70,13 +70,7 @@ def sampling(features: Features, summarise: Any = summarise, drag_shape: Any = d
     append_frame = write_frame_in_room if features.tilts else write_frame
 
     @wp.func
-    def sample(
-        K: Rows,
-        chain: Chain,
-        worlds: Worlds,
-        world: int,
-        time: wp.float64,
-    ):
+    def sample(K: Rows, chain: Chain, worlds: Worlds, world: int, time: wp.float64):
         frame_mark = worlds.next_frame[world]
         if frame_mark >= wp.int64(0) and time >= wp.float64(frame_mark) * worlds.control.frame_interval:
             append_frame(K, chain, worlds, world, time)

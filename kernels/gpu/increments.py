@@ -14,7 +14,7 @@ import warp as wp
 
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
-from warpchain.kernels.gpu.functions import shares_board
+from warpchain.kernels.gpu.block_memory import shares_board
 from warpchain.kernels.gpu.stage import Run, address_on_board, constants, felt_plane
 from warpchain.kernels.gpu.threads import barrier, number_memory
 from warpchain.kernels.layout import COSINE, OMEGA, SINE, THETA, U, V, X, Y

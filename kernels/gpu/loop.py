@@ -1,7 +1,7 @@
 """The GPU loop over steps: one block of threads carries one chain, one thread per link.
 
-It makes the same run as :mod:`cpu.loop`, on the same structs and with the same functions of physics. Stages lie in
-registers, the state on a board in the shared memory of the block. All threads know the values that decide (error, gap,
+It makes the same run as :mod:`cpu.loop`, in the parts of :mod:`hooks` and with the same functions of physics. Stages lie
+in registers, the state on a board in the shared memory of the block. All threads know the values that decide (error, gap,
 status …), and take the same branches. The results depend neither on how a run is cut into launches nor on other chains.
 
 An attempt costs one barrier a stage and one for the error. While nothing is near the floor or sprocket and no pair is
@@ -19,11 +19,11 @@ from warpchain.kernels.events.record import record_is_full
 from warpchain.kernels.events.tallies import attempts_made
 from warpchain.kernels.features import COMPILER_FLAGS, Features
 from warpchain.kernels.gpu import increments
+from warpchain.kernels.gpu.block_memory import STARTS, available_registers, board_size, shares_board, starts_offset
 from warpchain.kernels.gpu.board import find_link, raise_value
 from warpchain.kernels.gpu.contacts.contact_pass import block_contact_pass
 from warpchain.kernels.gpu.contacts.proximity import block_proximity
 from warpchain.kernels.gpu.contacts.self_contacts import touch_layout
-from warpchain.kernels.gpu.functions import STARTS, available_registers, board_size, shares_board, starts_offset
 from warpchain.kernels.gpu.increments import EXCHANGED, block_steps, real_of, vec3d
 from warpchain.kernels.gpu.run import block_run, block_sample
 from warpchain.kernels.gpu.stage import Run, constants
@@ -42,7 +42,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
 
     ``block_dim`` is at least the number of links of every chain: a multiple of 4, on a GPU of 32. ``registers``: most
     of a thread on a GPU; None: as many as a block of this size can have. A world's scratch has at least
-    :func:`gpu.functions.board_rows` rows; lists are as on a CPU.
+    :func:`gpu.block_memory.board_rows` rows; lists are as on a CPU.
     """
     available = available_registers(block_dim)
     if available < 255:
@@ -147,6 +147,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         run.maxima = maxima_address(maxima)
         run = find_link(run, worlds.model.chains[world], lane)
 
+        # load
         load_run(run, worlds)
         common = common_of(run)
         if worlds.is_fresh[world] != 0 or worlds.has_first_stage[world] == 0:
@@ -167,6 +168,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         smallest_step = wp.float32(worlds.control.smallest_step)
         barrier()
         while status == RUNNING and attempts < attempts_left:
+            # sample
             if time >= K[wp.static(layout.BOARD_VALUES), layout.VALUE_NEXT_SAMPLE]:
                 changed, pauses, status = take_sample(run, worlds, time)
                 if changed:
@@ -188,6 +190,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             is_near = bool(False)
             goes_on = bool(True)
             while goes_on:
+                # length
                 length = step
                 if wp.static(has_contacts):
                     length = wp.min(length, wp.max(contact_step, reach))
@@ -196,11 +199,13 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 if later >= stop_time:
                     h = stop_time - time
                     later = stop_time
+                # attempt
                 plane.begin_step(run, h)
                 result = attempt(run, common, h, inverse_tolerance)
                 own_gap = write_proximity(run, result.place, result.cosine, result.sine, result.opening, result.speed)
                 error = wp.cast(greatest(errors, lane, wp.where(lane < run.links, result.error, 0)), wp.float32)
                 attempts += 1
+                # accept or reject
                 if error <= wp.float32(1.0):
                     accepted += 1
                     accept(run, result)
@@ -219,6 +224,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 else:
                     goes_on = bool(False)
                 goes_on = goes_on and attempts < attempts_left
+            # contacts, or a run that ends with a rejected attempt
             if error <= wp.float32(1.0):
                 renews = since == wp.static(renewed)
                 is_hit = bool(False)
@@ -242,6 +248,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     status = int(STEP_TOO_SMALL)
         if status == RUNNING and attempts_made(worlds, world) + wp.int64(attempts) >= worlds.control.step_limit:
             status = int(STEP_LIMIT)
+        # store
         if lane == 0:
             raise_value(K, layout.VALUE_OPENING, opening)
         store_run(run, worlds, time, status, accepted, attempts)

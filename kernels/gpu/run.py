@@ -40,7 +40,7 @@ def write_bounds(run: Run, worlds: Worlds, is_driven: bool):
 
 @functools.cache
 def hits_booking(features: Features, touch: TouchLayout):
-    """Warp function ``book_hits(T, state, world)``: a block's impulses go to the state's counters; for one thread."""
+    """Warp function ``book_hits(T, worlds, world)``: a block's impulses go to its world's counters; for one thread."""
     _, _, fixed_count = of_fixed_body(features.is_driven)
 
     @wp.func
@@ -106,8 +106,7 @@ def note_drag(K: Rows, _chain: Chain, left: wp.float64):
 def block_run(features: Features, touch: TouchLayout, plane: PlaneHooks, steps: BlockSteps):
     """Warp functions for all threads of a block that load a chain's run and store it.
 
-    ``load(run, model, drive, state, control)``, which ends with a barrier, and
-    ``store(run, state, record, time, status, accepted, attempts)``.
+    ``load(run, worlds)``, which ends with a barrier, and ``store(run, worlds, time, status, accepted, attempts)``.
     """
     is_driven = features.is_driven
     fixed_loss, fixed_depth, _ = of_fixed_body(features.is_driven)
@@ -181,7 +180,7 @@ def block_run(features: Features, touch: TouchLayout, plane: PlaneHooks, steps: 
 def block_sample(features: Features, touch: TouchLayout, plane: PlaneHooks, steps: BlockSteps):
     """Warp function of a sample, for all threads of a block.
 
-    ``take_sample(run, model, drive, state, record, control, time)`` → whether the chain has changed, so that its first
+    ``take_sample(run, worlds, time)`` → whether the chain has changed, so that its first
     stage must be evaluated again; whether the launch pauses; status.
     """
     is_driven = features.is_driven

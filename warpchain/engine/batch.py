@@ -19,7 +19,7 @@ from warpchain.kernels import layout
 from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.cpu.implicit.rigid_layout import scratch_rows
 from warpchain.kernels.features import Features
-from warpchain.kernels.gpu.functions import board_rows
+from warpchain.kernels.gpu.block_memory import board_rows
 from warpchain.kernels.types import STATE, Drive, Model, Record, Worlds
 from warpchain.status import Status
 

@@ -24,7 +24,7 @@ from warpchain.kernels.types import Chain, Ground, Integers, Row, Rows, Worlds
 def body_pass(features: Features, plane: PlaneHooks):
     """Warp function of the contacts with the floor or sprocket, and with a sprocket that moves above a floor.
 
-    ``meet_bodies(K, P, chain, felt, ground, still, drive, state, world)`` → number of impulses. ``felt``: the chain on
+    ``meet_bodies(K, P, chain, felt, ground, still, worlds, world)`` → number of impulses. ``felt``: the chain on
     the plane that it felt in the step; ``still``: the face but for its motion.
     """
     face_at = BODIES[features.fixed_body].motion
@@ -67,8 +67,8 @@ def body_pass(features: Features, plane: PlaneHooks):
 def link_pass(features: Features, joints: Joints):
     """Warp functions of the contacts of a chain with itself; ``opening``: greatest |C| [m] of the placed links.
 
-    ``make_list(K, L, chain, state, world, skin, opening)`` makes the neighbour list, or ends the run if it overflows.
-    ``meet_links(K, L, chain, state, control, world, opening)`` → number of impulses.
+    ``make_list(K, L, chain, worlds, world, skin, opening)`` makes the neighbour list, or ends the run if it overflows.
+    ``meet_links(K, L, chain, worlds, world, opening)`` → number of impulses.
     """
     has_self = features.self_contact
     build_list = neighbour_list(features.columns)

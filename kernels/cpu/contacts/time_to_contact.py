@@ -95,7 +95,7 @@ def fastest_meeting(columns: int):
 def step_bound(features: Features, has_flight: bool):
     """Warp function: longest step [s] from a placed state that cannot miss a contact; ∞ if there are none.
 
-    ``bound(K, L, chain, face, control, state, world, longest)``; ``longest`` [s] bounds steps near a contact.
+    ``bound(K, L, chain, face, worlds, world, longest)``; ``longest`` [s] bounds steps near a contact.
     """
     has_fixed = features.fixed_body != "none"
     has_self = features.self_contact

@@ -26,11 +26,11 @@ MARGIN = wp.constant(wp.float32(1.0 + 2e-6))
 def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, plane: PlaneHooks):
     """Warp functions (begin, look, meet) of the contacts, for all threads of a block.
 
-    ``begin(run, state, control, proximity)`` → number of listed pairs, longest step [s] that cannot miss a contact (see
+    ``begin(run, worlds, proximity)`` → number of listed pairs, longest step [s] that cannot miss a contact (see
     ``time_to_contact`` of :mod:`gpu.contacts.proximity`), status, how far joints may move before the list may be stale
     if none is open [m]. The board is written, and a barrier passed. ``look(run, proximity, pairs, spare)`` → whether
-    there is anything to do for ``meet``, and that longest step. ``meet(run, drive, state, control, time, proximity, own
-    gap, pairs, spare)`` → whether anything was hit, then the four of ``begin`` anew.
+    there is anything to do for ``meet``, and that longest step. ``meet(run, worlds, time, proximity, own gap,
+    pairs, spare)`` → whether anything was hit, then the four of ``begin`` anew.
     """
     lists = list_layout(features.columns)
     has_fixed = features.fixed_body != "none"

@@ -33,7 +33,7 @@ from warpchain.engine.batch import Batch
 from warpchain.engine.kernel_choice import most_registers
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
-from warpchain.kernels.gpu import functions, increments
+from warpchain.kernels.gpu import block_memory, increments
 from warpchain.kernels.gpu.loop import make_advance_block
 from warpchain.kernels.methods.method import find_method
 from warpchain.status import Status
@@ -245,7 +245,7 @@ def test_registers_of_every_block_fit_into_a_multiprocessor() -> None:
     """Warps of 32 threads go to four schedulers in turn, each of which has 16384 registers."""
     for warps in range(1, 33):
         busiest = len(range(0, warps, 4))
-        registers = functions.available_registers(32 * warps)
+        registers = block_memory.available_registers(32 * warps)
         assert busiest * 32 * registers <= 16384 < busiest * 32 * (registers + 8)
 
 
