@@ -1,8 +1,9 @@
 """The GPU loop over steps: one block of threads carries one chain, one thread per link.
 
-It makes the same run as :mod:`cpu.loop`, in the parts of :mod:`hooks` and with the same functions of physics. Stages lie
-in registers, the state on a board in the shared memory of the block. All threads know the values that decide (error, gap,
-status …), and take the same branches. The results depend neither on how a run is cut into launches nor on other chains.
+It makes the same run as :mod:`cpu.loop`, in the parts of :mod:`hooks` and with the same functions of physics. Stages
+lie in registers, the state on a board in the shared memory of the block. All threads know the values that decide
+(error, gap, status …), and take the same branches. The results depend neither on how a run is cut into launches nor on
+other chains.
 
 An attempt costs one barrier a stage and one for the error. While nothing is near the floor or sprocket and no pair is
 listed, attempts follow one another in an inner loop.

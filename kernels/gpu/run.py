@@ -180,8 +180,8 @@ def block_run(features: Features, touch: TouchLayout, plane: PlaneHooks, steps: 
 def block_sample(features: Features, touch: TouchLayout, plane: PlaneHooks, steps: BlockSteps):
     """Warp function of a sample, for all threads of a block.
 
-    ``take_sample(run, worlds, time)`` → whether the chain has changed, so that its first
-    stage must be evaluated again; whether the launch pauses; status.
+    ``take_sample(run, worlds, time)`` → whether the chain has changed, so that its first stage must be evaluated again;
+    whether the launch pauses; status.
     """
     is_driven = features.is_driven
     sample = sampling(features, read_totals, note_drag)

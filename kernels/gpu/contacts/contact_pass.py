@@ -29,8 +29,8 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
     ``begin(run, worlds, proximity)`` → number of listed pairs, longest step [s] that cannot miss a contact (see
     ``time_to_contact`` of :mod:`gpu.contacts.proximity`), status, how far joints may move before the list may be stale
     if none is open [m]. The board is written, and a barrier passed. ``look(run, proximity, pairs, spare)`` → whether
-    there is anything to do for ``meet``, and that longest step. ``meet(run, worlds, time, proximity, own gap,
-    pairs, spare)`` → whether anything was hit, then the four of ``begin`` anew.
+    there is anything to do for ``meet``, and that longest step. ``meet(run, worlds, time, proximity, own gap, pairs,
+    spare)`` → whether anything was hit, then the four of ``begin`` anew.
     """
     lists = list_layout(features.columns)
     has_fixed = features.fixed_body != "none"

@@ -93,7 +93,7 @@ def test_unlike_links_equal_a_cpu_kernel(links: int) -> None:
 @pytest.mark.parametrize("block_dim", [LINKS, 224])
 def test_chains_too_long_for_shared_memory_equal_a_cpu_kernel(block_dim: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Long chains keep their board in the scratch, with the same result, even with more threads than columns."""
-    monkeypatch.setattr(functions, "LARGEST_SHARED_BLOCK", LINKS - 1)
+    monkeypatch.setattr(block_memory, "LARGEST_SHARED_BLOCK", LINKS - 1)
     make_advance_block.cache_clear()
     ours, theirs = (batch_of([heap(LINKS)], method="os32") for _ in range(2))
     features = ours.features(fixed_body="floor")
