@@ -1,5 +1,6 @@
 """Damage in the cache of compiled kernels is found before a kernel is loaded, whatever it hits."""
 
+import hashlib
 import json
 import os
 import shutil
@@ -96,6 +97,16 @@ def test_what_is_damaged_is_compiled_anew(cache: tuple[Path, str], suffix: str, 
     harmed = [file.read_bytes() for file in folder.glob(f"*/wp_*/*{suffix}")]
     assert computed(folder) == expected
     assert [compiled(folder, suffix).read_bytes()] != harmed
+
+
+def test_headers_that_a_process_has_read_serve_others(cache: tuple[Path, str]) -> None:
+    """They are read once, and anew if they are damaged."""
+    folder, expected = cache
+    (kept,) = folder.glob("*/headers/*")
+    flip(kept)
+    compiled(folder, ".o").unlink()
+    assert computed(folder) == expected
+    assert kept.read_bytes()[:32] == hashlib.sha256(kept.read_bytes()[32:]).digest()
 
 
 def test_what_fits_is_not_compiled_anew(cache: tuple[Path, str]) -> None:

@@ -68,13 +68,44 @@ def _load(module: wp.Module, device: wp.Device, make: Callable[[], wp.Module], f
     except FileNotFoundError:
         _make_sure_of_room(record)
         try:
-            wp.compile_aot_module(make(), device, module_dir=folder)
+            with _read_headers(device):
+                wp.compile_aot_module(make(), device, module_dir=folder)
         except OSError:
             shutil.rmtree(folder, ignore_errors=True)
             raise
         wp.load_aot_module(module, device, module_dir=folder)
     if (now := _checksums(folder)) != recorded:
         record.write_text(json.dumps(now), encoding="utf-8")  # cut short by a kill, it fits nothing
+
+
+@contextlib.contextmanager
+def _read_headers(device: wp.Device) -> Iterator[None]:
+    """Share Warp's headers, as the compiler for CPUs has read them, among threads and processes.
+
+    Warp keeps what it read for one thread of one process. Reading takes 2.5 s, a third of the time of a kernel. The
+    compiler itself refuses what does not fit the headers, and reads them anew. A checksum precedes the content here.
+    """
+    if not device.is_cpu:
+        yield
+        return
+    kept = Path(wp.config.kernel_cache_dir, "headers")
+    own = Path(wp._src.context.runtime.get_clang_pch_dir())  # type: ignore[attr-defined]
+    for path in kept.glob("*.pch"):
+        if (own / path.name).exists():
+            continue
+        memory = path.read_bytes()
+        if hashlib.sha256(memory[32:]).digest() == memory[:32]:
+            (own / path.name).write_bytes(memory[32:])
+        else:
+            path.unlink(missing_ok=True)
+    yield
+    for path in own.glob("*.pch"):
+        if not (kept / path.name).exists():
+            content = path.read_bytes()
+            kept.mkdir(exist_ok=True)
+            trial = kept / f"{secrets.token_hex(4)}.trial"
+            trial.write_bytes(hashlib.sha256(content).digest() + content)
+            trial.replace(kept / path.name)
 
 
 def _make_sure_of_room(record: Path) -> None:
