@@ -1,12 +1,18 @@
 """Dataclasses of hooks refuse Warp functions with other arguments than their loop hands them."""
 
-from dataclasses import dataclass
+import inspect
+import re
+from dataclasses import dataclass, fields
 from typing import Any
 
 import pytest
 import warp as wp
 
+from warpchain.kernels import hooks
 from warpchain.kernels.contacts.fixed_body import BODIES, Body
+from warpchain.kernels.cpu import loop, upright
+from warpchain.kernels.gpu import loop as block_loop
+from warpchain.kernels.gpu import upright as block_upright
 from warpchain.kernels.hooks import Hooks, hook
 from warpchain.kernels.physics.load import Load, no_energy, weight
 from warpchain.kernels.types import Chain
@@ -39,3 +45,17 @@ def test_a_hook_with_other_arguments_is_named() -> None:
         Load(no_energy, no_energy)
     with pytest.raises(TypeError, match=r"^Body\.surface: "):
         Body(surface=BODIES["sprocket"].motion)
+
+
+def test_both_loops_have_the_parts_of_a_step_in_their_order() -> None:
+    """The protocol names each part once; comments in the loops name the parts that they have, in that order."""
+    parts = [part.lower() for part in re.findall(r"^- \*(\w+)\*", hooks.__doc__ or "", re.MULTILINE)]
+    for module in (loop, block_loop):
+        named = [word for word in re.findall(r"^ *# (\w+)", inspect.getsource(module), re.MULTILINE) if word in parts]
+        assert named == [part for part in parts if part != "reject"]
+
+
+def test_planes_of_both_devices_have_the_hooks_of_a_step() -> None:
+    """They have the same names, whatever else one of the devices needs."""
+    ours, theirs = ({hook.name for hook in fields(module.PlaneHooks)} for module in (upright, block_upright))
+    assert ours & theirs == {"begin_run", "begin_step", "end_step", "meet"}
