@@ -159,7 +159,7 @@ def _walk_rows(result: WalkResult) -> Iterator[tuple[str, str]]:
     """Names and values."""
     status, energy = result.status, result.energy
     yield "Δx", f"{result.dx:#.2g}".removesuffix(".") + f" m, {ONE_OF_MANY}" if math.isfinite(result.dx) else "unknown"
-    yield "status", status.label if status.ok else f"{status.label}: {status.sentence}"
+    yield "status", status.label  # what to try is said on standard error
     if math.isfinite(result.hold_time):
         drift = f"drift {100 * result.drift:.2g} %" if math.isfinite(result.drift) else ""
         if result.status is Status.NOT_STEADY:  # the drift of its last, short watch is no reason
