@@ -121,6 +121,9 @@ def print_plan(planned: "Sweep", plan: "SweepPlan", as_json: bool) -> None:
     rows = {"sweep": f"{printable(planned.name)} is valid", "cells": f"{plan.cells:,}"}
     rows |= {"walks done": f"{plan.done:,}"} if plan.done else {}
     rows["walks left" if plan.done else "walks"] = f"{least:,}" + f" in this round, {most:,} at most" * (most > least)
+    if not most:
+        _print_rows([*rows.items(), ("memory", f"{_sizes(plan.memory)} to read the results")])
+        return
     rows |= {"expected": f"{plan.expected:,} walks left"} if plan.expected is not None else {}
     rows |= {"files": f"{plan.shards:,}", "disk": _sizes(BYTES_ON_DISK * least, BYTES_ON_DISK * most)}
     rows |= {"motions": f"of {plan.motions:,} walks; they need room beside this"} if plan.motions else {}

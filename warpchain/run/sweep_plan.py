@@ -67,7 +67,7 @@ def plan_sweep(
     """A checked sweep and what it would take; arguments as of `sweep`, errors likewise. Nothing is written.
 
     A folder in which the sweep has begun is read: the plan is of what is left. A `pilot` runs a walk of each corner of
-    the grid, whose mean time stands for that of all walks of its block.
+    the grid, whose mean time stands for that of all walks of its block; none if no walk is left.
     """
     planned = on_device(load_sweep(source, **replaced), device)
     blocks, cells = planned.blocks, list[Asked]()
@@ -92,6 +92,7 @@ def plan_sweep(
         any(choice.includes(sample) for choice in chosen) for sample in manifest.keys["sample"][least].tolist()
     )
     at_once = gpus or workers or processors()
+    pilot = pilot and bool(left.any())
     corners = [list(_corners(block)) for block in blocks] if pilot else []
     each = np.array([np.mean([seconds for *_, seconds in own]) for own in corners]) / min(at_once, processors())
     return planned, SweepPlan(
