@@ -31,7 +31,9 @@ MOST_BYTES: Final = 65_536
 """Most bytes of a request; a floor of 256 points takes 10 kB."""
 MOST_CONNECTIONS: Final = 32
 PATIENCE: Final = 20.0
-"""Time [s] after which a client that neither sends nor takes anything is given up."""
+"""Time [s] after which a client is given up that does not take an answer."""
+HASTE: Final = 5.0
+"""Time [s] in which a request has to be there as a whole; on this machine it takes milliseconds."""
 _NO_TOKEN: Final = (
     "This address lacks the token of the server. Open the address that `warpchain live` printed; "
     "`warpchain live 'ADDRESS'` opens the set-up of an older one.\n"
@@ -110,6 +112,22 @@ class _Handler(BaseHTTPRequestHandler):
     server: LiveServer
     timeout, server_version, sys_version = PATIENCE, "warpchain", ""
 
+    def setup(self) -> None:
+        """Give the request its time, however slowly it trickles in: then nothing more of it is read."""
+        super().setup()
+        self._reading = threading.Timer(HASTE, self._read_no_more)
+        self._reading.daemon = True
+        self._reading.start()
+
+    def finish(self) -> None:
+        """End the connection."""
+        self._reading.cancel()
+        super().finish()
+
+    def _read_no_more(self) -> None:
+        with suppress(OSError):  # the client has ended it
+            self.connection.shutdown(socket.SHUT_RD)
+
     def log_message(self, *_: object) -> None:
         """Keep the terminal free."""
 
@@ -135,7 +153,9 @@ class _Handler(BaseHTTPRequestHandler):
             self._reply(413, f"A request has a Content-Length, and at most {MOST_BYTES} bytes.\n")
             return
         try:
-            asked = checked(json.loads(self.rfile.read(int(size))), "request", dict[str, Any])
+            body = self.rfile.read(int(size))
+            self._reading.cancel()
+            asked = checked(json.loads(body), "request", dict[str, Any])
             if self.path == "/walk":
                 self._answer(lambda *to: self.server.walker.play(asked, *to))
             elif self.path == "/sample":

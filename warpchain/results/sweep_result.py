@@ -4,8 +4,8 @@ Users call `load`, and the commands `info`, `plot`, `report` and `merge` do. A f
 walks that are not computed yet are counted as missing.
 
 A merged file is one HDF5 file with a whole sweep: columns with named axes, and the recorded motions. Axes and samples
-are dimension scales. Units and meanings are attributes of every dataset; the resolved sweep, versions and counts by
-status are attributes of the file. A single block is in the root group, which
+are dimension scales. Units and meanings are attributes of every dataset; the resolved sweep, versions, runs and
+counts by status are attributes of the file. A single block is in the root group, which
 `xarray.open_dataset(path, engine="h5netcdf")` opens; several blocks are in groups of their names (`group=`). The
 recorded motions of a block are in its group `motion`, in the format of a saved walk. The name of a walk's group is the
 position of the walk in a flat column. `xarray.open_datatree(path)` opens everything.
@@ -31,6 +31,7 @@ from warpchain.inputs.arrays import AnyArray
 from warpchain.inputs.validation import InputError, InputWarning, Named, checked_path, full_name
 from warpchain.results.block_result import BlockResult, counted, located, status_counts
 from warpchain.results.walk_result import WalkResult
+from warpchain.store.crate import runs
 from warpchain.store.folder import read_rows
 from warpchain.store.shards import read_manifest, stamp, stored_sweep
 from warpchain.sweeps.plan import Sweep
@@ -83,7 +84,8 @@ class SweepResult(_OnlyBlock):
     Attributes:
         blocks: name of each block → its results.
         origin: definition of the sweep.
-        provenance: digest of the sweep, version of the numerics, and versions of the software that began it.
+        provenance: digest of the sweep, version of the numerics, versions of the software that began it, and `runs`,
+            each with its command, its times and the machines that computed its walks.
     """
 
     blocks: dict[str, BlockResult]
@@ -263,7 +265,7 @@ class SweepResult(_OnlyBlock):
             **{f"walks_{label}": count for label, count in self.summary().items()},
             "sweep": json.dumps(self.sweep, ensure_ascii=False),
             **self.provenance,
-            "versions": json.dumps(self.provenance["versions"]),
+            **{name: json.dumps(self.provenance[name], ensure_ascii=False) for name in ("versions", "runs")},
         }
 
 
@@ -304,7 +306,8 @@ def _together(sources: Sequence[AnyPath]) -> SweepResult:
                 raise InputError(f"{folder}: repeats walks of an earlier folder; pass each part of a sweep once")
             columns = Named({key: np.where(there, each, other.columns[key]) for key, each in block.columns.items()})
             blocks[block.name] = replace(block, columns=columns, motions=np.where(there, block.motions, other.motions))
-        whole = replace(whole, blocks=blocks)
+        ran = [*whole.provenance["runs"], *result.provenance["runs"]]
+        whole = replace(whole, blocks=blocks, provenance=whole.provenance | {"runs": ran})
     return whole
 
 
@@ -322,7 +325,8 @@ def _load_folder(directory: AnyPath) -> SweepResult:
                 raise
             time.sleep(PAUSE * is_deleting)
     provenance = {"digest": manifest.sweep.digest(), "numerics_version": manifest.numerics_version}
-    return _result(manifest.sweep, provenance | {"versions": manifest.versions}, rows, motions)
+    provenance |= {"versions": manifest.versions, "runs": runs(directory)}
+    return _result(manifest.sweep, provenance, rows, motions)
 
 
 def _load_merged(path: AnyPath) -> SweepResult:
@@ -330,7 +334,7 @@ def _load_merged(path: AnyPath) -> SweepResult:
     with reading_hdf5(path, MERGED, REMEDY, WANTED) as file:
         sweep = stored_sweep(path, json.loads(file.attrs["sweep"]))
         provenance = {"digest": file.attrs["digest"], "numerics_version": int(file.attrs["numerics_version"])}
-        provenance["versions"] = json.loads(file.attrs["versions"])
+        provenance |= {name: json.loads(file.attrs.get(name, "[]")) for name in ("versions", "runs")}
         groups = [file[block.name] if len(sweep.blocks) > 1 else file for block in sweep.blocks]
         motions = [np.full(block.shape, None) for block in sweep.blocks]
         for group, found in zip(groups, motions, strict=True):
