@@ -11,7 +11,6 @@ import secrets
 import select
 import socket
 import threading
-from collections.abc import Callable
 from contextlib import suppress
 from functools import cached_property
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -24,7 +23,7 @@ from warpchain.inputs.validation import InputError, checked
 from warpchain.live_page.page import FIRST, live_page
 
 if TYPE_CHECKING:
-    from warpchain.live_page.asked_walks import IsGone, Send, Walker
+    from warpchain.live_page.asked_walks import Walker
 
 ADDRESS: Final = "127.0.0.1"
 MOST_BYTES: Final = 65_536
@@ -156,10 +155,8 @@ class _Handler(BaseHTTPRequestHandler):
             body = self.rfile.read(int(size))
             self._reading.cancel()
             asked = checked(json.loads(body), "request", dict[str, Any])
-            if self.path == "/walk":
-                self._answer(lambda *to: self.server.walker.play(asked, *to))
-            elif self.path == "/sample":
-                self._answer(lambda *to: self.server.walker.sample(asked, *to))
+            if self.path in ("/walk", "/sample"):
+                self._answer(asked)
             else:
                 self._reply(404, "Ask for /walk or /sample.\n")
         except (ValueError, RecursionError) as error:  # not JSON, or something else than what is asked for
@@ -189,8 +186,8 @@ class _Handler(BaseHTTPRequestHandler):
         self.end_headers()
         self.wfile.write(body)
 
-    def _answer(self, run: "Callable[[Send, IsGone], None]") -> None:
-        """Send the messages of a run, and at its end a refusal if there is one."""
+    def _answer(self, asked: dict[str, Any]) -> None:
+        """Send the messages of a walk, and at its end a refusal if there is one."""
         from warpchain.live_page.asked_walks import GoneError
 
         self.send_response(200)
@@ -201,7 +198,8 @@ class _Handler(BaseHTTPRequestHandler):
             if self._is_gone():
                 return
         try:
-            run(self._send, self._is_gone)
+            walker = self.server.walker
+            (walker.play if self.path == "/walk" else walker.sample)(asked, self._send, self._is_gone)
         except InputError as error:
             self._send({"error": error.args[0]})
         except (GoneError, OSError):
