@@ -83,6 +83,16 @@ def test_the_machines_of_workers_are_named(tmp_path: Path) -> None:
     assert "; three" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
+def test_rounds_of_an_executor_leave_the_same_bytes(tmp_path: Path) -> None:
+    """With `until` an executor is asked for one round after the other, all of one run, as threads are."""
+    rounds: dict[str, Any] = {**WALK, "samples": 4, "until": {"dx": 0.1}, "at_most": 8, "name": "same"}
+    warpchain.sweep(**rounds, out=tmp_path / "threads")
+    with ThreadPoolExecutor(2) as executor:
+        warpchain.sweep(**rounds, executor=executor, workers=2, out=tmp_path / "executor")
+    assert content(tmp_path / "executor") == content(tmp_path / "threads")
+    assert load(tmp_path / "threads").walk_count == 8 and len(runs(tmp_path / "executor")) == 1
+
+
 def test_a_foreign_crate_is_not_replaced(tmp_path: Path) -> None:
     """In a folder without a sweep it is in the way; one that is no JSON is refused by its name, and nothing is run."""
     (tmp_path / CRATE).write_text("{}", encoding="utf-8")
