@@ -75,18 +75,15 @@ def plan_sweep(
     if folder is not None and (folder / "sweep.h5").exists():
         manifest = continued(folder, planned, manifest)
         rows, _ = read_rows(folder, manifest)
-        found, asked = seen(planned, rows)
-        cells = [Asked.of(block, own) for block, own in zip(blocks, rows, strict=True)]
+        found, asked, cells = seen(planned, rows)
     else:
         found, asked = np.zeros(planned.walk_count, bool), manifest.turns == 0
     left = manifest.mine & ~found
     least, expected = left & asked, None
     if planned.has_rounds and cells:
-        both = list(zip(blocks, cells, strict=True))
-        forecast = np.concatenate([np.repeat(own.forecast, block.samples) for block, own in both])
-        over = np.concatenate([np.repeat(own.over, block.samples) for block, own in both])
-        expected = int((left & (manifest.keys["sample"] < forecast)).sum())
-        left &= asked | ~over
+        most = [np.arange(own.walks.shape[1]) < own.forecast[:, np.newaxis] for own in cells]
+        expected = int((left & np.concatenate([walks.ravel() for walks in most])).sum())
+        left &= asked | np.concatenate([np.repeat(~own.over, own.walks.shape[1]) for own in cells])
     chosen = planned.recording.choices.values()
     motions = sum(
         any(choice.includes(sample) for choice in chosen) for sample in manifest.keys["sample"][least].tolist()
