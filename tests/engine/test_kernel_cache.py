@@ -102,7 +102,7 @@ def test_what_is_damaged_is_compiled_anew(cache: tuple[Path, str], suffix: str, 
 def test_headers_that_a_process_has_read_serve_others(cache: tuple[Path, str]) -> None:
     """They are read once, and anew if they are damaged."""
     folder, expected = cache
-    (kept,) = folder.glob("*/headers/*")
+    (kept,) = folder.glob("*/headers_*/*")
     flip(kept)
     compiled(folder, ".o").unlink()
     assert computed(folder) == expected

@@ -82,13 +82,16 @@ def _load(module: wp.Module, device: wp.Device, make: Callable[[], wp.Module], f
 def _read_headers(device: wp.Device) -> Iterator[None]:
     """Share Warp's headers, as the compiler for CPUs has read them, among threads and processes.
 
-    Warp keeps what it read for one thread of one process. Reading takes 2.5 s, a third of the time of a kernel. The
-    compiler itself refuses what does not fit the headers, and reads them anew. A checksum precedes the content here.
+    Warp keeps what it read for one thread of one process. Reading takes 2.5 s, a third of the time of a kernel. A
+    checksum precedes the content here. The compiler refuses, with a message, what was read of headers with another time
+    of modification, so the folder is that of one installation of Warp.
     """
     if not device.is_cpu:
         yield
         return
-    kept = Path(wp.config.kernel_cache_dir, "headers")
+    found = [(path.name, path.stat()) for path in sorted(Path(wp.__file__).parent.glob("native/**/*.h"))]
+    dated = repr([(name, stat.st_size, stat.st_mtime_ns) for name, stat in found])
+    kept = Path(wp.config.kernel_cache_dir, f"headers_{hashlib.sha256(dated.encode()).hexdigest()[:16]}")
     own = Path(wp._src.context.runtime.get_clang_pch_dir())  # type: ignore[attr-defined]
     for path in kept.glob("*.pch"):
         if (own / path.name).exists():
