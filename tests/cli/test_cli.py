@@ -133,6 +133,7 @@ def test_a_failed_walk_is_reported_and_kept(command: Command) -> None:
     assert load_walk("new/walk.h5").walk_time == pytest.approx(0.06)
     table = command("walk", *QUICK, "--set", "walk_limit=0.06")
     assert table.status == 1 and "Δx unknown" in " ".join(table.out.split())
+    assert (table.out + table.err).count(summary["status_sentence"]) == 1
 
 
 def test_a_chain_that_was_never_released_leaves_no_pictures(command: Command) -> None:

@@ -42,6 +42,8 @@ def test_a_plan_says_what_a_run_will_leave(command: Command, tiny: str) -> None:
     assert plan(command, tiny, "-o", "swept") | {"done": 80, "walks": [0, 0], "shards": 0} == plan(
         command, tiny, "-o", "swept"
     )
+    rows = [line.partition("  ")[0] for line in command("sweep", tiny, "-o", "swept", "--pilot").out.splitlines()]
+    assert rows == ["sweep", "cells", "walks done", "walks left", "memory"]
     more = plan(command, tiny, "-o", "swept", "--samples", "30")
     assert (more["done"], more["walks"]) == (80, [40, 40])
 

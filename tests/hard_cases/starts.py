@@ -20,9 +20,15 @@ State = tuple[Array, Array]
 
 METHODS = method_names()
 every_method = pytest.mark.parametrize("method", METHODS)
-MIXED = ("os32", "dp5", "hybrid")
+PRECISION = {method: "mixed" if method == "hybrid" else "double" for method in METHODS}
+"""In which each method is tried, `os32` in both; a kernel for another precision takes long to compile."""
 every_precision = pytest.mark.parametrize(
-    ("method", "precision"), [*((name, "double") for name in METHODS), *((name, "mixed") for name in MIXED)]
+    ("method", "precision"),
+    [
+        *PRECISION.items(),
+        ("os32", "mixed"),
+        *(pytest.param(*other, marks=pytest.mark.thorough) for other in (("dp5", "mixed"), ("hybrid", "double"))),
+    ],
 )
 
 UNDISSIPATIVE: Final[Mapping[str, float]] = {

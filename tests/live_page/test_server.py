@@ -255,6 +255,26 @@ def test_many_silent_connections(server: LiveServer) -> None:
     assert ask(server, "/walk", {"links": 31})[0] == 200
 
 
+@pytest.mark.parametrize(
+    "head", ["GET /", "POST /walk HTTP/1.1\r\nHost: {}\r\nX-Token: {}\r\nContent-Length: 9999\r\n\r\n"]
+)
+def test_a_request_that_trickles_in_is_given_up(server: LiveServer, monkeypatch: pytest.MonkeyPatch, head: str) -> None:
+    """However often another byte of it comes, head or body: its time is one of the whole."""
+    monkeypatch.setattr("warpchain.live_page.server.HASTE", 0.4)
+    with socket.create_connection(("127.0.0.1", server.server_port)) as line:
+        began = time.monotonic()
+        line.settimeout(0.05)
+        line.sendall(head.format(f"127.0.0.1:{server.server_port}", server.token).encode())
+        with suppress(ConnectionError):  # it is reset or ends
+            while time.monotonic() - began < 5:
+                line.sendall(b"1")
+                with suppress(TimeoutError):
+                    if not line.recv(4096):
+                        break
+        assert time.monotonic() - began < 3
+    assert ask(server, "/walk", {"links": 31})[0] == 200
+
+
 def test_samples_are_those_of_the_library(server: LiveServer) -> None:
     """A sample is the walk of `warpchain.walk` with its seed, without frames; a seed that is none is refused."""
     for setup, seed in ((FIRST, 3), (FIRST | {"floor_friction": 0.6}, 4)):

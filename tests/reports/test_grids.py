@@ -115,6 +115,14 @@ def test_two_axes_are_lines(tmp_path: Path, grid: dict[str, Any], along: str, ac
     assert [handle.get_color() for handle in handles[: len(colors)]] == colors
 
 
+@pytest.mark.parametrize(("outcome", "low", "high"), [(2.0, 0.0, 2.1), (-2.0, -2.1, 0.0)])
+def test_zero_is_on_the_axis(tmp_path: Path, outcome: float, low: float, high: float) -> None:
+    """Of distances alike, forwards and, up a slope, backwards."""
+    result = make_sweep(tmp_path, sweep({"floor_friction": FRICTION}), lambda walk: outcome)
+    (axes,) = panels(result.plot()).values()
+    assert axes.get_ylim() == pytest.approx((low, high), abs=0.02)
+
+
 def test_further_axes_are_panels(tmp_path: Path) -> None:
     """Four axes give a panel for each pair of values of two of them; of very many, the first are shown and counted."""
     grid = {"links": [60, 90], "start": ["rest", "ellipse"], "gravity": GRAVITY, "floor_friction": FRICTION}

@@ -131,6 +131,13 @@ def test_intervals_of_sensitivity_hold_what_they_say(tmp_path: Path) -> None:
     assert "without intervals: one randomisation" in sensitivity(one).figure.get_supxlabel()
 
 
+def test_samples_that_until_never_asked_for_are_not_lost(tmp_path: Path) -> None:
+    """A cell that stopped after its first round has no more samples, and its panel says nothing of others."""
+    content = ishigami(16, [10], until={"dx": 0.9}, at_most=64)
+    (cell,) = sensitivities(make_sweep(tmp_path, content, ishigami_distance))
+    assert (cell.samples, cell.lost) == (16, 0)
+
+
 def test_sensitivity_leaves_out_incomplete_samples(tmp_path: Path) -> None:
     """A sample with a failed walk is left out as a whole and counted; a block without two samples has no indices."""
     distributions = {"all": "fixed", "floor_friction": "table", "phase": "table", "clearance": "table"}

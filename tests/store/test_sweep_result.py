@@ -1,6 +1,7 @@
 """Results of sweeps: arrays with named axes, statistics, xarray, pandas, and the one merged file."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import h5py
@@ -112,8 +113,28 @@ def test_statistics_are_over_walks_at_rest(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.sd, [math.sqrt(10 / 3), math.sqrt(8), *[math.nan] * 3])
     np.testing.assert_allclose(found.standard_error[:2], [math.sqrt(10 / 12), 2.0])
     assert load(tmp_path).statistics("bounces").mean.shape == (5,)
-    with pytest.raises(KeyError, match="did you mean bounces"):
-        load(tmp_path).statistics("bounce")
+
+
+def test_names_that_are_not_there_are_refused(single: Path) -> None:
+    """Columns, axes, blocks and figures: one line with the name that is meant; codes of statuses have no mean."""
+    result = load(single)
+    (block,) = result.blocks.values()
+    named: dict[str, Callable[[str], object]] = {"bounce": result.statistics, "bounces_": block.values}
+    named |= {"bounced": result.cell_statistics, "bouncess": result.unit, "bounce_s": block.meaning}
+    named |= {"bouncy": result.columns.__getitem__, "bounces2": result.plot}
+    for name, call in named.items():
+        with pytest.raises(InputError, match=f"'{name}'.*; did you mean bounces") as caught:
+            call(name)
+        assert isinstance(caught.value, KeyError) and "\n" not in str(caught.value)
+    for refused in ("status", "index", 3, ["dx"]):
+        with pytest.raises(InputError, match="is not a column of numbers; use one of dx, "):
+            result.statistics(refused)
+    with pytest.raises(InputError, match="'mian': unknown name; did you mean main"):
+        result.blocks["mian"]
+    with pytest.raises(InputError, match="unknown name; did you mean links"):
+        result.axes["link"]
+    with pytest.raises(AttributeError, match=r"^bounce: unknown column; did you mean bounces\?$"):
+        result.bounce  # noqa: B018
 
 
 def test_a_sweep_is_no_saved_walk(tmp_path: Path, single: Path) -> None:

@@ -110,12 +110,17 @@ class Page:
         os.close(self._read)
 
 
+def program() -> str:
+    """The browser's program; where there is none a test is skipped."""
+    found = next(filter(None, map(shutil.which, NAMES)), None)
+    if found is None:
+        pytest.skip(f"no browser: none of {', '.join(NAMES)} is installed")
+    return found
+
+
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
     """A browser without a window."""
-    program = next(filter(None, map(shutil.which, NAMES)), None)
-    if program is None:
-        pytest.skip(f"no browser: none of {', '.join(NAMES)} is installed")
-    page = Page(program, tmp_path_factory.mktemp("profile"))
+    page = Page(program(), tmp_path_factory.mktemp("profile"))
     yield page
     page.close()

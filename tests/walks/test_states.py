@@ -227,7 +227,7 @@ def test_what_comes_before_a_state_is_refused(fall: WalkResult, settings: dict[s
 
 def test_a_state_keeps_its_floor_in_simulate() -> None:
     """Unless another is given, the floor is that of the state's scene: a chain lies on its slope, not on y = 0."""
-    state = warpchain.walk(**ELLIPSE | {"method": "os32"}, slope=10.0).state(0.3)
+    state = warpchain.walk(**ELLIPSE | {"method": "os32", "tolerance": 1e-5}, slope=10.0).state(0.3)
     on_slope, in_the_air = (
         warpchain.simulate(state, duration=0.4, method=method, floor=floor)
         for method, floor in (("os32", None), ("dp5", False))

@@ -60,6 +60,11 @@ class Setup:
     start: "State | None" = None
 
     @property
+    def sections(self) -> dict[str, dict[str, Any]]:
+        """All fields by section and name."""
+        return {name: getattr(self, name).model_dump() for name in ("parameters", "scene", "options")}
+
+    @property
     def has_drive(self) -> bool:
         """Whether the walk begins on a sprocket."""
         return self.start is None and self.scene.is_on_sprocket

@@ -121,6 +121,9 @@ def print_plan(planned: "Sweep", plan: "SweepPlan", as_json: bool) -> None:
     rows = {"sweep": f"{printable(planned.name)} is valid", "cells": f"{plan.cells:,}"}
     rows |= {"walks done": f"{plan.done:,}"} if plan.done else {}
     rows["walks left" if plan.done else "walks"] = f"{least:,}" + f" in this round, {most:,} at most" * (most > least)
+    if not most:
+        _print_rows([*rows.items(), ("memory", f"{_sizes(plan.memory)} to read the results")])
+        return
     rows |= {"expected": f"{plan.expected:,} walks left"} if plan.expected is not None else {}
     rows |= {"files": f"{plan.shards:,}", "disk": _sizes(BYTES_ON_DISK * least, BYTES_ON_DISK * most)}
     rows |= {"motions": f"of {plan.motions:,} walks; they need room beside this"} if plan.motions else {}
@@ -159,7 +162,7 @@ def _walk_rows(result: WalkResult) -> Iterator[tuple[str, str]]:
     """Names and values."""
     status, energy = result.status, result.energy
     yield "Δx", f"{result.dx:#.2g}".removesuffix(".") + f" m, {ONE_OF_MANY}" if math.isfinite(result.dx) else "unknown"
-    yield "status", status.label if status.ok else f"{status.label}: {status.sentence}"
+    yield "status", status.label  # what to try is said on standard error
     if math.isfinite(result.hold_time):
         drift = f"drift {100 * result.drift:.2g} %" if math.isfinite(result.drift) else ""
         if result.status is Status.NOT_STEADY:  # the drift of its last, short watch is no reason

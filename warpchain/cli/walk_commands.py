@@ -90,7 +90,6 @@ def walk(
     from warpchain.chain.setup import DEFAULT_PRESET
     from warpchain.cli.output import print_walk, saved, try_walk_folder, write_walk
     from warpchain.inputs.distributions import Seed
-    from warpchain.inputs.fields import SECTIONS
     from warpchain.inputs.validation import InputError, checked, printable
     from warpchain.inputs.yaml_files import parse_yaml
     from warpchain.results.one_walk import run_walk
@@ -124,7 +123,7 @@ def walk(
             block, place = found.located(parse_yaml(index, "--index"))
             base, number = block.setup_at(place), block.origin.seed
         preset, kept = base.preset, base.options.beside(given["options"])
-        own = {name: getattr(base, name).model_dump() for name in SECTIONS} | {"options": kept}
+        own = base.sections | {"options": kept}
     elif config is not None:
         from warpchain.sweeps.sweep_file import read_walk_file  # its grammar takes long to build
 

@@ -14,10 +14,15 @@ from warpchain.engine.processors import processors
 from warpchain.inputs.options import FIBERS, on_gpu
 
 
-def made_by(devices: Iterable[str]) -> dict[str, str]:
-    """The provenance of a result: the command of this process without the folders of its program, and the machine."""
+def own_command() -> str:
+    """The command of this process, without the folders of its program."""
     program, *arguments = sys.argv or [""]
-    return {"command": shlex.join([os.path.basename(program) or "python", *arguments])[:1000], **machine_of(devices)}
+    return shlex.join([os.path.basename(program) or "python", *arguments])[:1000]
+
+
+def machine_text(devices: Iterable[str]) -> str:
+    """`machine_of` in one line."""
+    return "; ".join(f"{name}: {value}" for name, value in machine_of(devices).items())
 
 
 def machine_of(devices: Iterable[str]) -> dict[str, str]:

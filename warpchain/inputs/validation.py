@@ -37,6 +37,8 @@ _LONGEST_VALUE: Final = 60
 MOST_PROBLEMS: Final = 20
 """Most problems that are described, each in a line; the others are counted."""
 
+T = TypeVar("T")
+
 DEEPEST: Final = 20
 """Most lists and mappings inside of one another; a sweep file has eight at most."""
 MOST_VALUES: Final = 100_000
@@ -57,6 +59,18 @@ class InputError(ValueError):
     def __str__(self) -> str:
         """All lines."""
         return "\n".join(self.args)
+
+
+class UnknownNameError(InputError, KeyError):
+    """A name that is not there, such as that of a column; its text says which one may be meant."""
+
+
+class Named(dict[str, T]):
+    """Values by their names; an unknown name is an `UnknownNameError`."""
+
+    def __missing__(self, name: object) -> T:
+        """Refuse the name."""
+        raise UnknownNameError(f"{shown(name)}: unknown name; {suggestion(name, [*self])}")
 
 
 class DamagedFileError(InputError):
@@ -154,9 +168,6 @@ class Section(BaseModel):
 def full_name(written: Any) -> Any:
     """Name of the field that is written as its name or symbol, `mu_fc` or μ_fc; anything else stays as it is."""
     return _NAME_OF_SYMBOL.get(spelled(written), written) if isinstance(written, str) else written
-
-
-T = TypeVar("T")
 
 
 def by_name(values: Mapping[Any, T], path: str = "") -> dict[Any, T]:

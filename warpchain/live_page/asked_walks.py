@@ -17,7 +17,7 @@ from pydantic import Field, Strict
 
 from warpchain.chain.resolution import resolve
 from warpchain.chain.setup import DEFAULT_PRESET, Setup
-from warpchain.inputs.fields import SECTIONS, by_section
+from warpchain.inputs.fields import by_section
 from warpchain.inputs.validation import InputError, checked, shown
 from warpchain.live_page.messages import Frames, change_of_velocity, recipes, summary
 from warpchain.pictures.player import player_data
@@ -80,9 +80,8 @@ class Walker:
         setup = block.setup_at(place)
         if not settings:
             return setup, block.origin.seed
-        own = {name: getattr(setup, name).model_dump() for name in SECTIONS}
-        own["options"] = setup.options.beside(sections["options"])
-        given = {name: own[name] | sections[name] for name in SECTIONS}
+        own = setup.sections | {"options": setup.options.beside(sections["options"])}
+        given = {name: own[name] | values for name, values in sections.items()}
         return resolve(setup.preset, **given, seed=None, loads=False), None
 
     def walk(self, asked: Asked, watch: Callable[[Progress], None], record: Mapping[str, Any]) -> WalkResult:

@@ -13,7 +13,7 @@ import yaml
 
 from warpchain.chain.setup import Setup
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.fields import SECTIONS, by_section
+from warpchain.inputs.fields import by_section
 from warpchain.inputs.validation import InputError, json_value
 from warpchain.pictures.player import player_data
 from warpchain.results.walk_result import WalkResult
@@ -22,6 +22,10 @@ from warpchain.walks.walk_phases import Progress
 
 _OPTIONS: Final = ("preset", "seed", "links", "frequency", "start")
 """Names with an option of their own on the command line of `warpchain walk`, which come first there."""
+
+
+_NO_FIELDS: Final = ("preset", "seed", "index", "push")
+"""What a set-up has beside fields of a walk."""
 
 
 class Frames:
@@ -41,15 +45,19 @@ class Frames:
         self.joints = np.concatenate([self.joints, progress.frame_joints[..., :2]])
         links = (self.joints + np.roll(self.joints, 1, axis=1)) / 2
         has_sprocket = not math.isnan(progress.sprocket_height)
-        walk = SimpleNamespace(setup=setup, time=self._times, frame_time=self._times, frame_joints=self.joints)
-        walk.joints_lab, walk.center = None, np.average(links, axis=1, weights=setup.link_values.mass)
-        walk.sprocket_center = np.array([0.0, progress.sprocket_height]) if has_sprocket else None
-        walk.sprocket_radius = setup.contact_radius if has_sprocket else math.nan
+        walk = SimpleNamespace(
+            setup=setup,
+            time=self._times,
+            frame_time=self._times,
+            frame_joints=self.joints,
+            joints_lab=None,
+            center=np.average(links, axis=1, weights=setup.link_values.mass),
+            sprocket_center=np.array([0.0, progress.sprocket_height]) if has_sprocket else None,
+            sprocket_radius=setup.contact_radius if has_sprocket else math.nan,
+        )
         data = player_data(cast(Walk, walk), len(self._times))
-        moving = {name: data.pop(name) for name in ("time", "joints", "center")}
-        if not had:
-            return {"first": data | moving}
-        return {"more": data | {name: values[had:] for name, values in moving.items()}}
+        new = {name: data[name][had:] for name in ("time", "joints", "center")}
+        return {"more" if had else "first": data | new}
 
 
 def change_of_velocity(setup: Setup, link: int, impulse: Sequence[float]) -> Array:
@@ -64,16 +72,16 @@ def summary(walk: WalkResult) -> dict[str, Any]:
     """The results that a page shows, and the values of its controls."""
     names = ("dx", "walk_time", "bounces", "energy", "wall_time", "fell_over")
     said = {name: getattr(walk, name) for name in names} | {"status": walk.status.label, "warnings": walk.warnings()}
-    values = walk.setup.parameters.model_dump() | walk.setup.scene.model_dump() | {"preset": walk.setup.preset}
+    own = walk.setup.sections
+    values = own["parameters"] | own["scene"] | {"preset": walk.setup.preset}
     told = {"sentence": walk.status.sentence, "values": values, "seed": walk.seed}
     return cast(dict[str, Any], json_value(said | told))
 
 
 def recipes(asked: Mapping[str, Any], walk: WalkResult, folder: Path) -> dict[str, str]:
     """Python lines, command line and YAML file that make the same walk; what cannot is empty."""
-    given = {name: asked[name] for name in (*_OPTIONS, *asked) if name in asked and name not in ("index", "push")}
-    given = {name: value for name, value in given.items() if value is not None or name not in ("preset", "seed")}
-    fields = {name: value for name, value in given.items() if name not in ("preset", "seed")}
+    fields = {name: asked[name] for name in (*_OPTIONS, *asked) if name in asked and name not in _NO_FIELDS}
+    given = {name: asked[name] for name in ("preset", "seed") if asked.get(name) is not None} | fields
     index, pushes = asked.get("index"), asked.get("push", [])
     words = ["warpchain", "walk", *([] if index is None else ["--like", str(folder), "--index", f"{index}"])]
     for name, value in given.items():
@@ -83,12 +91,12 @@ def recipes(asked: Mapping[str, Any], walk: WalkResult, folder: Path) -> dict[st
     file = yaml.safe_dump(sections, sort_keys=False, default_flow_style=None)
     note = "# warpchain walk --config FILE.yaml" + (f" --seed {given['seed']}" if "seed" in given else "")
     if index is not None and fields:  # the fields of the sweep's walk, one by one
-        dumps = [vars(walk.setup)[name].model_dump() for name in SECTIONS]
-        given = {"preset": walk.setup.preset} | {name: value for dump in dumps for name, value in dump.items()}
+        parameters, scene, options = walk.setup.sections.values()
+        given = {"preset": walk.setup.preset} | parameters | scene | options
     made = f"walk({', '.join(f'{name}={value!r}' for name, value in given.items())})"
     if index is not None and not fields:
         made = f"load({str(folder)!r}).walk({index})"
-    lines = ["import warpchain\n", f"walk = warpchain.{made}"]
+    lines = ["from dataclasses import replace\n"] * bool(pushes) + ["import warpchain\n", f"walk = warpchain.{made}"]
     for moment, link, *impulse in pushes:
         kick = change_of_velocity(walk.setup, link, impulse).tolist()
         lines += [
@@ -97,6 +105,8 @@ def recipes(asked: Mapping[str, Any], walk: WalkResult, folder: Path) -> dict[st
             f"velocity[{link}, :2] += {kick}  # m/s, by an impulse of {impulse} N s",
             "walk = warpchain.walk(start=replace(state, velocity=velocity))",
         ]
-    python = "\n".join([*["from dataclasses import replace\n"] * bool(pushes), *lines])
-    command, is_whole = shlex.join(words) if not pushes else "", not pushes and index is None
-    return {"python": python, "command": command, "yaml": f"{note}\n{file}" if is_whole else ""}
+    return {
+        "python": "\n".join(lines),
+        "command": "" if pushes else shlex.join(words),
+        "yaml": "" if pushes or index is not None else f"{note}\n{file}",
+    }

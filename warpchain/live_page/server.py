@@ -11,7 +11,6 @@ import secrets
 import select
 import socket
 import threading
-from collections.abc import Callable
 from contextlib import suppress
 from functools import cached_property
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -24,14 +23,16 @@ from warpchain.inputs.validation import InputError, checked
 from warpchain.live_page.page import FIRST, live_page
 
 if TYPE_CHECKING:
-    from warpchain.live_page.asked_walks import IsGone, Send, Walker
+    from warpchain.live_page.asked_walks import Walker
 
 ADDRESS: Final = "127.0.0.1"
 MOST_BYTES: Final = 65_536
 """Most bytes of a request; a floor of 256 points takes 10 kB."""
 MOST_CONNECTIONS: Final = 32
 PATIENCE: Final = 20.0
-"""Time [s] after which a client that neither sends nor takes anything is given up."""
+"""Time [s] after which a client is given up that does not take an answer."""
+HASTE: Final = 5.0
+"""Time [s] in which a request has to be there as a whole; on this machine it takes milliseconds."""
 _NO_TOKEN: Final = (
     "This address lacks the token of the server. Open the address that `warpchain live` printed; "
     "`warpchain live 'ADDRESS'` opens the set-up of an older one.\n"
@@ -110,6 +111,22 @@ class _Handler(BaseHTTPRequestHandler):
     server: LiveServer
     timeout, server_version, sys_version = PATIENCE, "warpchain", ""
 
+    def setup(self) -> None:
+        """Give the request its time, however slowly it trickles in: then nothing more of it is read."""
+        super().setup()
+        self._reading = threading.Timer(HASTE, self._read_no_more)
+        self._reading.daemon = True
+        self._reading.start()
+
+    def finish(self) -> None:
+        """End the connection."""
+        self._reading.cancel()
+        super().finish()
+
+    def _read_no_more(self) -> None:
+        with suppress(OSError):  # the client has ended it
+            self.connection.shutdown(socket.SHUT_RD)
+
     def log_message(self, *_: object) -> None:
         """Keep the terminal free."""
 
@@ -135,11 +152,11 @@ class _Handler(BaseHTTPRequestHandler):
             self._reply(413, f"A request has a Content-Length, and at most {MOST_BYTES} bytes.\n")
             return
         try:
-            asked = checked(json.loads(self.rfile.read(int(size))), "request", dict[str, Any])
-            if self.path == "/walk":
-                self._answer(lambda *to: self.server.walker.play(asked, *to))
-            elif self.path == "/sample":
-                self._answer(lambda *to: self.server.walker.sample(asked, *to))
+            body = self.rfile.read(int(size))
+            self._reading.cancel()
+            asked = checked(json.loads(body), "request", dict[str, Any])
+            if self.path in ("/walk", "/sample"):
+                self._answer(asked)
             else:
                 self._reply(404, "Ask for /walk or /sample.\n")
         except (ValueError, RecursionError) as error:  # not JSON, or something else than what is asked for
@@ -169,8 +186,8 @@ class _Handler(BaseHTTPRequestHandler):
         self.end_headers()
         self.wfile.write(body)
 
-    def _answer(self, run: "Callable[[Send, IsGone], None]") -> None:
-        """Send the messages of a run, and at its end a refusal if there is one."""
+    def _answer(self, asked: dict[str, Any]) -> None:
+        """Send the messages of a walk, and at its end a refusal if there is one."""
         from warpchain.live_page.asked_walks import GoneError
 
         self.send_response(200)
@@ -181,7 +198,8 @@ class _Handler(BaseHTTPRequestHandler):
             if self._is_gone():
                 return
         try:
-            run(self._send, self._is_gone)
+            walker = self.server.walker
+            (walker.play if self.path == "/walk" else walker.sample)(asked, self._send, self._is_gone)
         except InputError as error:
             self._send({"error": error.args[0]})
         except (GoneError, OSError):

@@ -112,10 +112,9 @@ def draw_grid(
     title = style.head(owner, title, bool(beside))
     if maps:
         owner.colorbar(image, ax=maps, label=label).outline.set_visible(False)
-    low = min((axes.dataLim.y0 for axes in lines), default=0.0)
-    high = max((axes.dataLim.y1 for axes in lines), default=0.0)
-    for axes in lines if low >= 0 else ():  # as in the figure of the paper
-        axes.set_ylim(0.0, 1.05 * high)
+    ends = [end for axes in lines for end in (axes.dataLim.y0, axes.dataLim.y1)]
+    for axes in lines:  # zero is in all, as in the figure of the paper
+        axes.set_ylim(1.05 * min(0.0, *ends), 1.05 * max(0.0, *ends))
     _draw_legends(owner, areas, panels, palettes, bool(beside), title)
     return owner
 

@@ -28,7 +28,7 @@ def samples_picture(result: SweepResult) -> Figure:
     below.axvspan(mean - sd, mean + sd, color=FAINT, alpha=0.25, linewidth=0, label="± standard deviation")
     below.plot(rested, np.zeros(len(rested)), "|", color=BLUE, markersize=16, label="walks")
     below.errorbar(mean, 0.0, xerr=error, fmt="o", color=INK, capsize=4, label="mean ± its error")
-    below.set(xlim=(min(0.0, 1.05 * rested[0]), 1.05 * rested[-1]), yticks=[], xlabel="Δx / m")
+    below.set(xlim=(1.05 * min(0.0, rested[0]), 1.05 * max(0.0, rested[-1])), yticks=[], xlabel="Δx / m")
     text = f"Δx of {len(rested)} walks: {with_error(mean, error)} m; above, the median one"
     below.set_title(text, fontsize="medium", loc="left")
     below.legend(frameon=False, fontsize="small", ncols=3, loc="lower left", bbox_to_anchor=(0.0, -0.02))

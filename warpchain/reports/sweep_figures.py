@@ -197,9 +197,10 @@ def sensitivities(result: SweepResult) -> list[Sensitivity]:
     found = []
     for block in crossed:
         for place in np.ndindex(*block.shape[:-1]):
-            whole = block.values("dx")[place].reshape(-1, SAMPLERS[block.block.sampler].walks(len(block.drawn)))
+            walks = SAMPLERS[block.block.sampler].walks(len(block.drawn))  # of a sample
+            whole = block.values("dx")[place].reshape(-1, walks)
             is_complete = np.isfinite(whole).all(axis=1)
-            complete, groups = whole[is_complete], block.block.groups[:: whole.shape[1]][is_complete]
+            complete, groups = whole[is_complete], block.block.groups[::walks][is_complete]
             samples, indices = len(complete), np.array(sobol_indices(complete))
             if samples < 2 or not np.isfinite(indices).all():
                 continue
@@ -207,7 +208,8 @@ def sensitivities(result: SweepResult) -> list[Sensitivity]:
             intervals = np.stack([indices - half, indices + half], axis=-1)
             cell = labels.cell_text(cell_values(block.axes, place))
             text = ": ".join([*[block.name] * (len(crossed) > 1), *[cell] * bool(cell)]) or block.name
-            lost = len(whole) - samples
+            is_asked = (block.is_there | block.is_missing)[place]  # until a cell has its error
+            lost = int(is_asked[::walks].sum()) - samples
             found.append(Sensitivity(text, block.drawn, indices, intervals, samples, lost))
     if not found:
         raise NothingToShow("no cell has two complete samples for Sobol indices yet; resume the sweep")

@@ -27,7 +27,6 @@ from warpchain.results.block_result import BlockResult
 from warpchain.results.sweep_result import SweepResult, load
 from warpchain.results.walk_result import WalkResult
 from warpchain.status import Status
-from warpchain.store.crate import runs
 from warpchain.version import VERSION
 from warpchain.walks.landmarks import FAULTS
 
@@ -68,10 +67,10 @@ def write_report(folder: AnyPath, path: AnyPath, *, animation_of: int | None = N
     inaccurate = [(name, remedy, [own[name] for own in faults]) for name, remedy in FAULTS.items()]
     resolved = yaml.safe_dump(result.sweep, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
     note = "Values are in SI units; gaussian and uniform are what samples draw. <code>warpchain parameters</code> "
-    origin = [[name, f"{value}"] for name, value in result.notes().items() if name != "sweep"]
-    for number, run in enumerate(runs(folder) if Path(folder).is_dir() else (), 1):
-        times = f"{run.get('startTime')} to {run.get('endTime', 'an unknown end')}"
-        origin.append([f"run {number}", f"{run.get('name')}; {times}; {run.get('description')}"])
+    origin = [[name, f"{value}"] for name, value in result.notes().items() if name not in ("sweep", "runs")]
+    for number, run in enumerate(result.provenance["runs"], 1):
+        times = f"{run.get('start')} to {run.get('end', 'an unknown end')}"
+        origin.append([f"run {number}", f"{run.get('command')}; {times}; {run.get('machines')}"])
     again = "<p>With the text under Sweep in a file: <code>warpchain sweep FILE.yaml -o DIR</code></p>"
     sections = {
         "Figures": "\n".join(_picture(each.figure, each.caption) for each in figures(result)),

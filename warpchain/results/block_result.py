@@ -14,7 +14,16 @@ from warpchain.chain.keep import FRAME_INTERVAL
 from warpchain.chain.setup import Setup
 from warpchain.inputs.arrays import AnyArray
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.validation import InputError, InputWarning, by_name, checked, plain, shown, suggestion
+from warpchain.inputs.validation import (
+    InputError,
+    InputWarning,
+    UnknownNameError,
+    by_name,
+    checked,
+    plain,
+    shown,
+    suggestion,
+)
 from warpchain.results.walk_result import WalkResult
 from warpchain.status import Status
 from warpchain.sweeps.block import POINT, Block
@@ -25,7 +34,7 @@ from warpchain.walks import rows
 from warpchain.walks.cell_statistics import CellStatistics, known_values
 from warpchain.walks.control_variates import controlled
 from warpchain.walks.landmarks import LENGTHS
-from warpchain.walks.rows import COLUMNS, MISSING, Column, quantity_of
+from warpchain.walks.rows import COLUMNS, MISSING, Column, checked_quantity, quantity_of
 from warpchain.walks.walk_numbers import read_motion
 
 if TYPE_CHECKING:
@@ -100,7 +109,7 @@ class BlockResult(Columns):
             """A column."""
             columns = self.__dict__.get("columns", {})
             if name not in columns:
-                raise AttributeError(f"{name}: unknown column; use one of {', '.join(columns)}", name=name, obj=self)
+                raise AttributeError(f"{name}: unknown column; {suggestion(name, [*columns])}", name=None)
             return columns[name]
 
     def __dir__(self) -> list[str]:
@@ -113,18 +122,18 @@ class BlockResult(Columns):
         return f"<BlockResult {self.name} ({sizes}): {counted(self.summary())}>"
 
     def unit(self, name: str) -> str:
-        """SI unit of a column or an axis, "1" for pure numbers; a `KeyError` if there is none of that name."""
+        """SI unit of a column or an axis, "1" for pure numbers; an `UnknownNameError` if there is none."""
         return self._column(name).unit
 
     def meaning(self, name: str) -> str:
-        """One line saying what a column or an axis is; a `KeyError` if there is none of that name."""
+        """One line saying what a column or an axis is; an `UnknownNameError` if there is none."""
         return self._column(name).meaning
 
     def _column(self, name: str) -> Column:
         if name in _NUMBERED:
             return Column("<i8", "1", _NUMBERED[name])
-        if not any(name in known for known in (self.columns, self.axes, self.block.points)):
-            raise KeyError(f"{shown(name)}: {suggestion(name, (*self.columns, *self.axes))}")
+        if name not in (known := (*self.columns, *self.axes, *self.block.points)):
+            raise UnknownNameError(f"{shown(name)}: not a column or an axis; {suggestion(name, known)}")
         return COLUMNS[name] if name in COLUMNS else rows.field_column(name)
 
     @property
@@ -286,8 +295,8 @@ class BlockResult(Columns):
         return np.asarray(np.any([*self.faults.values()], axis=0))
 
     def values(self, name: str = "dx") -> NDArray[np.float64]:
-        """A column as numbers, shape `shape`, which `statistics` averages; NaN for walks excluded from means."""
-        return known_values(self.columns[name], self.columns["status"])
+        """A column of numbers, shape `shape`, which `statistics` averages; NaN for walks excluded from means."""
+        return known_values(self.columns[checked_quantity(name, self.columns, "name")], self.columns["status"])
 
     def statistics(self, name: str = "dx", *, control: bool = False) -> CellStatistics:
         """Statistics of a column in each cell, over the walks at rest that have a value.
@@ -303,13 +312,13 @@ class BlockResult(Columns):
                 in which a walk failed, or that have few walks more than drawn quantities, have no such mean (NaN).
 
         Raises:
-            KeyError: there is no such column.
+            UnknownNameError: there is no such column of numbers.
             InputError: `control` of samples that are not random, draw nothing, or had to be drawn again.
         """
-        unit, column, status = self.unit(name), self.columns[name], self.columns["status"]
+        column, status = self.columns[checked_quantity(name, self.columns, "name")], self.columns["status"]
         is_bounded = name == "dx" and (status == Status.DISTANCE_LIMIT).any()
         farthest = self._farthest() if is_bounded else np.array(np.nan)
-        cells = CellStatistics.of(self.axes, unit, column, status, self.block.groups, farthest)
+        cells = CellStatistics.of(self.axes, self.unit(name), column, status, self.block.groups, farthest)
         reached = self._asked.reached.reshape(cells.mean.shape) if self.block.until else None
         cells = replace(cells, missing=self.is_missing.sum(axis=-1), reached=reached)
         return self._controlled(cells, name) if checked(control, "control", bool) else cells

@@ -9,7 +9,7 @@ from pydantic import Field
 from warpchain.chain.keep import FRAME_INTERVAL, LONGEST_INTERVAL, Keep
 from warpchain.chain.setup import Setup
 from warpchain.engine.devices import gpu_turn
-from warpchain.engine.machine import made_by
+from warpchain.engine.machine import machine_of, own_command
 from warpchain.files import now
 from warpchain.inputs.validation import InputError, checked
 from warpchain.kernels.methods.method import find_method
@@ -58,6 +58,6 @@ def run_walk(
             setup=setup,
             seed=seed,
             versions=package_versions(),
-            provenance=made_by([setup.options.device]) | {"date": date},
+            provenance={"command": own_command(), **machine_of([setup.options.device]), "date": date},
             wall_time=time.perf_counter() - started,
         )

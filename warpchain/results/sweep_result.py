@@ -4,8 +4,8 @@ Users call `load`, and the commands `info`, `plot`, `report` and `merge` do. A f
 walks that are not computed yet are counted as missing.
 
 A merged file is one HDF5 file with a whole sweep: columns with named axes, and the recorded motions. Axes and samples
-are dimension scales. Units and meanings are attributes of every dataset; the resolved sweep, versions and counts by
-status are attributes of the file. A single block is in the root group, which
+are dimension scales. Units and meanings are attributes of every dataset; the resolved sweep, versions, runs and
+counts by status are attributes of the file. A single block is in the root group, which
 `xarray.open_dataset(path, engine="h5netcdf")` opens; several blocks are in groups of their names (`group=`). The
 recorded motions of a block are in its group `motion`, in the format of a saved walk. The name of a walk's group is the
 position of the walk in a flat column. `xarray.open_datatree(path)` opens everything.
@@ -28,14 +28,15 @@ from warpchain.chain.setup import Setup
 from warpchain.files import AnyPath, FileKind, checked_output, clear_parts, given_path, write_whole
 from warpchain.hdf5_files import SWEEP_FILE, Format, hdf5_image, kind_of_hdf5, reading_hdf5
 from warpchain.inputs.arrays import AnyArray
-from warpchain.inputs.validation import InputError, InputWarning, checked_path, full_name, shown, suggestion
+from warpchain.inputs.validation import InputError, InputWarning, Named, checked_path, full_name
 from warpchain.results.block_result import BlockResult, counted, located, status_counts
 from warpchain.results.walk_result import WalkResult
+from warpchain.store.crate import runs
 from warpchain.store.folder import read_rows
 from warpchain.store.shards import read_manifest, stamp, stored_sweep
 from warpchain.sweeps.plan import Sweep
 from warpchain.walks.cell_statistics import CellStatistics
-from warpchain.walks.rows import COLUMNS, STORED_COLUMNS, derived_columns, drawn_column, quantity_of
+from warpchain.walks.rows import COLUMNS, STORED_COLUMNS, checked_quantity, derived_columns, drawn_column, quantity_of
 from warpchain.walks.walk_numbers import MOTION, read_motion, write_motion
 
 if TYPE_CHECKING:
@@ -83,7 +84,8 @@ class SweepResult(_OnlyBlock):
     Attributes:
         blocks: name of each block → its results.
         origin: definition of the sweep.
-        provenance: digest of the sweep, version of the numerics, and versions of the software that began it.
+        provenance: digest of the sweep, version of the numerics, versions of the software that began it, and `runs`,
+            each with its command, its times and the machines that computed its walks.
     """
 
     blocks: dict[str, BlockResult]
@@ -159,7 +161,7 @@ class SweepResult(_OnlyBlock):
         return sum(int(block.inaccurate.sum()) for block in self.blocks.values())
 
     def unit(self, name: str) -> str:
-        """SI unit of a column or an axis of any block, "1" for pure numbers; a `KeyError` if there is none."""
+        """SI unit of a column or an axis of any block, "1" for pure numbers; an `UnknownNameError` if there is none."""
         first, *others = self.blocks.values()
         known = (block for block in others if name in (*block.columns, *block.dims, *block.block.points))
         return next(known, first).unit(name)
@@ -168,12 +170,10 @@ class SweepResult(_OnlyBlock):
         """Name of each block that has a column of numbers → its statistics, see `BlockResult.statistics`.
 
         Raises:
-            InputError: no block has such a column.
+            UnknownNameError: no block has such a column.
         """
         known = {name: None for block in self.blocks.values() for name in block.columns}
-        columns = [name for name in known if name not in ("index", "status")]
-        if quantity not in columns:
-            raise InputError(f"quantity: {shown(quantity)} is not a column of numbers; {suggestion(quantity, columns)}")
+        checked_quantity(quantity, known, "quantity")
         blocks = self.blocks.items()
         return {name: block.statistics(quantity) for name, block in blocks if quantity in block.columns}
 
@@ -265,7 +265,7 @@ class SweepResult(_OnlyBlock):
             **{f"walks_{label}": count for label, count in self.summary().items()},
             "sweep": json.dumps(self.sweep, ensure_ascii=False),
             **self.provenance,
-            "versions": json.dumps(self.provenance["versions"]),
+            **{name: json.dumps(self.provenance[name], ensure_ascii=False) for name in ("versions", "runs")},
         }
 
 
@@ -299,14 +299,15 @@ def _together(sources: Sequence[AnyPath]) -> SweepResult:
             raise InputError(
                 f"{folder}: expected a part of the sweep in {first}, got another sweep; use parts of one sweep"
             )
-        blocks = {}
+        blocks = Named[BlockResult]()
         for block, other in zip(whole.blocks.values(), result.blocks.values(), strict=True):
             there = block.is_there
             if (there & other.is_there).any():
                 raise InputError(f"{folder}: repeats walks of an earlier folder; pass each part of a sweep once")
-            columns = {key: np.where(there, values, other.columns[key]) for key, values in block.columns.items()}
+            columns = Named({key: np.where(there, each, other.columns[key]) for key, each in block.columns.items()})
             blocks[block.name] = replace(block, columns=columns, motions=np.where(there, block.motions, other.motions))
-        whole = replace(whole, blocks=blocks)
+        ran = [*whole.provenance["runs"], *result.provenance["runs"]]
+        whole = replace(whole, blocks=blocks, provenance=whole.provenance | {"runs": ran})
     return whole
 
 
@@ -324,7 +325,8 @@ def _load_folder(directory: AnyPath) -> SweepResult:
                 raise
             time.sleep(PAUSE * is_deleting)
     provenance = {"digest": manifest.sweep.digest(), "numerics_version": manifest.numerics_version}
-    return _result(manifest.sweep, provenance | {"versions": manifest.versions}, rows, motions)
+    provenance |= {"versions": manifest.versions, "runs": runs(directory)}
+    return _result(manifest.sweep, provenance, rows, motions)
 
 
 def _load_merged(path: AnyPath) -> SweepResult:
@@ -332,7 +334,7 @@ def _load_merged(path: AnyPath) -> SweepResult:
     with reading_hdf5(path, MERGED, REMEDY, WANTED) as file:
         sweep = stored_sweep(path, json.loads(file.attrs["sweep"]))
         provenance = {"digest": file.attrs["digest"], "numerics_version": int(file.attrs["numerics_version"])}
-        provenance["versions"] = json.loads(file.attrs["versions"])
+        provenance |= {name: json.loads(file.attrs.get(name, "[]")) for name in ("versions", "runs")}
         groups = [file[block.name] if len(sweep.blocks) > 1 else file for block in sweep.blocks]
         motions = [np.full(block.shape, None) for block in sweep.blocks]
         for group, found in zip(groups, motions, strict=True):
@@ -343,7 +345,7 @@ def _load_merged(path: AnyPath) -> SweepResult:
 
 def _result(sweep: Sweep, provenance: dict[str, Any], stored: Sequence[Any], motions: Sequence[Any]) -> SweepResult:
     """A result, given for each block what has its stored columns by name, and its motions, both in any shape."""
-    blocks = {}
+    blocks = Named[BlockResult]()
     for number, block in enumerate(sweep.blocks):
         drawn = [*map(drawn_column, block.drawn)]
         names = ("status", *STORED_COLUMNS, *drawn)
@@ -352,9 +354,9 @@ def _result(sweep: Sweep, provenance: dict[str, Any], stored: Sequence[Any], mot
         blocks[block.name] = BlockResult(
             name=block.name,
             number=number,
-            axes={name: np.array(values) for name, values in block.axes.items()},
+            axes=Named({name: np.array(values) for name, values in block.axes.items()}),
             drawn=block.drawn,
-            columns={name: columns[name] for name in (*COLUMNS, *drawn)},
+            columns=Named({name: columns[name] for name in (*COLUMNS, *drawn)}),
             origin=sweep,
             versions=provenance["versions"],
             motions=motions[number].reshape(block.shape),

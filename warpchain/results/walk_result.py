@@ -179,7 +179,8 @@ class WalkResult(WalkNumbers):
                 "status_sentence": self.status.sentence,
                 **{name: getattr(self, name) for name in NUMBERS},
                 **{name: getattr(self, name) for name in ("sprocket_center", "sprocket_radius", "energy_error")},
-                **_setup_as_dict(self.setup),
+                "preset": self.setup.preset,
+                **self.setup.sections,
                 "seed": self.seed,
                 "versions": self.versions,
                 "provenance": self.provenance,
@@ -222,7 +223,7 @@ class WalkResult(WalkNumbers):
         return {
             "status": self.status.label,
             "status_sentence": self.status.sentence,
-            "setup": json.dumps(_setup_as_dict(self.setup), allow_nan=False),
+            "setup": json.dumps({"preset": self.setup.preset, **self.setup.sections}, allow_nan=False),
             "seed": json.dumps(self.seed),
             "versions": json.dumps(self.versions),
             "provenance": json.dumps(self.provenance),
@@ -272,11 +273,6 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
             **read_fields(file, NUMBERS, setup.scene.links),
             **read_motion(file, setup.scene.links),
         )
-
-
-def _setup_as_dict(setup: Setup) -> dict[str, Any]:
-    models = {name: getattr(setup, name).model_dump() for name in ("parameters", "scene", "options")}
-    return {"preset": setup.preset, **models}
 
 
 def write_state(file: "h5py.File", state: State) -> None:

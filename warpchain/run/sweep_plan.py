@@ -67,7 +67,7 @@ def plan_sweep(
     """A checked sweep and what it would take; arguments as of `sweep`, errors likewise. Nothing is written.
 
     A folder in which the sweep has begun is read: the plan is of what is left. A `pilot` runs a walk of each corner of
-    the grid, whose mean time stands for that of all walks of its block.
+    the grid, whose mean time stands for that of all walks of its block; none if no walk is left.
     """
     planned = on_device(load_sweep(source, **replaced), device)
     blocks, cells = planned.blocks, list[Asked]()
@@ -75,23 +75,21 @@ def plan_sweep(
     if folder is not None and (folder / "sweep.h5").exists():
         manifest = continued(folder, planned, manifest)
         rows, _ = read_rows(folder, manifest)
-        found, asked = seen(planned, rows)
-        cells = [Asked.of(block, own) for block, own in zip(blocks, rows, strict=True)]
+        found, asked, cells = seen(planned, rows)
     else:
         found, asked = np.zeros(planned.walk_count, bool), manifest.turns == 0
     left = manifest.mine & ~found
     least, expected = left & asked, None
     if planned.has_rounds and cells:
-        both = list(zip(blocks, cells, strict=True))
-        forecast = np.concatenate([np.repeat(own.forecast, block.samples) for block, own in both])
-        over = np.concatenate([np.repeat(own.over, block.samples) for block, own in both])
-        expected = int((left & (manifest.keys["sample"] < forecast)).sum())
-        left &= asked | ~over
+        most = [np.arange(own.walks.shape[1]) < own.forecast[:, np.newaxis] for own in cells]
+        expected = int((left & np.concatenate([walks.ravel() for walks in most])).sum())
+        left &= asked | np.concatenate([np.repeat(~own.over, own.walks.shape[1]) for own in cells])
     chosen = planned.recording.choices.values()
     motions = sum(
         any(choice.includes(sample) for choice in chosen) for sample in manifest.keys["sample"][least].tolist()
     )
     at_once = gpus or workers or processors()
+    pilot = pilot and bool(left.any())
     corners = [list(_corners(block)) for block in blocks] if pilot else []
     each = np.array([np.mean([seconds for *_, seconds in own]) for own in corners]) / min(at_once, processors())
     return planned, SweepPlan(

@@ -1,6 +1,6 @@
 """`warpchain.sweep`: hands the shards of a sweep to workers and follows their progress; an interrupted sweep resumes.
 
-A worker runs the walks of shards, writes each shard to an immutable file and returns nothing. So
+A worker runs the walks of shards, writes each shard to an immutable file and returns the name of its machine. So
 any executor in the style of ``concurrent.futures`` will do, on this machine or another that sees the same folder.
 """
 
@@ -24,7 +24,7 @@ from pydantic import Field
 from warpchain.chain.resolution import MAY_BE_NONE, Values
 from warpchain.chain.setup import DEFAULT_PRESET, Setup
 from warpchain.engine.devices import gpu_turn, has_gpu_turn, start_device
-from warpchain.engine.machine import made_by
+from warpchain.engine.machine import machine_text, own_command
 from warpchain.engine.processors import free_memory, processors
 from warpchain.files import AnyPath
 from warpchain.inputs.fields import SECTION_OF, by_section
@@ -50,7 +50,7 @@ from warpchain.walks.walk_phases import outcomes
 if TYPE_CHECKING:
     from warpchain.typed import SweepFields
 
-Tasks = Iterator[tuple[Future[None], list[Shard]]]
+Tasks = Iterator[tuple[Future[str], list[Shard]]]
 
 FILE_KEYS: Final = (*BlockKeys.model_fields, "same_samples_along", "record", "name", "seed")
 """Keys of a sweep file that are keywords."""
@@ -240,9 +240,16 @@ def _run_in_folder(
         if missing and executor is None:
             compile_kernels(kinds, store.left, lambda: report(replace(progress, compiling=True)))
             executor, pulse = held.enter_context(pulsing_threads(at_once))
-        crated = partial(write_crate, store.directory, store.manifest, made_by(sorted(on_devices)))
+        machines = [] if pulse is None else [machine_text(sorted(on_devices))]
+        crated = partial(write_crate, store.directory, store.manifest, own_command(), machines)
+
+        def note(machine: str) -> None:
+            if pulse is None and machine not in machines:
+                machines.append(machine)
+                crated()
+
         if missing:
-            crated()
+            crated(is_new=True)
         where = str(store.directory), stamp(store.directory)
         for number in range(1, int(store.manifest.turns.max()) + 2):  # rounds of `until`; else there is one
             if not missing:
@@ -250,7 +257,7 @@ def _run_in_folder(
             progress.walks, progress.round = store.walks, number if planned.has_rounds else None
             tasks = _tasks(planned, missing, at_once if pulse is None else 1)  # threads take turns on a GPU
             submitted = ((executor.submit(run_shards, planned, *where, tuple(task), pulse), task) for task in tasks)
-            _follow(submitted, 2 * at_once, pulse or Pulse(), store, missing, progress, report)
+            _follow(submitted, 2 * at_once, pulse or Pulse(), store, missing, progress, report, note)
             if not (missing := store.missing()):
                 crated(is_over=True)
         counts = counts_text(progress) or "nothing to do"
@@ -301,11 +308,11 @@ def on_device(planned: Sweep, device: str | None) -> Sweep:
     return moved
 
 
-def run_shards(planned: Sweep, directory: str, seal: str, shards: Sequence[Shard], pulse: Pulse | None = None) -> None:
+def run_shards(planned: Sweep, directory: str, seal: str, shards: Sequence[Shard], pulse: Pulse | None = None) -> str:
     """Run the walks of some shards and write each shard as soon as its walks are over; what a worker does.
 
-    The seal is the `stamp` that the folder has to have. The pulse counts the walks that are over, and stops the
-    work: unfinished shards are not written.
+    It returns what names its machine. The seal is the `stamp` that the folder has to have. The pulse counts the walks
+    that are over, and stops the work: unfinished shards are not written.
     """
     check_numerics(directory)  # of a worker with another version of warpchain
     stop = None if pulse is None else pulse.stop
@@ -338,6 +345,7 @@ def run_shards(planned: Sweep, directory: str, seal: str, shards: Sequence[Shard
                 if missing[number] == 0:
                     shard, first = shards[number], firsts[number]
                     write_shard(directory, seal, shard, rows[first : first + len(shard)], motions.pop(number, {}))
+    return machine_text(sorted({setup.options.device for setup in setups}))
 
 
 def _follow(
@@ -348,8 +356,11 @@ def _follow(
     missing: Sequence[Shard],
     progress: SweepProgress,
     report: OnProgress,
+    note: Callable[[str], None],
 ) -> None:
     """Ask for so many tasks at once, so that memory does not grow with the sweep, and count the shards they write.
+
+    `note` is told the machine of each task.
 
     A task whose shards are written is done, whatever becomes of it: Dask fails one that a killed worker had finished.
     """
@@ -358,7 +369,7 @@ def _follow(
     done, beats = progress.done, pulse.over
     folder, left = store.directory / "shards", {shard.name: shard for shard in missing}
     lengths = {name: np.concatenate([block.parameter(name).ravel() for block in blocks]) for name in LENGTHS}
-    pending: dict[Future[None], list[Shard]] = {}
+    pending: dict[Future[str], list[Shard]] = {}
     try:
         while True:
             with losses_named():
@@ -368,8 +379,10 @@ def _follow(
                 finished, _ = wait(pending, 1.0, FIRST_COMPLETED)  # looks for shards every second
                 there = set(os.listdir(folder))
                 for future in finished:
-                    if not there.issuperset(shard.name for shard in pending.pop(future)):
-                        future.result()
+                    has_failed = future.cancelled() or future.exception() is not None
+                    if not (has_failed and there.issuperset(shard.name for shard in pending[future])):
+                        note(future.result())
+                    del pending[future]
             for name in left.keys() & there:
                 shard = left.pop(name)
                 with opened_shard(store.directory, name, shard.digest, store.manifest.numerics_version) as file:

@@ -1,12 +1,12 @@
 """Where and when a sweep was run: ro-crate-metadata.json in its folder, which archives and search engines read.
 
 The file is an RO-Crate 1.1 (https://w3id.org/ro/crate/1.1) in JSON-LD: the folder with its files, warpchain with its
-versions, and an action for each run with its command, its times and its machine. It is outside of what is equal to the
+versions, and an action for each run with its command, its times and its machines. It is outside of what is equal to the
 byte for equal sweeps, like log.txt. What somebody adds to it, such as authors and a licence, stays there.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -33,15 +33,25 @@ def entities(directory: AnyPath) -> dict[str, dict[str, Any]]:
         raise InputError(f"{path}: expected an RO-Crate in JSON; move it out of this folder") from None
 
 
-def runs(directory: AnyPath) -> list[dict[str, Any]]:
-    """The runs of a sweep, each with name (its command), startTime, endTime if it came to its end, and description."""
-    return [each for name, each in entities(directory).items() if name.startswith(_RUN)]
+def runs(directory: AnyPath) -> list[dict[str, str]]:
+    """The runs of a sweep, each with its `command`, `start`, `end` if it came to its end, and `machines`."""
+    named = {"command": "name", "start": "startTime", "end": "endTime", "machines": "description"}
+    own = [each for name, each in entities(directory).items() if name.startswith(_RUN)]
+    return [{name: str(each[key]) for name, key in named.items() if key in each} for each in own]
 
 
-def write_crate(directory: Path, manifest: Manifest, run: Mapping[str, str], *, is_over: bool = False) -> None:
-    """Add a run that begins to a folder's crate, or its end to the last run; who calls holds the folder.
+def write_crate(
+    directory: Path,
+    manifest: Manifest,
+    command: str,
+    machines: Sequence[str],
+    *,
+    is_new: bool = False,
+    is_over: bool = False,
+) -> None:
+    """Add a run that begins to a folder's crate, or machines and end to the last run; who calls holds the folder.
 
-    `run` has the command of the run, and what names its machine. An `OSError` says that the file cannot be written.
+    The machines are those that have computed walks in this run. An `OSError` says that the file cannot be written.
     """
     graph, moment = entities(directory), now()
 
@@ -49,14 +59,14 @@ def write_crate(directory: Path, manifest: Manifest, run: Mapping[str, str], *, 
         graph[entity] = {**graph.get(entity, {}), "@id": entity, "@type": kind, **values}
 
     names = [name for name in graph if name.startswith(_RUN)]
-    if is_over and names:
-        graph[names[-1]]["endTime"] = moment
-    else:
+    if is_new or not names:
         names.append(f"{_RUN}{len(names) + 1}")
-        machine = "; ".join(f"{name}: {value}" for name, value in run.items() if name != "command")
         used: dict[str, Any] = {"instrument": _id("#warpchain"), "object": _id("sweep.yaml")}
         used["result"] = [_id(SWEEP_FILE), _id("shards/")]
-        put(names[-1], "CreateAction", name=run["command"], description=machine, startTime=moment, **used)
+        put(names[-1], "CreateAction", name=command, startTime=moment, **used)
+    graph[names[-1]]["description"] = " | ".join(machines) or "no worker has named its machine yet"
+    if is_over:
+        graph[names[-1]]["endTime"] = moment
     walks = f"{manifest.sweep.walk_count:,} walks of roller chains, simulated by warpchain"
     if manifest.sweep.has_rounds:
         walks = f"at most {walks}"

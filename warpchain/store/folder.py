@@ -86,7 +86,7 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
             manifest = _prepared(path, sweep, Manifest(sweep, shard_size, part), fresh)
             damaged: dict[str, str] = {}
             rows, _ = read_rows(path, manifest, damaged)
-            folder = cls(path, manifest, unlock, *seen(manifest.sweep, rows))
+            folder = cls(path, manifest, unlock, *seen(manifest.sweep, rows)[:2])
             for name, problem in damaged.items():
                 remove_output(path / "shards" / name)
                 folder.log(f"{problem}; deleted, its walks are computed again")
@@ -116,7 +116,8 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         left = [shard for shard in self.manifest.left(self.found, self.asked) if shard.name not in written]
         if left or not self.manifest.sweep.has_rounds:
             return left
-        self.found[:], self.asked[:] = seen(self.manifest.sweep, read_rows(self.directory, self.manifest)[0])
+        rows, _ = read_rows(self.directory, self.manifest)
+        self.found[:], self.asked[:], _ = seen(self.manifest.sweep, rows)
         return self.manifest.left(self.found, self.asked)
 
     @property
@@ -177,10 +178,11 @@ def read_rows(
     return tables, motions
 
 
-def seen(sweep: Sweep, rows: list[Rows]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """`found` and `asked` of a `SweepFolder`, given the rows of each block."""
+def seen(sweep: Sweep, rows: list[Rows]) -> tuple[NDArray[np.bool_], NDArray[np.bool_], list[Asked]]:
+    """`found` and `asked` of a `SweepFolder`, given the rows of each block, and what is asked of each block."""
     found = np.concatenate([table["status"].ravel() for table in rows]) != MISSING
-    return found, np.concatenate([Asked.of(*both).walks.ravel() for both in zip(sweep.blocks, rows, strict=True)])
+    cells = [Asked.of(*both) for both in zip(sweep.blocks, rows, strict=True)]
+    return found, np.concatenate([each.walks.ravel() for each in cells]), cells
 
 
 def _prepared(folder: Path, sweep: Sweep, manifest: Manifest, fresh: bool) -> Manifest:

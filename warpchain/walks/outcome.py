@@ -7,20 +7,22 @@ derive from them.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.chain.setup import Setup
 from warpchain.engine.tallies import CONTACTS, COUNTS, DEPTHS, EXTREMES, IMPULSES, LOSSES, LOST
-from warpchain.engine.world import World
 from warpchain.hdf5_files import Stored
 from warpchain.inputs.arrays import Array
 from warpchain.kernels import layout
 from warpchain.status import Status
 from warpchain.walks.landmarks import RELEASE
 from warpchain.walks.moving_plane import angles
+
+if TYPE_CHECKING:  # results are read without Warp, which takes half a second to import
+    from warpchain.engine.world import World
 
 _SINCE_FLOOR: Final = "time since the last impulse on the floor (NaN if none)"
 _FIXED: Final = "if the plane is fixed"
@@ -180,7 +182,7 @@ _MEMORY: Final = "driven/"
 
 
 def outcomes_of(
-    world: World,
+    world: "World",
     setups: Sequence[Setup],
     statuses: Sequence[Status],
     driven: Sequence[Driven],
@@ -245,7 +247,7 @@ def along_floor(setup: Setup) -> float:
     return math.cos(math.radians(setup.scene.slope))
 
 
-def datums(world: World, setups: Sequence[Setup]) -> Array:
+def datums(world: "World", setups: Sequence[Setup]) -> Array:
     """Energy [J] of chains' masses on the floor below the release, from which potential energies count, (w,)."""
     heights = np.zeros(len(setups))
     for place, setup in enumerate(setups):
@@ -255,7 +257,7 @@ def datums(world: World, setups: Sequence[Setup]) -> Array:
     return weights * heights
 
 
-def _energies(world: World, setups: Sequence[Setup], is_released: NDArray[np.bool_]) -> dict[str, Array]:
+def _energies(world: "World", setups: Sequence[Setup], is_released: NDArray[np.bool_]) -> dict[str, Array]:
     """Where the energy of walks went [J]; NaN before the release. Keys: `ENERGIES`."""
     first, last, below = world.state("first_sample").T, world.state("last_sample").T, datums(world, setups)
     lost = {name: loss for name, loss in zip(LOSSES, world.state("losses").T, strict=True) if name in LOST}
@@ -275,7 +277,7 @@ def _energies(world: World, setups: Sequence[Setup], is_released: NDArray[np.boo
 _FALL: Final = ("lateral_drift", "final_tilt", "final_yaw", "greatest_tilt", "fell_at")
 
 
-def _falls(world: World, tilts: NDArray[np.bool_], is_at_rest: NDArray[np.bool_]) -> dict[str, NDArray[Any]]:
+def _falls(world: "World", tilts: NDArray[np.bool_], is_at_rest: NDArray[np.bool_]) -> dict[str, NDArray[Any]]:
     """What became of planes; `tilts` is false of one that is fixed or was never released."""
     if not tilts.any():
         never = {name: np.full(len(tilts), np.nan) for name in _FALL}
@@ -295,7 +297,7 @@ def _falls(world: World, tilts: NDArray[np.bool_], is_at_rest: NDArray[np.bool_]
 
 
 def _endings(
-    world: World, is_released: NDArray[np.bool_], moment: str, event: str, first: int
+    world: "World", is_released: NDArray[np.bool_], moment: str, event: str, first: int
 ) -> dict[str, NDArray[Any]]:
     """When an event came, after how many bounces begun, and how long after the last impulse on the floor.
 

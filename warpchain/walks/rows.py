@@ -13,7 +13,7 @@ from warpchain.engine.tallies import CONTACTS, LOST
 from warpchain.hdf5_files import stored_fields
 from warpchain.inputs.distributions import DRAWABLE
 from warpchain.inputs.fields import FIELDS
-from warpchain.inputs.validation import field_unit
+from warpchain.inputs.validation import UnknownNameError, field_unit, shown, suggestion
 from warpchain.walks.landmarks import MOST_ENERGY_ERROR, energy_error, faults
 from warpchain.walks.outcome import Outcome
 
@@ -76,6 +76,14 @@ COLUMNS: Final = {
 
 What is missing, or does not exist (the distance of a walk that failed), is NaN among floats and −1 among integers.
 """
+
+
+def checked_quantity(name: object, columns: Iterable[str], path: str) -> str:
+    """Name of one of some columns that means can be of; an `UnknownNameError` if it is none of them."""
+    known = [each for each in columns if each not in ("index", "status")]
+    if name not in known:
+        raise UnknownNameError(f"{path}: {shown(name)} is not a column of numbers; {suggestion(name, known)}")
+    return str(name)
 
 
 def row_type(drawn: Iterable[str]) -> np.dtype[np.void]:

@@ -14,6 +14,7 @@ import numpy as np
 from warpchain.chain.setup import Setup
 from warpchain.hdf5_files import Stored, read_fields, stored_fields, write_fields
 from warpchain.inputs.arrays import Array
+from warpchain.inputs.validation import Named
 from warpchain.loop.stationary_loop import BEFORE_RELEASE, LOOP_FIELDS, BeforeRelease, StationaryLoop, average_loop
 from warpchain.walks.landmarks import FAULTS, LENGTHS, bounces, energy_error, faults, least
 from warpchain.walks.outcome import Outcome
@@ -125,15 +126,15 @@ class WalkNumbers(Outcome):
         return bounces(self.time, self.center_velocity, self.setup)
 
     def unit(self, name: str) -> str:
-        """SI unit of a field; a `KeyError` if there is none of that name."""
+        """SI unit of a field; an `UnknownNameError` if there is none of that name."""
         return STORED[name].unit
 
     def meaning(self, name: str) -> str:
-        """One line saying what a field is; a `KeyError` if there is none of that name."""
+        """One line saying what a field is; an `UnknownNameError` if there is none of that name."""
         return STORED[name].described
 
 
-STORED: Final = stored_fields(WalkNumbers)
+STORED: Final = Named(stored_fields(WalkNumbers))
 """Fields of `WalkNumbers` that a file keeps: name → unit, meaning, shape."""
 NUMBERS: Final = {name: stored for name, stored in STORED.items() if not stored.shape}
 """Those that are numbers, or dictionaries of them."""

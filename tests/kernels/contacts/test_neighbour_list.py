@@ -176,7 +176,7 @@ def test_depth_of_self_contacts_is_bounded_by_the_contact_step(lean):
     position, velocity = flattening_hexagon(lean, rate)
     assert contact_equations.touching_pairs(position, limber) == []
     position[:, 1] += 0.5
-    run = {"gravity": False, "tolerance": 1e-3, "method": "rkf78", "contact_step": 2e-5}
+    run = {"gravity": False, "tolerance": 1e-3, "method": "rkf78", "precision": "double", "contact_step": 2e-5}
     trajectory = warpchain.simulate(limber, position, velocity, 0.42 / rate, times=[0.0], **run)
     assert trajectory.status == Status.FINISHED
     assert trajectory.impulses["self"] > 0

@@ -54,8 +54,8 @@ def run(batch, tilts):
 
 
 def fall(start, parameters=SOFT, tolerance=1e-4):
-    """Lets a chain fall by dp5."""
-    options = Options(method="dp5", tolerance=tolerance)
+    """Lets a chain fall by os32 in mixed precision, at small tolerances by dp5 in double precision."""
+    options = Options(method="os32" if tolerance >= 1e-6 else "dp5", tolerance=tolerance)
     batch = tilting_batch(
         [start], [parameters], options, LIMIT, stop_status=Status.TIME_LIMIT, keep=Keep(series_every=1)
     )

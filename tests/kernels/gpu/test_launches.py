@@ -23,13 +23,15 @@ from warpchain.kernels.gpu.loop import make_advance_block
 from warpchain.kernels.types import State
 from warpchain.status import Status
 
-LINKS = 24
+LINKS, BLOCK = 24, 32
+
+pytestmark = pytest.mark.usefixtures("without_fused_operations")  # whose kernels other tests share
 
 
 def piles() -> Batch:
     """Two heaps on the floor whose joints soften half-way; the first has longer links than the second."""
     chains = [heap(LINKS, seed, tilt=2.0) for seed in (5, 9)]
-    batch = batch_of(chains, method="dp5", fixed_step=False, keeps=True, stop_time=100 * FIXED_STEP)
+    batch = batch_of(chains, method="os32", fixed_step=False, keeps=True, stop_time=100 * FIXED_STEP)
     batch.control.contact_step = FIXED_STEP
     batch.control.sample_interval = 5 * FIXED_STEP
     batch.control.skin = 1e-4
@@ -53,9 +55,9 @@ def everything(batch: Batch, world: int) -> dict[str, NDArray[np.generic]]:
 def run(factory: Callable[[Features, int], wp.Kernel], attempts: int) -> list[dict[str, NDArray[np.generic]]]:
     """Both piles to their end, in launches of so many attempts."""
     batch = piles()
-    kernel = factory(batch.features(fixed_body="floor"), LINKS)
+    kernel = factory(batch.features(fixed_body="floor"), BLOCK)
     while batch.worlds[0].status == Status.RUNNING or batch.worlds[1].status == Status.RUNNING:
-        launch_kernel(batch, kernel, [0, 1], attempts, block_dim=LINKS)
+        launch_kernel(batch, kernel, [0, 1], attempts, block_dim=BLOCK)
     return [everything(batch, world) for world in (0, 1)]
 
 
@@ -78,7 +80,7 @@ def test_cuts_change_no_number() -> None:
     for attempts in (1, 7):
         assert_same(run(make_advance_block, attempts), whole)
     alone = piles()
-    launch_kernel(alone, make_advance_block(alone.features(fixed_body="floor"), LINKS), [1], 10**6, block_dim=LINKS)
+    launch_kernel(alone, make_advance_block(alone.features(fixed_body="floor"), BLOCK), [1], 10**6, block_dim=BLOCK)
     assert_same([everything(alone, 1)], whole[1:])
 
 
@@ -96,6 +98,7 @@ def reversed_factory(tmp_path: Path) -> Iterator[Callable[[Features, int], wp.Ke
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     spec.loader.exec_module(module)
+    module.COMPILER_FLAGS = loop.COMPILER_FLAGS
     yield module.make_advance_block
     del sys.modules[name]
 

@@ -19,7 +19,7 @@ from warpchain.engine.batch import Batch
 from warpchain.kernels import layout
 from warpchain.status import Status
 
-LINKS = 12
+LINKS, BLOCK = 12, 32
 
 
 pytestmark = pytest.mark.usefixtures("without_fused_operations")
@@ -36,7 +36,7 @@ def soften_much(batch: Batch) -> Batch:
 
 def heaps(area: float) -> Batch:
     """Heaps on the floor that soften below a fraction of their first area, in fixed steps with frequent samples."""
-    batch = batch_of([heap(LINKS, 5, tilt=2.0), heap(LINKS, 10, tilt=2.0)], method="dp5", keeps=True)
+    batch = batch_of([heap(LINKS, 5, tilt=2.0), heap(LINKS, 10, tilt=2.0)], method="os32", keeps=True)
     batch.control.sample_interval = 5 * FIXED_STEP
     batch.control.soften_area = area
     return soften_much(batch)
@@ -44,7 +44,7 @@ def heaps(area: float) -> Batch:
 
 def released() -> Batch:
     """A ring above the floor, just released with soft joints."""
-    batch = batch_of([lay_chain(ellipse(1.0), LINKS, SOFT.link_length, 2.0)], method="dp5", keeps=True)
+    batch = batch_of([lay_chain(ellipse(1.0), LINKS, SOFT.link_length, 2.0)], method="os32", keeps=True)
     batch.control.sample_interval = 4 * FIXED_STEP
     batch.control.stiffening_time = 40 * FIXED_STEP
     batch.control.soften_area = -np.inf
@@ -82,7 +82,7 @@ def assert_same_samples(ours: Batch, theirs: Batch) -> None:
         assert_close(ours.worlds[world].drain().samples, theirs.worlds[world].drain().samples, NEARLY)
 
 
-def launch_both(ours: Batch, theirs: Batch, fixed_body: str, launches: int, block_dim: int = LINKS) -> None:
+def launch_both(ours: Batch, theirs: Batch, fixed_body: str, launches: int, block_dim: int = BLOCK) -> None:
     """Make seven attempts a launch in the GPU kernel, and as many all at once in the CPU kernel."""
     features = ours.features(fixed_body=fixed_body)
     for _ in range(launches):
@@ -118,7 +118,7 @@ def test_a_gpu_kernel_stiffens_as_a_cpu_kernel_does() -> None:
 def test_a_gpu_kernel_drives_under_load_as_a_cpu_kernel_does(load_factor: float) -> None:
     """In the GPU kernel loads and softness change in the same steps of the drive, however cut: on, falling, off."""
     ours, theirs = driven(load_factor), driven(load_factor)
-    launch_both(ours, theirs, "sprocket", 12, block_dim=5 * LINKS)
+    launch_both(ours, theirs, "sprocket", 12, block_dim=2 * BLOCK)
     assert theirs.worlds[0].counts["sprocket"] > 10
     load, softness = theirs.state.load_factor.numpy()[0], theirs.state.softness.numpy()[0]
     if load_factor > 1:

@@ -23,8 +23,8 @@ pytestmark = pytest.mark.usefixtures("without_fused_operations")
 
 def falling_batch(fixed_step: float | None = None) -> Batch:
     """Two circulating loops in planes that lean and turn, which have sunk into the floor a little."""
-    tolerance, precision = (1e-5, "mixed") if fixed_step is None else (0.1, "double")
-    options = Options(method="os32", tolerance=tolerance, precision=precision)
+    tolerance = 1e-5 if fixed_step is None else 0.1
+    options = Options(method="os32", tolerance=tolerance, precision="double")
     batch = Batch(2, max(LINKS), options, keep=Keep(series_every=1, frame_every=1), tilts=True)
     batch.control.launch_time = 1e9
     if fixed_step is not None:

@@ -109,7 +109,9 @@ HEUN_EULER = Tableau(
 )
 
 
-@pytest.fixture(params=[CASH_KARP, HEUN_EULER], ids=lambda tableau: tableau.name)
+@pytest.fixture(
+    params=[pytest.param(CASH_KARP, marks=pytest.mark.thorough), HEUN_EULER], ids=lambda tableau: tableau.name
+)
 def new_method(request: pytest.FixtureRequest) -> Iterator[str]:
     """Name of a method that is registered for one test."""
     register(request.param)
