@@ -36,16 +36,14 @@ class Step:
     name: str
     arguments: tuple[str, ...]
     walks: int = 0
-    like: str = ""  # Another sweep whose walks take as long, if its own were never measured
 
     def expected(self, times: pandas.DataFrame) -> tuple[float, str]:
         """Time on one device [s], and what was measured; NaN if nothing was."""
-        if (name := self.like or self.name) not in times.index:
+        if self.name not in times.index:
             return math.nan, "not measured"
-        known = times.loc[name]
+        known = times.loc[self.name]
         share = self.walks / known.walks if self.walks else 1.0
-        basis = f"{'as ' + self.like if self.like else 'measured'}, {known.device}, numerics {known.numerics}"
-        return float(known.seconds * known.devices * share), basis
+        return float(known.seconds * known.devices * share), f"{known.device}, numerics {known.numerics}"
 
 
 def steps(only: list[str]) -> Iterator[Step]:
@@ -59,7 +57,7 @@ def steps(only: list[str]) -> Iterator[Step]:
             file = given.get("file", f"studies/{study}/sweeps/{name}.yaml")
             words = ["warpchain", "sweep", file, "-o", f"{{folders}}/{name}", "--device", given.get("on", "{device}")]
             words += [text for key in ("seed", "samples") if key in given for text in (f"--{key}", str(given[key]))]
-            yield Step(study=study, name=name, arguments=tuple(words), walks=given["walks"], like=given.get("like", ""))
+            yield Step(study=study, name=name, arguments=tuple(words), walks=given["walks"])
         for command in content[study]["commands"]:
             words = [f"{{folders}}/{word}" if word in sweeps else word for word in command.split()]
             name = " ".join(word for word in command.split()[:2] if "{" not in word)
@@ -79,7 +77,7 @@ def listed(chosen: list[Step], times: pandas.DataFrame) -> str:
         if is_known := not math.isnan(seconds):
             total["CPU core" if "CPU" in basis else "GPU"] += seconds
         rows.append((step.study, step.name, f"{step.walks:,}", f"{seconds:.0f}" if is_known else "-", basis))
-    text = table("study | step | walks | expected / s | basis", rows)
+    text = table("study | step | walks | expected / s | measured", rows)
     times_of = " and ".join(f"{each / 60:.0f} min of one {kind}" for kind, each in total.items() if each)
     return f"{text}\n\n{sum(step.walks for step in chosen):,} walks, {times_of}; what was not measured is not in it"
 

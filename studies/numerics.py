@@ -78,11 +78,8 @@ def of_file(path: Path) -> set[int]:
 
 
 def of_study(study: str) -> set[int]:
-    """Versions that the numbers on a study's page were computed with: its files' and those of what has no file yet."""
-    folder = TABLE.parent / study / "results"
-    written = yaml.safe_load(TABLE.read_text(encoding="utf-8"))[study].get("written", {})
-    known = {version for path in sorted(folder.glob("*")) for version in of_file(path)}
-    return known.union(version for name, version in written.items() if not (folder / name).exists())
+    """Versions that the numbers on a study's page were computed with: those of its files."""
+    return {version for path in sorted((TABLE.parent / study / "results").glob("*")) for version in of_file(path)}
 
 
 def line(study: str) -> str:

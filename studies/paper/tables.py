@@ -191,7 +191,7 @@ def walks(numbers: Numbers) -> str:
     inaccurate = sum(content["inaccurate"] for content in numbers.values())
     *earlier, last = (str(each) for each in sorted({content["numerics_version"] for content in numbers.values()}))
     numerics = f"{', '.join(earlier)} and {last}" if earlier else last
-    return f"{', '.join(parts)}; {inaccurate} with an energy error above 5 %; versions {numerics} of the numerics"
+    return f"{', '.join(parts)}; {inaccurate} with an energy error above 5 %; numerics {numerics}"
 
 
 def left_open(numbers: Numbers) -> str:

@@ -1,7 +1,7 @@
 """Makes the numbers, figures and tables of README.md from the files in results/, in one to two minutes.
 
-Parts of the sweep `phase_diagram` that are given, of `strands` as --meetings or the sweep `scaling`, are reduced to
-these first. Parts have other seeds; they may be unfinished, and their grids may differ.
+Parts of the sweep `phase_diagram` that are given, or the sweep `scaling`, are reduced to these first. Parts have other
+seeds; they may be unfinished, and their grids may differ.
 """
 
 from pathlib import Path
@@ -64,19 +64,16 @@ def table_of_failures(cells: Columns) -> str:
 def make(
     parts: Annotated[list[str] | None, typer.Argument()] = None,
     scaling: str | None = None,
-    meetings: list[str] | None = None,
 ) -> None:
     """Reduce the sweeps that are given into the committed files; then draw and write all that is in them."""
     if parts:
         results = [warpchain.load(path) for path in parts]
         walks = cells.walks_by_cell(results)
         write_rows(cells.CSV, (cells.reduced(*cell, columns) for cell, columns in walks.items()), *results)
+        write_rows(strands.CSV, strands.reduced(results), *results)
     if scaling is not None:
         result = warpchain.load(scaling)
         write_rows(scales.CSV, scales.reduced(result), result)
-    if meetings:
-        results = [warpchain.load(path) for path in meetings]
-        write_rows(strands.CSV, strands.reduced(results), *results)
     found, met, varied = read_columns(cells.CSV), read_columns(strands.CSV), scales.Cells()
     points = laws.points_of(found)
     ranges = candidates.ranges(found)

@@ -1,4 +1,4 @@
-"""When strands of the loop meet, from parts of the sweep ``strands``: results/strands.csv and its tables.
+"""When strands of the loop meet, from parts of the sweep ``phase_diagram``: results/strands.csv and its tables.
 
 Walks of one cell are compared: those whose strands met by their second bounce, and the others, as they are and with
 what is drawn held: Δx as a linear function of it, of sine and cosine of the phase, and of the early meeting.
