@@ -56,6 +56,13 @@ def test_a_method_by_need_is_that_of_the_device(options: dict[str, Any], expecte
     assert again.walk(0).setup.options == there
 
 
+def test_a_sweep_goes_on_on_any_gpu() -> None:
+    """A folder begun on one GPU is that of the same sweep on another; the CPU makes other numbers."""
+    planned = load_sweep(content(options={"method": "explicit"}))
+    one, other, cpu = (on_device(planned, device).digest() for device in ("cuda", "cuda:3", "cpu"))
+    assert one == other != cpu
+
+
 def test_a_device_is_refused_beside_devices_on_an_axis() -> None:
     """One of them would be passed over."""
     planned = load_sweep(content(grid={"device": ["cuda:0", "cuda:1"]}, options={}))

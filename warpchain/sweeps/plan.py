@@ -260,6 +260,8 @@ class Sweep:
                     block.pop(key, None)
             usual = {name: field.default for model in (Scene, Options) for name, field in model.model_fields.items()}
             usual |= vars(PRESETS[block["preset"]]) if "preset" in block else {}
+            if str(block["options"].get("device")).startswith("cuda"):  # any GPU may go on with what another began
+                block["options"] = block["options"] | {"device": "cuda"}
             for section in SECTIONS:
                 block[section] = {n: value for n, value in block[section].items() if value != usual.get(n, ...)}
         text = json.dumps(content, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
