@@ -47,7 +47,7 @@ def check_units(values: Mapping[str, Any], path: str) -> None:
             continue
         for value in np.atleast_1d(np.asarray(given, float)).tolist():
             ratio = value / usual
-            if ratio > _FACTOR or (0 < ratio < 1 / _FACTOR and name != "gravity"):
+            if ratio > _FACTOR or (0 < value and ratio < 1 / _FACTOR and name != "gravity"):
                 question = _question(value, usual, unit)
                 problem = f"{short(value)} {unit} is {short(ratio, 3)} times Table 1's"
                 raise InputError(f"{path}.{name}: {problem}; {question} set options.unusual_values: true to insist")
@@ -55,7 +55,7 @@ def check_units(values: Mapping[str, Any], path: str) -> None:
 
 def _question(value: float, usual: float, unit: str) -> str:
     """What is probably meant, in SI."""
-    far = {name: abs(math.log(value * factor / usual)) for name, factor in _UNITS[unit].items()}
+    far = {name: abs(math.log(value) + math.log(factor / usual)) for name, factor in _UNITS[unit].items()}
     name = min(far, key=lambda each: far[each])
     if far[name] > math.log(_NEAR):
         return f"use {unit}, or"
