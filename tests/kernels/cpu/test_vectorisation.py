@@ -59,7 +59,7 @@ def remarks_by_function(
     [
         pytest.param("dp5", "sprocket", False, "double", marks=pytest.mark.thorough),
         ("hybrid", "floor", False, "mixed"),
-        ("dp5", "floor", True, "mixed"),
+        pytest.param("dp5", "floor", True, "mixed", marks=pytest.mark.thorough),
     ],
 )
 def test_hot_loops_are_vectorised(tmp_path: Path, method: str, fixed_body: str, tilts: bool, precision: str) -> None:
