@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import warp as wp
@@ -118,7 +118,7 @@ class Batch:
             setattr(getattr(self, group), name, array)
         self._host["state/status"][:] = int(Status.FINISHED)
 
-        self.control: Any = self.state.control
+        self.control = cast(Any, self.state.control)
         self.control.assign(control_of(options))
         self.control.launch_time = LAUNCH_SECONDS
         self.control.frame_every = keep.frame_every or 1
