@@ -10,6 +10,7 @@ import json
 import secrets
 import select
 import socket
+import sys
 import threading
 from contextlib import suppress
 from functools import cached_property
@@ -103,6 +104,11 @@ class LiveServer(ThreadingHTTPServer):
             super().process_request_thread(request, client_address)
         finally:
             self._connections.release()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Print what went wrong, unless the client has left before its answer."""
+        if not isinstance(sys.exception(), ConnectionError):
+            super().handle_error(request, client_address)
 
 
 class _Handler(BaseHTTPRequestHandler):
