@@ -40,7 +40,7 @@ def refusal(call: Callable[[], object]) -> str:
     begun = time.process_time()
     with pytest.raises(InputError) as caught:
         call()
-    assert time.process_time() - begun < 5
+    assert time.process_time() - begun < 10  # hanging would be minutes; a busy machine takes 2 to 6 s for the slowest
     for line in caught.value.args:
         assert line.isprintable() and 0 < len(line) <= LONGEST_LINE
     return str(caught.value)
