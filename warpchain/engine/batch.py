@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -118,8 +118,8 @@ class Batch:
             setattr(getattr(self, group), name, array)
         self._host["state/status"][:] = int(Status.FINISHED)
 
-        self.control = cast(Any, self.state.control)
-        self.control.assign(control_of(options))
+        self.control = self.state.control
+        self.control.assign(control_of(options))  # type: ignore[attr-defined, unused-ignore] # Warp adds it
         self.control.launch_time = LAUNCH_SECONDS
         self.control.frame_every = keep.frame_every or 1
         self.control.frame_interval = keep.frame_interval
