@@ -21,7 +21,7 @@ State = tuple[Array, Array]
 METHODS = method_names()
 every_method = pytest.mark.parametrize("method", METHODS)
 PRECISION = {method: "mixed" if method == "hybrid" else "double" for method in METHODS}
-"""In which each method is tried, `os32` in both; a kernel for another precision takes long to compile."""
+"""Precision in which tests try each method; another one needs a kernel of its own, which takes long to compile."""
 every_precision = pytest.mark.parametrize(
     ("method", "precision"),
     [
