@@ -23,7 +23,7 @@ from warpchain.chain.start_shapes import ellipse, lay_chain
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import LEAST_MIXED, Options
 from warpchain.inputs.parameters import preset
-from warpchain.pictures.style import LEGEND, LINE_COLORS, MARKERS, save_figure, tidy
+from warpchain.pictures.style import FAINT, LEGEND, LINE_COLORS, MARKERS, tidy
 from warpchain.status import Status
 
 ROOT = Path(__file__).parents[2]
@@ -32,6 +32,8 @@ FIGURE = ROOT / "docs" / "figures" / "error_cost.png"
 LINKS, DURATION, LONGER, ROUNDS, PARAMETERS = 60, 1e-3, 10, 5, preset("paper")
 METHODS, PRECISIONS = ("os32", "dp5", "bs32"), ("mixed", "double")
 TOLERANCES = (1e-2, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
+COSTS = (0.3, 0.5, 1, 2, 4)
+"""Ticks of the figure."""
 
 
 def flights() -> list[dict[str, Any]]:
@@ -81,8 +83,11 @@ def draw() -> Figure:
         )
         refused = curve.tolerance < LEAST_MIXED
         if is_mixed:
-            axes.plot(cost[refused], curve.position_error[refused], "", **look, linestyle="", markerfacecolor="white")
+            axes.plot(cost[refused], curve.position_error[refused], **look, linestyle="", markerfacecolor="white")
+    axes.plot([], [], "o", color=FAINT, markersize=5, markerfacecolor="white", label="mixed, refused")
     axes.set(xscale="log", yscale="log", xlabel="cost / processor seconds per simulated second")
+    axes.set_xticks(COSTS, [f"{cost:g}" for cost in COSTS])
+    axes.set_xticks([], minor=True)
     axes.set_ylabel("largest error of a position / m")
     axes.legend(**LEGEND)
     tidy(axes, grid="both")
@@ -91,4 +96,4 @@ def draw() -> Figure:
 
 if __name__ == "__main__":
     write_rows(RESULTS, flights())
-    save_figure(draw(), FIGURE)
+    draw().savefig(FIGURE, dpi=150)
