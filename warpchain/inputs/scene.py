@@ -42,7 +42,7 @@ class Scene(Section):
     """number of links of the closed chain; must be even if inner and outer links alternate"""
     frequency: float = number_field(15.0, "Hz", symbol="ν", ge=0, le=300.0)  # more is in turns a minute
     """frequency of the sprocket at the release, in revolutions per second"""
-    start: StartWord = Field("rest", description=f"how a walk begins; {DESCRIBED}")
+    start: StartWord = Field(default="rest", description=f"how a walk begins; {DESCRIBED}")
     phase: float = number_field(0.0, "1", ge=0, lt=1)
     """moment of the release, as a fraction of a loop period"""
     clearance: float = number_field(0.01, "m", ge=0, le=HIGHEST)
