@@ -16,7 +16,6 @@ class ListLayout:
     """Where a chain's neighbour list lies in one row of int32."""
 
     capacity: int  # greatest number of pairs; more is an overflow, which ends the walk with a status
-    table: int  # number of hash buckets, a power of two
     count: int  # offset of the number of pairs (one integer). All below are offsets, too
     nearest: int  # least distance of two joints that are not listed [m], bits of a single-precision number
     first: int  # lower joint of each pair; on a CPU in the order of contact resolution
@@ -24,10 +23,7 @@ class ListLayout:
     touching: int  # GPU scratch: pairs that touch now, beyond those in shared memory
     found_first: int  # CPU scratch: lower joints as found, ordered by (p, q); then those of the pairs that touch now
     found_second: int  # CPU scratch: higher joints, likewise
-    bucket: int  # CPU scratch: last joint put into each bucket, −1 for none
-    next_joint: int  # CPU scratch: the joint put into the same bucket before this one
-    cell_x: int  # CPU scratch: cell of each joint
-    cell_y: int  # CPU scratch: cell of each joint
+    group: int  # CPU scratch: first joints of groups of eight that are near another one
     owners: int  # GPU scratch of chains too long for shared memory, see :mod:`gpu.contacts.self_contacts`
     geometry: int  # CPU scratch for contacts: doubles, on whole cache lines
     size: int  # integers in all
@@ -42,23 +38,17 @@ class ListLayout:
 def list_layout(columns: int) -> ListLayout:
     """Layout for chains in scratch of this width."""
     capacity = layout.PAIRS_PER_LINK * columns
-    table = 1
-    while table < 2 * columns:
-        table *= 2
     integers = layout.consecutive_offsets(
         count=1,
         nearest=1,
-        first=capacity,
-        second=capacity,
+        first=capacity + 1,
+        second=capacity + 1,
         touching=capacity + 1,
         found_first=capacity,
         found_second=capacity,
-        bucket=table,
-        next_joint=columns,
-        cell_x=columns,
-        cell_y=columns,
+        group=columns // 8 + 1,
         owners=3 * columns + 8,
     )
     geometry = -(-integers["size"] // 16) * 16
     size = geometry + 2 * GEOMETRY_ROWS * GEOMETRY_COLUMNS
-    return ListLayout(capacity, table, **integers | {"geometry": geometry, "size": size})
+    return ListLayout(capacity, **integers | {"geometry": geometry, "size": size})
