@@ -44,7 +44,7 @@ GROUP = wp.constant(wp.float64(8.0))
                 const ::wp::float64 dx = x[q] - x[p], dy = y[q] - y[p], square = dx * dx + dy * dy;
                 const bool counts = (q - p >= apart) & (q - p <= n - apart) & (q < n);
                 near |= (counts & (square < reach)) << lane;
-                const ::wp::float64 other = counts & (square >= reach) ? square : furthest;
+                const ::wp::float64 other = (counts & (square >= reach)) ? square : furthest;
                 nearest[lane] = other < nearest[lane] ? other : nearest[lane];
             }
             for (; near; near &= near - 1, ++total)
