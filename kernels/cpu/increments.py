@@ -244,8 +244,9 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
                 fallen = real(0.5) * stage.even * stage.even
                 S[at.WAY, i] = S[at.WAY, i] + fallen * plane.fall_x
                 S[at.WAY + 1, i] = S[at.WAY + 1, i] + fallen * plane.fall_y
-            S[at.CHANGE, i] = stage.h * sums[0]
-            S[at.CHANGE + 1, i] = stage.h * sums[1]
+            if wp.static(of_script is not None):
+                S[at.CHANGE, i] = stage.h * sums[0]
+                S[at.CHANGE + 1, i] = stage.h * sums[1]
 
     @wp.func
     def close_loop(S: Numbers, n: int, has_power: bool):
