@@ -1,8 +1,8 @@
 """The neighbour list of a chain: its reach, how long it lasts, distances of joints, and the hash of grid cells.
 
 The list holds all pairs of joints closer than its reach, 2r + skin + 2|C|, but for those that a link keeps apart. It
-lasts until the nearest pair that it lacks may touch, see :func:`slack_of`. While a chain is far from itself, the cells
-of the grid are wider than the reach: then the nearest pair is known to be far, and lists last long.
+lasts until the nearest pair that it lacks may touch, see :func:`slack_of`. While a chain is far from itself, pairs are
+sought farther than the reach: then the nearest pair is known to be far, and lists last long.
 """
 
 import warp as wp
@@ -30,7 +30,10 @@ def listing_reach(chain: Chain, skin: wp.float64, opening: wp.float64):
 
 @wp.func
 def cell_width(chain: Chain, reach: wp.float64, is_far: bool):
-    """Width [m] of cells: the reach or, while a chain is far from itself, two links: next joints but one are closer."""
+    """How far pairs are sought [m], on a GPU the width of cells.
+
+    It is the reach or, while a chain is far from itself, two links: next joints but one are closer.
+    """
     return wp.where(is_far, wp.max(reach, TWO * TWO * chain.half_length), reach)
 
 

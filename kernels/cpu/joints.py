@@ -16,8 +16,9 @@ from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.types import Chain, Rows, Worlds
 
 NOTHING_KNOWN, STAGE_KNOWN, ROUNDED = 0, 1, 2
-"""Of the start of a step, in ``Worlds.has_first_stage``: the first stage is the last one before; it is also in its place,
-and the state is rounded."""
+"""Of the start of a step, in ``Worlds.has_first_stage``: the first stage is the last one of the step before; or it
+is in place, and the state is rounded.
+"""
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from warpchain.kernels.physics.geometry import put, two, whole_lanes
 from warpchain.kernels.types import Chain, Integers, Rows
 
 GROUP = wp.constant(wp.float64(8.0))
-"""Joints that are compared at a time, and so the most by which one of them is from the middle of each of two groups."""
+"""Joints in a group. So many links at most are between the middles of two groups, beyond those between two joints."""
 
 
 @wp.func_native("""

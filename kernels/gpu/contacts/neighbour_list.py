@@ -1,6 +1,8 @@
-"""The neighbour list on a GPU: the grid of :mod:`cpu.contacts.neighbour_list`, built in parallel, one thread a joint.
+"""The neighbour list on a GPU: pairs are sought in a uniform grid, which is built in parallel, one thread a joint.
 
-It holds the same pairs as on a CPU, in any order: keys order the contacts, see :mod:`gpu.contacts.self_contacts`.
+Cells of the grid are hashed into a table, so that the grid needs no bounds, and memory does not depend on the chain's
+extent. The list holds the same pairs as on a CPU, in any order: keys order the contacts, see
+:mod:`gpu.contacts.self_contacts`.
 """
 
 import functools
