@@ -229,8 +229,8 @@ def test_a_state_keeps_its_floor_in_simulate() -> None:
     """Unless another is given, the floor is that of the state's scene: a chain lies on its slope, not on y = 0."""
     state = warpchain.walk(**ELLIPSE | {"method": "os32", "tolerance": 1e-5}, slope=10.0).state(0.3)
     on_slope, in_the_air = (
-        warpchain.simulate(state, duration=0.4, method=method, floor=floor)
-        for method, floor in (("os32", None), ("dp5", False))
+        warpchain.simulate(state, duration=0.4, **given)
+        for given in ({"method": "os32", "tolerance": 1e-5}, {"method": "dp5", "floor": False})
     )
     assert on_slope.impulses["floor"] > 0 == in_the_air.impulses["floor"]
     x, y = on_slope.position[-1, :, :2].T

@@ -51,8 +51,8 @@ pytestmark = pytest.mark.usefixtures("without_fused_operations")
 @pytest.mark.parametrize(
     ("method", "fixed_body", "self_contact", "block_dim", "precision"),
     [
-        pytest.param("bs32", "floor", False, BLOCK, "double", marks=pytest.mark.thorough),
-        ("rkf78", "floor", False, BLOCK, "double"),
+        ("bs32", "floor", False, BLOCK, "double"),
+        pytest.param("rkf78", "floor", False, BLOCK, "double", marks=pytest.mark.thorough),
         ("os32", "sprocket", True, 2 * BLOCK, "double"),
         ("os32", "terrain", False, BLOCK, "mixed"),
         pytest.param("os32", "sprocket", True, 5 * LINKS, "mixed", marks=pytest.mark.thorough),
@@ -61,7 +61,8 @@ pytestmark = pytest.mark.usefixtures("without_fused_operations")
 def test_fixed_steps_equal_a_cpu_kernel(
     method: str, fixed_body: str, self_contact: bool, block_dim: int, precision: str
 ) -> None:
-    """Forty steps with dozens of impulses of every kind end in the same state, after the same impulses."""
+    """Steps with dozens of impulses of every kind end in the same state, after the same impulses."""
+    steps = 40 if block_dim == BLOCK else 20  # fibers of a larger block take longer
     raised = 0.9 * SOFT.sprocket_radius if fixed_body == "sprocket" else 0.0
     chains = [heap(LINKS, 3, raised=raised), heap(min(40, block_dim), 18, tilt=np.pi, raised=raised)]
     ours, theirs = (batch_of(chains, method=method, self_contact=self_contact, precision=precision) for _ in range(2))
@@ -69,10 +70,10 @@ def test_fixed_steps_equal_a_cpu_kernel(
         for world in range(2):
             batch.worlds[world].set_floor(floor_with(HILLS, SOFT))
     features = ours.features(fixed_body=fixed_body)
-    launch_blocks(ours, features, 40, block_dim=block_dim)
-    launch_chains(theirs, features, 40)
+    launch_blocks(ours, features, steps, block_dim=block_dim)
+    launch_chains(theirs, features, steps)
     for counts in (world.counts for world in theirs.worlds):
-        assert counts["accepted"] == 40
+        assert counts["accepted"] == steps
         assert counts["sprocket" if fixed_body == "sprocket" else "floor"] > 10
         assert (counts["self"] > 10) == self_contact
     assert (theirs.worlds[1].counts["strands"] > 0) == self_contact
@@ -115,7 +116,7 @@ def test_free_flight_equals_a_cpu_kernel() -> None:
     position[:, 1] += FAR
     velocity[:, 2] += np.random.default_rng(1).normal(size=LINKS)
     ours, theirs = (
-        batch_of([(position, velocity)], method="rkf78", self_contact=False, fixed_step=False) for _ in range(2)
+        batch_of([(position, velocity)], method="bs32", self_contact=False, fixed_step=False) for _ in range(2)
     )
     features = ours.features(fixed_body="floor")
     launch_blocks(ours, features, 60, block_dim=BLOCK)
