@@ -1,5 +1,6 @@
 """Every command and every example of README, docs/ and studies/ does what a reader would have it do."""
 
+import functools
 import os
 import re
 import shlex
@@ -107,6 +108,12 @@ def reduced(sweep: Any) -> Any:
     return small
 
 
+@functools.cache
+def command_line() -> Any:
+    """The command `warpchain` with all of its commands, as it parses words."""
+    return typer.main.get_command(app)
+
+
 def test_no_block_is_left_out_silently() -> None:
     """Each block is Python or shell that is run, a file that is shown, or is marked with a reason."""
     reasons: Counter[str] = Counter()
@@ -127,7 +134,7 @@ def test_commands_are_those_of_the_command_line(page: Path) -> None:
     parts = [part.strip() for text in [*lines, *inline_code(page)] for part in re.split(r"&&|#", text)]
     for part in parts:
         words = shlex.split(part) if part.removeprefix(".venv/bin/").startswith("warpchain ") else []
-        command: Any = typer.main.get_command(app)
+        command: Any = command_line()
         words = words[1:]
         while words and words[0] in getattr(command, "commands", {}):
             command = command.commands[words.pop(0)]

@@ -51,8 +51,8 @@ def features_of(batch: Batch) -> Features:
 def test_a_gpu_kernel_tilts_as_a_cpu_kernel_does() -> None:
     """Through first impulses both find the same links and planes, but for the order in which sums are added up."""
     one, other = (falling_batch(FIXED_STEP) for _ in range(2))
-    launch_chains(one, features_of(one), 30)
-    launch_blocks(other, features_of(other), 30, block_dim=64)
+    launch_chains(one, features_of(one), 60)
+    launch_blocks(other, features_of(other), 60, block_dim=64)
     for world in range(2):
         assert one.worlds[world].counts == other.worlds[world].counts
         assert one.worlds[world].counts["floor"] > 0
