@@ -15,6 +15,7 @@ NOTEBOOKS = [*sorted((ROOT / "docs/notebooks").glob("*.ipynb")), *sorted((ROOT /
 SHORTER = {
     "samples=3,": "samples=1,",
     "np.arange(20, 61, 20)": "np.arange(20, 41, 20)",
+    "[0.1, 0.2, 0.4, 0.8]": "[0.1, 0.4]",
     "samples=64,": "samples=40,",
 }
 """What a notebook does for long, and what is run instead: fewer walks."""
