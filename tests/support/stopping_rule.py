@@ -5,11 +5,9 @@ known mean of 1 and a known standard deviation.
 """
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas
 from scipy.stats import t as student
 
 from tests.support.sweep_content import content
@@ -69,27 +67,6 @@ def main() -> None:
                 ratio = np.sqrt(((cells.mean - 1) ** 2).mean()) / until
                 row = name, until, sampler, f"{walks:.0f}", f"{coverage(cells):.3f}", f"{bias:+.3f}", f"{ratio:.2f}"
                 print(*row, f"{found.reached.mean():.3f}", sep=" | ")
-    spreads = montecarlo_spreads()
-    for until in (0.005, 0.01):
-        for samples in (8, 16):
-            found = [stopped(gaussian(sd), until, seeds=20, samples=samples, at_most=4096)[1] for sd in spreads]
-            walks = np.mean([each.walks.sum(axis=1).mean() for each in found])
-            print(f"montecarlo, until {until}, from {samples}: {walks:.0f} walks a cell, {walks / 1800:.3f} of 1800")
-
-
-def montecarlo_spreads() -> list[float]:
-    """Relative standard deviation of Δx in each cell of the sweep `montecarlo`.
-
-    They are those of the study of the phase diagram, with 1254 walks a cell, linear between its frequencies.
-    """
-    table = pandas.read_csv(Path(__file__).parents[2] / "studies/phase_diagram/results/cells.csv", comment="#")
-    spreads = table.assign(spread=table["dx_sd"] / table["dx_mean"]).pivot(index="links", columns="frequency")["spread"]
-    frequencies = np.arange(5, 45, 5)
-    return [
-        float(each)
-        for links in range(60, 200, 20)
-        for each in np.interp(frequencies, spreads.columns.to_numpy(float), spreads.loc[links])
-    ]
 
 
 if __name__ == "__main__":
