@@ -103,7 +103,7 @@ HARD = {
     "standing": {"links": 60, "frequency": 0.0},
     "fast": {"links": 180, "frequency": 60.0, "hold_limit": 3.0},
     "fewest": {"links": FEWEST, "frequency": 15.0, "hold_limit": 3.0},
-    "long": {"links": 198, "frequency": 20.0, "hold_limit": 4.0},
+    "long": {"links": 192, "frequency": 20.0, "hold_limit": 4.0},
     "longer": {"links": 300, "frequency": 20.0, "hold_limit": 4.0},  # with kernels of their own
     "point-like": {**CELL, **TENTH, "hold_limit": 3.0},
     "heavy turning": {**CELL, **TENFOLD, "hold_limit": 3.0},
