@@ -14,7 +14,7 @@ import warp as wp
 
 from warpchain.kernels import layout
 from warpchain.kernels.cpu import stage_rows as at
-from warpchain.kernels.cpu.placing import close_ends, place_link
+from warpchain.kernels.cpu.placing import place_ends
 from warpchain.kernels.methods.explicit_tableaus import Tableau
 from warpchain.kernels.physics.elementary import HALF, order_bits, order_bits_single
 from warpchain.kernels.physics.geometry import Link, read_link, whole_lanes
@@ -32,6 +32,7 @@ class Steps:
     take_constants: Any  # ``(K, S, chain)`` when those of links and joints have changed
     begin: Any  # ``(K, S, chain)`` rounds the state at the start of a step, whose ends are placed
     first_stage: Any  # ``(K, S, chain)`` evaluates the first stage
+    take_last_stage: Any  # ``(S, n)`` takes the last stage of the step before for the first one
     shift_first_stage: Any  # ``(S, before, now)`` changes it from one plane to another
     attempt: Any  # ``(K, S, chain, h, tolerance)`` → bits of the greatest error ratio, see :func:`order_bits`
     commit: Any  # ``(K, S, chain, h)`` takes the new state and places its ends
@@ -53,7 +54,6 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
     stages, nodes = tableau.stages, tableau.nodes
     rows, power_rows, _ = at.stage_rows(tableau)
     needs_power = at.needs_power(tableau)
-    reuses_last = tableau.first_same_as_last
     weights = tableau.velocity_weights
     stage_sums = [at.sums_over(real, *both, rows) for both in zip(tableau.velocity, tableau.position, strict=True)]
     new_state = at.sums_over(real, weights, tableau.position_weights, rows)
@@ -244,8 +244,9 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
                 fallen = real(0.5) * stage.even * stage.even
                 S[at.WAY, i] = S[at.WAY, i] + fallen * plane.fall_x
                 S[at.WAY + 1, i] = S[at.WAY + 1, i] + fallen * plane.fall_y
-            S[at.CHANGE, i] = stage.h * sums[0]
-            S[at.CHANGE + 1, i] = stage.h * sums[1]
+            if wp.static(of_script is not None):
+                S[at.CHANGE, i] = stage.h * sums[0]
+                S[at.CHANGE + 1, i] = stage.h * sums[1]
 
     @wp.func
     def close_loop(S: Numbers, n: int, has_power: bool):
@@ -408,22 +409,23 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
                         change += wp.float64(h * impulse(S, 4 + c, i))
                 K[layout.X + c, i] = K[layout.X + c, i] + (step * rate + way)
                 K[layout.U + c, i] = rate + change
-            place_link(K, chain.half_length, i)
             i += 1
-        close_ends(K, n)
-        if wp.static(reuses_last):
-            vectors = whole_vectors(n)
-            i = int(0)
-            while i < vectors:
-                for row in range(3):
-                    S[wp.static(rows[0]) + row, i] = S[wp.static(rows[-1]) + row, i]
-                if wp.static(needs_power[0]):
-                    for row in range(wp.static(at.POWER_ROWS)):
-                        S[wp.static(power_rows[0]) + row, i] = S[wp.static(power_rows[-1]) + row, i]
-                i += 1
+        place_ends(K, chain)  # in a loop of its own, which is faster: the processor overlaps more of its short rounds
+
+    @wp.func
+    def take_last_stage(S: Numbers, n: int):
+        vectors = whole_vectors(n)
+        i = int(0)
+        while i < vectors:
+            for row in range(3):
+                S[wp.static(rows[0]) + row, i] = S[wp.static(rows[-1]) + row, i]
             if wp.static(needs_power[0]):
-                for row in range(2, 4):
-                    S[wp.static(power_rows[0]) + row, n] = S[wp.static(power_rows[-1]) + row, n]
+                for row in range(wp.static(at.POWER_ROWS)):
+                    S[wp.static(power_rows[0]) + row, i] = S[wp.static(power_rows[-1]) + row, i]
+            i += 1
+        if wp.static(needs_power[0]):
+            for row in range(2, 4):
+                S[wp.static(power_rows[0]) + row, n] = S[wp.static(power_rows[-1]) + row, n]
 
     @wp.func
     def start_is_finite(S: Numbers, n: int):
@@ -433,4 +435,6 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
                 finite = finite and wp.isfinite(S[wp.static(rows[0]) + row, i])
         return finite
 
-    return Steps(take_constants, begin, first_stage, shift_first_stage, attempt, commit, start_is_finite)
+    return Steps(
+        take_constants, begin, first_stage, take_last_stage, shift_first_stage, attempt, commit, start_is_finite
+    )

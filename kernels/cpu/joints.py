@@ -16,7 +16,9 @@ from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.types import Chain, Rows, Worlds
 
 NOTHING_KNOWN, STAGE_KNOWN, ROUNDED = 0, 1, 2
-"""Of the start of a step, in ``Worlds.has_first_stage``: the first stage is known; the state is rounded as well."""
+"""Of the start of a step, in ``Worlds.has_first_stage``: the first stage is the last one of the step before; or it
+is in place, and the state is rounded.
+"""
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,8 @@ def springs(name: str, columns: int, is_mixed: bool, load: Any) -> Joints:
     rows = rows_of_stages(tableau, columns, first_stage_row(name, columns), real)
     steps = steps_in_increments(tableau, real, load)
     growth, shrink = step_controller(tableau.order, tableau.error_order, real)
-    after_step = STAGE_KNOWN if tableau.first_same_as_last else NOTHING_KNOWN
+    reuses_last = tableau.first_same_as_last
+    after_step = STAGE_KNOWN if reuses_last else NOTHING_KNOWN
 
     @wp.func
     def take_constants(K: Rows, chain: Chain):
@@ -72,6 +75,8 @@ def springs(name: str, columns: int, is_mixed: bool, load: Any) -> Joints:
             steps.begin(K, S, chain)
             if known == wp.static(NOTHING_KNOWN):
                 steps.first_stage(K, S, chain)
+            elif wp.static(reuses_last):
+                steps.take_last_stage(S, chain.link_count)
             worlds.has_first_stage[world] = wp.static(ROUNDED)
 
     @wp.func

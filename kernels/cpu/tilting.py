@@ -10,9 +10,9 @@ from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.cpu.contacts.proximity import FURTHEST, any_negative, placed_link
 from warpchain.kernels.cpu.joints import Joints
 from warpchain.kernels.cpu.upright import PlaneHooks
-from warpchain.kernels.layout import LEFT_X, LOST_FIXED, SUMS, SUMS_OF_MOTION, U
+from warpchain.kernels.layout import GAP, LEFT_X, LOST_FIXED, SUMS, SUMS_OF_MOTION, U
 from warpchain.kernels.physics import plane
-from warpchain.kernels.physics.elementary import ZERO, from_order_key, order_key
+from warpchain.kernels.physics.elementary import ONE, ZERO, from_order_key, order_key
 from warpchain.kernels.physics.geometry import LANES, whole_lanes
 from warpchain.kernels.types import Chain, Ground, Row, Rows, Worlds, with_circles
 
@@ -33,6 +33,19 @@ def row_sum(K: Rows, row: int, count: int) -> wp.float64:
     """Sum of the first ``count`` columns of a row, a multiple of 8; in pure Warp clang adds one after the other."""
 
 
+@wp.func_native("""
+    typedef ::wp::float64 Lanes __attribute__((ext_vector_type(8), aligned(8)));
+    for (int k = 0; k < rows; ++k) {
+        const ::wp::float64* values = &K.data[(row + k) * (K.strides[0] / sizeof(::wp::float64))];
+        Lanes sums = 0.0;
+        for (int i = 0; i < count; i += 8) sums += *reinterpret_cast<const Lanes*>(values + i);
+        P.data[first + k] = ((sums[0] + sums[1]) + (sums[2] + sums[3])) + ((sums[4] + sums[5]) + (sums[6] + sums[7]));
+    }
+""")
+def write_row_sums(K: Rows, row: int, rows: int, count: int, P: Row, first: int):
+    """Writes the sums of rows of K, over their first ``count`` columns, a multiple of 8; as fast as memory allows."""
+
+
 @wp.func
 def write_sums_of_motion(K: Rows, P: Row, chain: Chain):
     """Writes the sums over the links that depend on velocities."""
@@ -43,8 +56,7 @@ def write_sums_of_motion(K: Rows, P: Row, chain: Chain):
         for k in range(wp.static(SUMS_OF_MOTION)):
             K[wp.static(SUMS + k), i] = wp.where(i < chain.link_count, motion[k], ZERO)
         i += 1
-    for k in range(wp.static(SUMS_OF_MOTION)):
-        P[wp.static(layout.MOTION_SUMS + k)] = row_sum(K, wp.static(SUMS + k), count)
+    write_row_sums(K, SUMS, SUMS_OF_MOTION, count, P, layout.MOTION_SUMS)
 
 
 @wp.func
@@ -57,8 +69,7 @@ def write_plane_sums(K: Rows, P: Row, chain: Chain):
         for k in range(wp.static(layout.SUMS_OF_PLACES)):
             K[wp.static(SUMS + k), i] = wp.where(i < chain.link_count, places[k], ZERO)
         i += 1
-    for k in range(wp.static(layout.SUMS_OF_PLACES)):
-        P[wp.static(layout.PLANE_SUMS + k)] = row_sum(K, wp.static(SUMS + k), count)
+    write_row_sums(K, SUMS, layout.SUMS_OF_PLACES, count, P, layout.PLANE_SUMS)
     write_sums_of_motion(K, P, chain)
     P[layout.SUM_MASS] = chain.mass
     plane.invert_mass(P)
@@ -66,41 +77,54 @@ def write_plane_sums(K: Rows, P: Row, chain: Chain):
 
 @wp.func
 def tilting_gap(K: Rows, chain: Chain, _ground: Ground, _face: Face):
-    """Height [m] of the lowest rim of a roller above the floor; negative when it is below."""
+    """Height [m] of the lowest rim of a roller above the floor, and of each link in its row; negative when below."""
     slope = tilting_floor.steepness(chain)
+    tipped = wp.abs(chain.half_width * chain.up_z)
     lowest = FURTHEST
     i = int(0)
     while i < whole_lanes(chain.link_count):
         own = with_circles(chain, K[layout.RADIUS, i])
         left = order_key(tilting_floor.middle_height(own, slope, K[LEFT_X, i], K[layout.LEFT_Y, i]))
         right = order_key(tilting_floor.middle_height(own, slope, K[layout.RIGHT_X, i], K[layout.RIGHT_Y, i]))
-        lowest = wp.min(lowest, wp.where(i < chain.link_count, wp.min(left, right), FURTHEST))
+        middle = wp.min(left, right)
+        K[GAP, i] = wp.where(i < chain.link_count, from_order_key(middle) - tipped, ONE)
+        lowest = wp.min(lowest, wp.where(i < chain.link_count, middle, FURTHEST))
         i += 1
     return from_order_key(lowest) - chain.half_width * wp.abs(chain.up_z)
 
 
 @wp.func
 def write_touches(K: Rows, chain: Chain, slope: wp.float64):
-    """Writes −1 for each link that touches the floor and 0 for others; returns their number."""
+    """Writes −1 for each link that touches the floor and 0 for others; returns their number.
+
+    Only in lanes of links of which one is below the floor, see their gaps.
+    """
     touching = wp.int64(0)
-    i = int(0)
-    while i < whole_lanes(chain.link_count):
-        touches = tilting_floor.link_touches(with_circles(chain, K[layout.RADIUS, i]), slope, placed_link(K, i))
-        touches = wp.where(i < chain.link_count, touches, wp.int64(0))
-        K[wp.static(TOUCHES), i] = -wp.float64(touches)
-        touching += touches
-        i += 1
+    first = int(0)
+    while first < whole_lanes(chain.link_count):
+        if any_negative(K, GAP, first):
+            lane = int(0)
+            while lane < wp.static(LANES):
+                i = first + lane
+                own = with_circles(chain, K[layout.RADIUS, i])
+                touches = tilting_floor.link_touches(own, slope, placed_link(K, i))
+                touches = wp.where(i < chain.link_count, touches, wp.int64(0))
+                K[wp.static(TOUCHES), i] = -wp.float64(touches)
+                touching += touches
+                lane += 1
+        first += wp.static(LANES)
     return touching
 
 
 @wp.func
-def resolve_tilting_floor(K: Rows, P: Row, chain: Chain, _ground: Ground, _face: Face):
+def resolve_tilting_floor(K: Rows, P: Row, chain: Chain, ground: Ground, face: Face):
     """Applies the impulses between rollers and floor to links, plane and sums; returns their number.
 
     The sums must be those of the present places. Lanes of links of which none touches are passed over.
     """
     present = plane.on_plane(chain, P, 0)
     slope = tilting_floor.steepness(present)
+    tilting_gap(K, present, ground, face)
     touching = write_touches(K, present, slope)
     if touching == wp.int64(0):
         return touching
@@ -112,7 +136,7 @@ def resolve_tilting_floor(K: Rows, P: Row, chain: Chain, _ground: Ground, _face:
         for k in range(wp.static(SUMMED_IN_CONTACT)):
             for lane in range(wp.static(LANES)):
                 K[wp.static(SUMS + k), first + lane] = ZERO
-        if any_negative(K, wp.static(TOUCHES), first):
+        if any_negative(K, GAP, first) and any_negative(K, wp.static(TOUCHES), first):
             lane = int(0)
             while lane < wp.static(LANES):
                 i = first + lane

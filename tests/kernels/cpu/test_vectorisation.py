@@ -19,13 +19,15 @@ wp.load_module(loop.make_advance(features).module, device="cpu")
 """
 
 COMMON = {"place_ends", "attempt", "greatest_distance", "greatest_speed", "evaluate"}
-EXPLICIT = COMMON | {"begin", "take_constants", "pull_joints", "first_stage", "commit"}
+EXPLICIT = COMMON | {"begin", "take_constants", "pull_joints", "first_stage", "take_last_stage", "commit"}
 # flights have a ``commit`` of their own, one loop of which scatters
 RIGID = (EXPLICIT - {"commit"}) | {
     *("fastest", "meeting", "prepare", "place_stage", "factorise", "solve_forces", "damp", "keep_stage"),
     *("openings", "opening_rates", "push", "close", "begin"),
 }
-TILTING = EXPLICIT | {"shift_first_stage", "tilting_gap", "resolve_tilting_floor", "write_plane_sums"}
+TILTING = EXPLICIT | {
+    *("shift_first_stage", "tilting_gap", "write_touches", "resolve_tilting_floor", "write_plane_sums"),
+}
 HOT_FUNCTIONS = {"dp5": EXPLICIT, "hybrid": RIGID}
 
 
