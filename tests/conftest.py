@@ -1,9 +1,14 @@
 """How tests are spread over the cores of a machine, and how long hostile inputs are tried."""
 
+import os
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
+
+# Each core has a worker already, and threads of NumPy's linear algebra that wait for one another keep it busy: with two
+# on a core, tests of posteriors took three times as long. NumPy reads this when it is imported.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from tests.support.command_line import command  # noqa: F401
 from warpchain.engine.processors import processors

@@ -211,10 +211,15 @@ def test_public_names() -> None:
 
 
 def test_importing_starts_and_loads_nothing() -> None:
-    """Importing the package and looking up all of its names starts no device and loads no heavy library."""
+    """Importing the package and looking up all of its names starts no device and loads no heavy library.
+
+    What reads and prints results loads no Warp either.
+    """
     program = (
         "import sys, warpchain\n"
         "light = set(sys.modules)\n"
+        "import warpchain.cli.output, warpchain.results.sweep_result\n"
+        "print('warp' in sys.modules)\n"
         "[getattr(warpchain, name) for name in warpchain.__all__]\n"
         "import warp._src.context\n"
         "print(sorted(light & {'warp', 'numpy', 'pydantic', 'yaml', 'rich', 'typer'}))\n"
@@ -222,7 +227,7 @@ def test_importing_starts_and_loads_nothing() -> None:
         "print(warp._src.context.runtime)\n"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, encoding="utf-8")
-    assert (done.stdout, done.stderr) == ("[]\n[]\nNone\n", "")
+    assert (done.stdout, done.stderr) == ("False\n[]\n[]\nNone\n", "")
 
 
 def test_tests_of_a_gpu_start_no_cpu() -> None:

@@ -1,5 +1,6 @@
 """Every command and every example of README, docs/ and studies/ does what a reader would have it do."""
 
+import functools
 import os
 import re
 import shlex
@@ -16,16 +17,20 @@ import typer
 import yaml
 
 from tests.docs.code_blocks import PAGES, REASONS, ROOT, code_blocks, inline_code, name_of
-from warpchain.cli.main import app
+from warpchain.cli.main import app, main
 from warpchain.inputs.yaml_files import read_yaml
 
 SET_UP = re.compile(r"^python3 -m venv \S+ && \S+/pip install -q \. && ")
 """What the first command of the README does before it runs warpchain; `.ci/run` and the test of the wheel do it."""
 MOST_SAMPLES = 2
 MOST_VALUES = 2
+LONGEST = 70
+"""Most links of a chain in a sweep."""
 SHORTER = {
     r"(?m)^samples: \d+$": f"samples: {MOST_SAMPLES}",
     r"\[(0\.\d+), (?:0\.\d+, )+(0\.\d+)\]": r"[\1, \2]",  # an axis with its first and its last value
+    r"\bsamples=4\b": f"samples={MOST_SAMPLES}",
+    r"\b(links[=:] ?\[60, )\d+\]": r"\g<1>70]",
     r"--at-most \d+": f"--at-most {4 * MOST_SAMPLES}",
     r"--fps 12 --slow 5": "--fps 3",
     r'\.animate\("([\w.-]+)"\)': r'.animate("\1", fps=3)',
@@ -37,7 +42,10 @@ RUN = [page for page in PAGES if any(block.is_run for block in code_blocks(page)
 @pytest.mark.slow
 @pytest.mark.parametrize("page", RUN, ids=name_of)
 def test_blocks_of_a_page_run(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The blocks of a page run one after the other; sweeps have fewer samples and shorter axes than the page says."""
+    """The blocks of a page run one after the other; sweeps have fewer samples, shorter axes and shorter chains.
+
+    The commands of the repository's README run in processes of their own, as a shell starts them.
+    """
     for file in (*ROOT.glob("sweeps/*.yaml"), *ROOT.glob("studies/*/sweeps/*.yaml")):
         target = tmp_path / file.relative_to(ROOT)
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -59,12 +67,28 @@ def test_blocks_of_a_page_run(page: Path, tmp_path: Path, monkeypatch: pytest.Mo
             exec(compile(code, name_of(page), "exec"), names)
         else:
             code = SET_UP.sub("", code).replace(".venv/bin/", "")
+            if page != ROOT / "README.md" and (commands := plain_commands(code)):
+                for arguments in commands:
+                    with pytest.raises(SystemExit) as end:
+                        main(arguments)
+                    assert not end.value.code, arguments
+                continue
             done = subprocess.run(["bash", "-euo", "pipefail", "-c", code], capture_output=True, encoding="utf-8")
             assert done.returncode == 0, f"{code}\n{done.stdout}\n{done.stderr}"
 
 
+def plain_commands(code: str) -> list[list[str]]:
+    """The arguments of each command of a block, if it has nothing but commands of `warpchain` and needs no shell.
+
+    They run in this process: in one of its own most take longer to import what they need than to do their work.
+    """
+    lines = [line.strip() for line in re.split(r"\n|&&", re.sub(r"#.*", "", code)) if line.strip()]
+    is_plain = all(line.startswith("warpchain ") and not re.search(r"[|<>$&;*\\]", line) for line in lines)
+    return [shlex.split(line)[1:] for line in lines] if is_plain else []
+
+
 def reduced(sweep: Any) -> Any:
-    """The content of a sweep file with few samples in each cell and few values along each axis."""
+    """The content of a sweep file with few samples in each cell, few values along each axis and no long chains."""
     if not isinstance(sweep, Mapping):
         return sweep
     small = dict(sweep)
@@ -77,9 +101,17 @@ def reduced(sweep: Any) -> Any:
             else [values["from"], values["from"] + values["step"]]
             for name, values in small["grid"].items()
         }
+        if (links := small["grid"].get("links")) and links[-1] > LONGEST:
+            small["grid"]["links"] = [LONGEST - 10, LONGEST]
     if "blocks" in small:
         small["blocks"] = [reduced(block) for block in small["blocks"]]
     return small
+
+
+@functools.cache
+def command_line() -> Any:
+    """The command `warpchain` with all of its commands, as it parses words."""
+    return typer.main.get_command(app)
 
 
 def test_no_block_is_left_out_silently() -> None:
@@ -102,7 +134,7 @@ def test_commands_are_those_of_the_command_line(page: Path) -> None:
     parts = [part.strip() for text in [*lines, *inline_code(page)] for part in re.split(r"&&|#", text)]
     for part in parts:
         words = shlex.split(part) if part.removeprefix(".venv/bin/").startswith("warpchain ") else []
-        command: Any = typer.main.get_command(app)
+        command: Any = command_line()
         words = words[1:]
         while words and words[0] in getattr(command, "commands", {}):
             command = command.commands[words.pop(0)]

@@ -110,17 +110,16 @@ def test_wheel_walks_outside_the_repository(tree: Path, tmp_path: Path) -> None:
     assert all(Path(path).is_relative_to(packages) for path in home.split())
     command = python.with_name("warpchain")
     assert "Usage" in run(command, "--help", cwd=tmp_path)
-    words = "walk --start ellipse --links 10 --frequency 3 --preset soft --json"
+    words = "walk --start ellipse --links 10 --frequency 3 --preset soft --json -o film"
     walk = json.loads(run(command, *words.split(), cwd=tmp_path))
     assert walk["status"] == "at_rest" and walk["scene"]["links"] == 10
-    run(command, *words.replace("--json", "-o film").split(), cwd=tmp_path)
     run(command, "animate", "film", "-o", "film/walk.html", cwd=tmp_path)
     assert (tmp_path / "film/walk.html").is_file()
     assert run(command, "sweep", "--new", "new.yaml", cwd=tmp_path) == "new.yaml\n"
-    for name in ("new.yaml", *(path.stem for path in (ROOT / "sweeps").iterdir())):
-        program = f"from warpchain.sweeps.plan import load_sweep; print(load_sweep({name!r}).digest())"
-        expected = load_sweep(tmp_path / name if name == "new.yaml" else name).digest()
-        assert run(python, "-c", program, cwd=tmp_path) == f"{expected}\n"
+    names = ["new.yaml", *(path.stem for path in (ROOT / "sweeps").iterdir())]
+    program = f"from warpchain.sweeps.plan import load_sweep\nprint(*(load_sweep(name).digest() for name in {names}))"
+    expected = [load_sweep(tmp_path / name if name == "new.yaml" else name).digest() for name in names]
+    assert run(python, "-c", program, cwd=tmp_path).split() == expected
 
 
 def test_a_checkout_without_metadata_runs() -> None:

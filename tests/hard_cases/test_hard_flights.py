@@ -271,8 +271,7 @@ def test_elastic_bouncing_keeps_the_energy_for_a_second(method, tolerance, bound
     assert flight.position[:, :, 1].min() > 0
 
 
-@pytest.mark.thorough
-@pytest.mark.parametrize("method", ["os32", "hybrid"])
+@pytest.mark.parametrize("method", ["os32", pytest.param("hybrid", marks=pytest.mark.thorough)])
 def test_long_chains(method):
     """590 links hit the floor like any other number; other explicit methods differ in coefficients alone."""
     fall = Flight(SOFT, partial(dropped_circle, 590), 5e-3)

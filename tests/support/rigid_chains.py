@@ -18,13 +18,13 @@ def constraint_matrix(position: Array, parameters: Parameters) -> Array:
     a = parameters.link_length / 2
     turned = np.column_stack([-np.sin(position[:, 2]), np.cos(position[:, 2])])
     matrix = np.zeros((n, 2, n, 3))
-    for left in range(n):
-        right = (left + 1) % n
-        for d in range(2):
-            matrix[left, d, right, d] += 1
-            matrix[left, d, left, d] -= 1
-        matrix[left, :, right, 2] -= a * turned[right]
-        matrix[left, :, left, 2] -= a * turned[left]
+    left = np.arange(n)
+    right = (left + 1) % n
+    for d in range(2):
+        matrix[left, d, right, d] += 1
+        matrix[left, d, left, d] -= 1
+    matrix[left, :, right, 2] -= a * turned[right]
+    matrix[left, :, left, 2] -= a * turned[left]
     return matrix.reshape(2 * n, 3 * n)
 
 
@@ -70,9 +70,9 @@ def projected(position: Array, velocity: Array, parameters: Parameters) -> tuple
 
 
 def exact_rigid_flight(
-    position: Array, velocity: Array, parameters: Parameters, duration: float
+    position: Array, velocity: Array, parameters: Parameters, duration: float, tolerance: float = 1e-12
 ) -> tuple[Array, Array]:
-    """The state after a flight on rigid joints, by SciPy's DOP853 on the dense equations at 1e-12."""
+    """The state after a flight on rigid joints, by SciPy's DOP853 on the dense equations, in SI units."""
     n = len(position)
 
     def rates(_: float, state: Array) -> Array:
@@ -80,7 +80,7 @@ def exact_rigid_flight(
         return np.concatenate([speed.ravel(), rigid_motion(place, speed, parameters)[0].ravel()])
 
     start = np.concatenate([position.ravel(), velocity.ravel()])
-    end = solve_ivp(rates, (0, duration), start, method="DOP853", rtol=1e-12, atol=1e-12).y[:, -1]
+    end = solve_ivp(rates, (0, duration), start, method="DOP853", rtol=tolerance, atol=tolerance).y[:, -1]
     return tuple(end.reshape(2, n, 3))
 
 

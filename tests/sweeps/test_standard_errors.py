@@ -1,5 +1,6 @@
 """Standard errors of means over the samples of a cell, held against the spread of means over many seeds."""
 
+import functools
 import math
 from typing import Any
 
@@ -24,6 +25,13 @@ def planned(sampler: str, seed: int, samples: int = 64, **keys: Any) -> Sweep:
     return load_sweep(content(grid=None, **given))
 
 
+@functools.cache
+def drawn(sampler: str, seed: int) -> tuple[Sweep, np.ndarray]:
+    """A sweep of 64 samples, and its `fractions`; two distances are made of each."""
+    sweep = planned(sampler, seed)
+    return sweep, fractions(sweep)
+
+
 def fractions(sweep: Sweep) -> np.ndarray:
     """What each walk drew, as fractions of the ranges, (walks, 4)."""
     draws = [sweep.walk(index).draws for index in sweep.indices.tolist()]
@@ -42,7 +50,11 @@ def chaotic(u: np.ndarray) -> np.ndarray:
 
 def found(sweep: Sweep, distance: Any, ended: np.ndarray | None = None) -> CellStatistics:
     """Statistics of walks that came so far, all at rest unless it is said which."""
-    dx = distance(fractions(sweep))
+    return statistics_of(sweep, distance(fractions(sweep)), ended)
+
+
+def statistics_of(sweep: Sweep, dx: np.ndarray, ended: np.ndarray | None = None) -> CellStatistics:
+    """Statistics of walks with these distances."""
     rest = np.full(len(dx), True) if ended is None else ended
     status = np.where(rest, Status.AT_REST, Status.TIME_LIMIT)
     return CellStatistics.of({}, "m", np.where(rest, dx, np.nan), status, sweep.blocks[0].groups)
@@ -52,7 +64,8 @@ def found(sweep: Sweep, distance: Any, ended: np.ndarray | None = None) -> CellS
 @pytest.mark.parametrize("sampler", SAMPLERS)
 def test_printed_errors_are_those_of_the_means(sampler: str, distance: Any) -> None:
     """Over 24 seeds cell means scatter as their standard errors say, whatever the sampler: within 3 σ of a spread."""
-    cells = [found(planned(sampler, seed), distance) for seed in range(SEEDS)]
+    each_drawn = [drawn(sampler, seed) for seed in range(SEEDS)]
+    cells = [statistics_of(sweep, distance(u)) for sweep, u in each_drawn]
     true = np.std([each.mean for each in cells], ddof=1)
     printed = math.sqrt(np.mean([each.standard_error**2 for each in cells]))
     assert true / printed == pytest.approx(1.0, abs=3 / math.sqrt(2 * (SEEDS - 1)))

@@ -8,7 +8,7 @@ import warp as wp
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 import warpchain
-from tests.walks.test_states import assert_rest_of
+from tests.walks.test_states import assert_rest_of, walked
 from warpchain import InputError
 from warpchain.chain.sprocket_motion import motion_rows, sprocket_places
 from warpchain.kernels.contacts.fixed_body import moved_sprocket
@@ -73,7 +73,7 @@ def test_a_sprocket_that_goes_on_as_it_was_keeps_the_loop() -> None:
 
 def test_a_throw_gives_the_chain_the_speed_of_the_sprocket() -> None:
     """A sprocket that is moved along takes the chain with it; what it does is in the ledger, which closes."""
-    usual = warpchain.walk(**SPUN)
+    usual = walked(**SPUN)
     thrown = warpchain.walk(**SPUN, release=[[0.1, 0.2, 0.0, 20.0]])
     at = np.searchsorted(thrown.time, 0.1)
     moved = thrown.center[at] - thrown.center[0]
@@ -98,7 +98,7 @@ PRESSED = {"links": 30, "frequency": 8.0, "start": "spinning", "preset": "soft"}
 def test_a_walk_goes_on_when_the_sprocket_has_vanished(settings: dict[str, Any], release: Any, deep: bool) -> None:
     """Lowered onto the floor and stopped, a loop walks less far; from then on its states go on to the bit."""
     lowered = warpchain.walk(**settings, release=release)
-    assert lowered.status.label == "at_rest" and lowered.dx < warpchain.walk(**settings).dx
+    assert lowered.status.label == "at_rest" and lowered.dx < walked(**settings).dx
     assert lowered.energy_error < 1e-2 and lowered.bounces > 0
     with pytest.raises(InputError, match=r"t: expected a time after 0\.\d+ s, when the sprocket vanishes, got 0.05 s"):
         lowered.state(0.05)

@@ -1,5 +1,6 @@
 """States: taken from walks, continued, perturbed, or given by a measured outline."""
 
+import functools
 import math
 from collections.abc import Mapping
 from dataclasses import replace
@@ -47,17 +48,21 @@ def assert_rest_of(walk: WalkResult, whole: WalkResult, start: float) -> None:
             assert ours[later[0]].tobytes() == theirs[later[1]].tobytes(), name
 
 
+walked = functools.cache(warpchain.walk)
+"""A walk that several tests begin with."""
+
+
 @pytest.fixture(scope="module")
 def fall() -> WalkResult:
     """A walk of an ellipse without a sprocket."""
-    return warpchain.walk(**ELLIPSE)
+    return walked(**ELLIPSE)
 
 
 @pytest.mark.parametrize("name", WALKS)
 def test_a_state_goes_on_to_the_bit(name: str) -> None:
     """Unchanged, what begins from a state is the rest of its walk: every number, sample and frame."""
     settings, share = WALKS[name]
-    whole = warpchain.walk(**settings, frame_interval=1e-3)
+    whole = walked(**settings, frame_interval=1e-3)
     state = whole.state(share * whole.walk_time)
     assert 0 <= state.time - share * whole.walk_time < 2e-3
     if name in ("rigid joints", "soft joints"):
@@ -82,7 +87,7 @@ def test_a_perturbed_state_is_another_walk_with_a_ledger_of_its_own(
     settings: Mapping[str, Any], tmp_path: Path
 ) -> None:
     """Δx changes, energy counts from the perturbed state, clock and events go on; it is repeatable bit for bit."""
-    whole = warpchain.walk(**settings)
+    whole = walked(**settings)
     state = whole.state(0.4 * whole.walk_time)
     perturbed = replace(state, velocity=1.01 * state.velocity)
     walk = warpchain.walk(start=perturbed)
@@ -229,8 +234,8 @@ def test_a_state_keeps_its_floor_in_simulate() -> None:
     """Unless another is given, the floor is that of the state's scene: a chain lies on its slope, not on y = 0."""
     state = warpchain.walk(**ELLIPSE | {"method": "os32", "tolerance": 1e-5}, slope=10.0).state(0.3)
     on_slope, in_the_air = (
-        warpchain.simulate(state, duration=0.4, method=method, floor=floor)
-        for method, floor in (("os32", None), ("dp5", False))
+        warpchain.simulate(state, duration=0.4, **given)
+        for given in ({"method": "os32", "tolerance": 1e-5}, {"method": "dp5", "floor": False})
     )
     assert on_slope.impulses["floor"] > 0 == in_the_air.impulses["floor"]
     x, y = on_slope.position[-1, :, :2].T

@@ -11,7 +11,7 @@ from warpchain import Status
 
 SHORT = {"links": 40, "start": "ellipse", "frame_interval": None}
 FIRST_MOMENTS = {**SHORT, "preset": "soft", "method": "reference", "stop_time": 0.02}
-SLIDING = {**SHORT, "slope": 20.0, "mu_fc": 0.1, "walk_limit": 1.0}
+SLIDING = {**SHORT, "method": "explicit", "slope": 20.0, "mu_fc": 0.1, "walk_limit": 1.0}
 WHIRLING = {"start": "spinning", "charm_mass": 0.02, "frame_interval": None}
 
 ADVICE: list[Any] = [

@@ -35,7 +35,6 @@ from warpchain.inputs.validation import InputError, checked_path, json_value, va
 from warpchain.loop.stationary_loop import LOOP_FIELDS
 from warpchain.status import Status
 from warpchain.walks.landmarks import MOST_ENERGY_ERROR
-from warpchain.walks.restart import state_at
 from warpchain.walks.walk_numbers import MOTION, NUMBERS, STORED, WalkNumbers, read_motion, write_motion
 
 if TYPE_CHECKING:
@@ -98,6 +97,8 @@ class WalkResult(WalkNumbers):
         Raises:
             InputError: `t` is outside this range, the chain was never released, or the walk's device is missing.
         """
+        from warpchain.walks.restart import state_at  # brings Warp, which commands that read results do without
+
         is_released = not np.isnan(self.energy["kinetic_at_release"])
         return state_at(self.setup, t, self.walk_time if is_released else np.nan)
 

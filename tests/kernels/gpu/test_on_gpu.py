@@ -145,7 +145,7 @@ def content_of(device: str, long: float) -> dict[str, object]:
         "preset": "soft",
         "samples": 20 if device == "cuda" else 10,
         "scene": scene,
-        "options": {"method": "dp5", "rest_time": 100.0, "device": device},
+        "options": {"method": "os32", "tolerance": 1e-5, "rest_time": 100.0, "device": device},
         "blocks": [
             {"name": "flying", "grid": {"walk_limit": [0.002, long]}},
             {"name": "leaning", "scene": {"plane": "tilting", "tilt": 0.1, "clearance": 1e-4, "walk_limit": 0.01}},
