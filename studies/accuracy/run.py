@@ -1,12 +1,15 @@
 """Compares the walks of two sweeps of the same samples, cell by cell; README.md has the commands.
 
 It writes results/NEW-BASE.csv and prints the relative difference of the mean Δx of each cell with the standard error of
-pairs of samples; over all cells their mean and χ², scatter and bounces; and how exact either is.
+pairs of samples; over all cells their mean and χ², scatter and bounces; and how exact either is. Of one sweep with
+points it compares each method with the last, and writes results/NAME.csv.
 """
 
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+import typer
 
 import warpchain
 from studies.common import Array, OverCells, of_cells, run_study, write_rows
@@ -41,6 +44,18 @@ def describe(sweep: warpchain.SweepResult) -> None:
     print(f"  attempted steps: {steps.sum() / 1e6:.1f} million, in the longest walk {steps.max():.0f}")
 
 
+def change(new: Array, base: Array) -> dict[str, float]:
+    """Pairs of samples that both walked, relative change of the mean and its standard error, both in per cent."""
+    pairs = np.isfinite(new) & np.isfinite(base)
+    a, b = new[pairs] / new[pairs].mean(), base[pairs] / base[pairs].mean()
+    error = np.std(a - b, ddof=1) / np.sqrt(len(a))
+    return {
+        "pairs": len(a),
+        "change_percent": 100 * float(new[pairs].mean() / base[pairs].mean() - 1),
+        "error": 100 * float(error),
+    }
+
+
 def compare(new: warpchain.SweepResult, base: warpchain.SweepResult) -> None:
     """Write and print how the walks of one sweep differ from those of another."""
     distances, bounces = cells(new, "dx"), cells(new, "bounces")
@@ -53,21 +68,36 @@ def compare(new: warpchain.SweepResult, base: warpchain.SweepResult) -> None:
     for name, b in base_distances.items():
         a = distances[name][: len(b)]
         b = b[: len(a)]
+        found = change(a, b)
         pairs = np.isfinite(a) & np.isfinite(b)
-        a, b = a[pairs], b[pairs]
-        difference, error = a.mean() / b.mean() - 1, np.std(a / a.mean() - b / b.mean(), ddof=1) / np.sqrt(len(a))
-        rows.append((difference, error, a.std() / b.std(), bounces[name].mean() / base_bounces[name].mean()))
-        cells_of_file.append({"cell": name, "pairs": len(a), "change_percent": 100 * difference, "error": 100 * error})
-        print(f"{name}: {100 * difference:+.2f} ± {100 * error:.2f} % ({len(a)} pairs)")
+        spread = a[pairs].std() / b[pairs].std(), bounces[name].mean() / base_bounces[name].mean()
+        rows.append((found["change_percent"], found["error"], *spread))
+        cells_of_file.append({"cell": name, **found})
+        print(f"{name}: {found['change_percent']:+.2f} ± {found['error']:.2f} % ({found['pairs']} pairs)")
     write_rows(FOLDER / "results" / f"{new.name}-{base.name}.csv", cells_of_file, new, base)
     differences, errors, scatter, bounced = np.array(rows).T
-    over = OverCells(100 * differences, 100 * errors)
+    over = OverCells(differences, errors)
     print(f"mean of {len(rows)} cells {over.mean:+.3f} ± {over.error:.3f} %, χ² {over.chi2:.1f}")
     print(f"standard deviations {100 * scatter.mean() - 100:+.1f} %, bounces {100 * bounced.mean() - 100:+.1f} %")
 
 
-def main(folder: str, base: str) -> None:
-    """Compare two folders."""
+def compare_methods(sweep: warpchain.SweepResult) -> None:
+    """Write and print how Δx with each method of a sweep's points differs from that with the last."""
+    if not all("method" in block.get("points", {}) for block in sweep.sweep["blocks"]):
+        raise warpchain.InputError(f"{sweep.name}: no points with methods; pass a second folder to compare it with")
+    rows = []
+    for block, settings in zip(sweep.blocks.values(), sweep.sweep["blocks"], strict=True):
+        distances = block.columns["dx"].reshape(len(settings["points"]["method"]), -1).astype(float)
+        for method, walked in zip(settings["points"]["method"][:-1], distances, strict=False):
+            rows.append({"method": method, **change(walked, distances[-1])})
+            print("{method}: {change_percent:+.2f} ± {error:.2f} % ({pairs} pairs)".format(**rows[-1]))
+    write_rows(FOLDER / "results" / f"{sweep.name}.csv", rows, sweep)
+
+
+def main(folder: str, base: Annotated[str | None, typer.Argument()] = None) -> None:
+    """Compare two folders, or the methods of one."""
+    if base is None:
+        return compare_methods(warpchain.load(folder))
     sweeps = warpchain.load(folder), warpchain.load(base)
     compare(*sweeps)
     for sweep in sweeps:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from studies.common import minus
+from studies.paper import figure5
 from studies.paper.statistics import Effect, percent, plain
 from studies.paper.verdicts import BOUNDS, Verdict, direction, share, together
 from studies.waves import directions, doses
@@ -55,6 +56,13 @@ def bounces(numbers: Numbers) -> Found:
     several = int((table >= 2).sum())
     found = {"least": np.nanmin(table), "most": np.nanmax(table), "several": several, "cells": table.size}
     return share(several, table.size), found
+
+
+def velocities(_: Numbers) -> Found:
+    """Height and v_x of a walk look as in Figure 5: the chain bounces again, and v_x does not reverse."""
+    bounces_again, is_forward = figure5.shapes()
+    again, cells, back = int(bounces_again.sum()), len(is_forward), int((~is_forward).sum())
+    return share(int((bounces_again & is_forward).sum()), cells), {"again": again, "cells": cells, "back": back}
 
 
 def shape(numbers: Numbers) -> Found:

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import pytest
 import warpchain
 from tests.support.command_line import Command
 from tests.support.made_sweeps import make_sweep
+from tests.support.made_walks import make_walk
 from tests.support.presets import SOFT
 from tests.support.sweep_content import content
 from warpchain import video
@@ -27,6 +29,13 @@ def joined() -> tuple[Any, Any]:
     half = SOFT.link_length / 2
     turns = [(0.0, -1.0, 0.0), (1.0, 0.0, 0.5), (0.0, 1.0, 1.0), (-1.0, 0.0, 1.5)]
     return [[x * half, 0.1 + y * half, 3.14159265358979 * turn] for x, y, turn in turns], [[0.0] * 3] * 4
+
+
+def saved_walk() -> warpchain.WalkResult:
+    """A walk that was read from its file."""
+    with tempfile.TemporaryDirectory() as folder:
+        make_walk().save(f"{folder}/walk.h5")
+        return warpchain.load_walk(f"{folder}/walk.h5")
 
 
 @pytest.mark.parametrize(
@@ -55,6 +64,15 @@ def joined() -> tuple[Any, Any]:
         (
             lambda: warpchain.simulate("soft", *joined()),
             "duration: missing; set it in s, or set times",
+        ),
+        (
+            lambda: make_walk().energy["potental_at_end"],
+            "'potental_at_end': unknown name; did you mean potential_at_end?",
+        ),
+        (lambda: saved_walk().release["hight"], "'hight': unknown name; did you mean height?"),
+        (
+            lambda: warpchain.simulate("soft", *joined(), times=[0.0]).losses["flor"],
+            "'flor': unknown name; did you mean floor?",
         ),
         (lambda: warpchain.load(None), "path: expected a path, got None; pass it as text"),  # type: ignore[arg-type]
         (lambda: warpchain.load(""), "path: expected a path, got ''; pass it as text"),

@@ -37,4 +37,6 @@ if __name__ == "__main__":
     for number, start in enumerate(STARTS):
         print(f"{start}: median {np.median(percent[..., number]):.1f} %")
         print(percent[..., number].round(1))
-    print(f"all: median {np.median(percent):.1f} %, from {percent.min():.1f} to {percent.max():.1f} %")
+    least, low, middle, high, greatest = np.quantile(percent, [0, 0.25, 0.5, 0.75, 1])
+    print(f"from the sprocket: median {np.median(percent[..., :2]):.1f} %")
+    print(f"all: median {middle:.1f} %, half of them {low:.1f} to {high:.1f} %, all {least:.1f} to {greatest:.1f} %")

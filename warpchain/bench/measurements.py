@@ -57,9 +57,10 @@ def step_costs(device: str, links: Sequence[int], report: Report) -> list[Row]:
     """Cost and error of a step of all methods of a device, and of SciPy's DOP853, at default tolerances.
 
     For each even number of links and each method: `links`, `method`, `tolerance`, `chains` that fly side by side,
-    `microseconds` of wall time that an attempted step of one chain takes, `step` [s], the mean accepted one (of SciPy
-    the attempted one), `rejected`, the share of attempts (NaN for SciPy, which does not tell), `chain_seconds`
-    simulated in a second, and the greatest `position_error` [m] and `velocity_error` [m/s] of a link after
+    `microseconds` that an attempted step of one chain takes, of wall time on a GPU, and on a CPU of the processor's
+    time, which other programs hardly change; `step` [s], the mean accepted one (of SciPy the attempted one),
+    `rejected`, the share of attempts (NaN for SciPy, which does not tell), `chain_seconds` simulated in a second, and
+    the greatest `position_error` [m] and `velocity_error` [m/s] of a link after
     `COMPARED_TIME`. An `InputError` says that there is no such device, a `RuntimeError` that a flight ended early.
     """
     methods = [name for name in method_names() if not (on_gpu(device) and find_method(name).has_rigid_flight)]
@@ -96,9 +97,10 @@ def flying(links: int, device: str = "cpu") -> Motion:
 def fly(start: Motion, method: str, chains: int, device: str) -> tuple[Motion, float, int, int]:
     """Carry identical chains of a batch through the air; a `RuntimeError` says that one did not come to the end.
 
-    The state of a chain after `COMPARED_TIME`; from then on wall time [s], accepted and rejected steps of a chain.
+    The state of a chain after `COMPARED_TIME`; from then on time [s], accepted and rejected steps of a chain.
     """
     worlds, links = range(chains), len(start[0])
+    clock = time.perf_counter if on_gpu(device) else time.process_time
     with gpu_turn([device]):
         batch = Batch(chains, links, Options.model_validate({"method": method, "device": device}))
         for world in batch.worlds:
@@ -109,9 +111,9 @@ def fly(start: Motion, method: str, chains: int, device: str) -> tuple[Motion, f
         one = batch.worlds[0]
         compared, before = (one.position, one.velocity), one.counts
         batch.several(worlds).resume(TIMED, Status.FINISHED)
-        began = time.perf_counter()
+        began = clock()
         batch.run(worlds, features)
-        seconds, after = time.perf_counter() - began, one.counts
+        seconds, after = clock() - began, one.counts
         if (batch.statuses() != Status.FINISHED).any():
             raise RuntimeError(f"{method}: {one.status.sentence}")  # all chains are alike
     return compared, seconds, after["accepted"] - before["accepted"], after["rejected"] - before["rejected"]
@@ -189,7 +191,7 @@ def fly_by_scipy(
 ) -> tuple[Motion, float, float]:
     """Integrate a chain in flight by SciPy's DOP853, at a tolerance that is absolute (SI units) and relative.
 
-    Position and velocity after the duration [s], wall time [s], and attempted steps, accepted or not.
+    Position and velocity after the duration [s], time of the processor [s], and attempted steps, accepted or not.
     """
     from scipy.integrate import solve_ivp
 
@@ -199,9 +201,9 @@ def fly_by_scipy(
         place, rate = state.reshape(start.shape)
         return np.concatenate([rate, acceleration(place, rate, parameters)]).ravel()
 
-    began = time.perf_counter()
+    began = time.process_time()
     done = solve_ivp(rates, (0.0, duration), start.ravel(), "DOP853", [duration], rtol=tolerance, atol=tolerance)
-    seconds = time.perf_counter() - began
+    seconds = time.process_time() - began
     if not done.success:
         raise RuntimeError(f"DOP853 failed: {done.message}")
     end = done.y[:, -1].reshape(start.shape)

@@ -13,7 +13,7 @@ import typer
 from warpchain.chain.keep import FRAME_INTERVAL
 from warpchain.cli.words import JSON, argument, option, output
 from warpchain.inputs.methods import METHODS
-from warpchain.inputs.starts import STARTS
+from warpchain.inputs.starts import DESCRIBED
 
 if TYPE_CHECKING:
     from warpchain.results.sweep_result import SweepResult
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 FAILED: Final = 1
 """Exit status of a command whose walks failed."""
 
-_STARTS: Final = f"{'; '.join(f'{word}: {start.described}' for word, start in STARTS.items())}. Default: rest."
+_STARTS: Final = f"{DESCRIBED}. Default: rest."
 _PRESETS: Final = "Parameters to start from. paper: Table 1 of the paper; soft: softer joints. Default: paper."
 _METHODS: Final = (
     "A solver profile: standard (hybrid on a CPU), explicit (os32, also on a GPU) or reference (rkf78, as in the "

@@ -7,7 +7,7 @@ from pydantic import Field, Strict
 
 from warpchain.inputs.compound_fields import FloorField, Rows
 from warpchain.inputs.options import on_gpu
-from warpchain.inputs.starts import STARTS, StartWord
+from warpchain.inputs.starts import DESCRIBED, STARTS, StartWord
 from warpchain.inputs.validation import InputError, Section, Whole, number_field
 
 MOST_LINKS: Final = 100_000
@@ -42,8 +42,7 @@ class Scene(Section):
     """number of links of the closed chain; must be even if inner and outer links alternate"""
     frequency: float = number_field(15.0, "Hz", symbol="ν", ge=0, le=300.0)  # more is in turns a minute
     """frequency of the sprocket at the release, in revolutions per second"""
-    start: StartWord = "rest"
-    """initial state: at rest on the sprocket, already circulating on it, or a circulating ellipse without a sprocket"""
+    start: StartWord = Field(default="rest", description=f"how a walk begins; {DESCRIBED}")
     phase: float = number_field(0.0, "1", ge=0, lt=1)
     """moment of the release, as a fraction of a loop period"""
     clearance: float = number_field(0.01, "m", ge=0, le=HIGHEST)

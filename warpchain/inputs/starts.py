@@ -19,3 +19,5 @@ STARTS: Final[Mapping[StartWord, Start]] = {
     "ellipse": Start(False, "without a sprocket", "started as an ellipse"),
 }
 """All starts; one without a sprocket has its curve among the `SHAPES` of `warpchain.chain.starts`."""
+DESCRIBED: Final = "; ".join(f"{word}: {start.described}" for word, start in STARTS.items())
+"""All starts for help texts."""

@@ -17,7 +17,7 @@ from warpchain.inputs.keywords import takes_fields
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene, check_links_on_gpu
-from warpchain.inputs.validation import InputError, checked, plain, shown, validated
+from warpchain.inputs.validation import InputError, Named, checked, plain, shown, validated
 from warpchain.status import Status
 
 if TYPE_CHECKING:
@@ -283,8 +283,8 @@ def _follow(batch: Batch, body: str, instants: Array, end: float) -> Trajectory:
         velocity=np.array(velocities),
         steps_accepted=counts["accepted"],
         steps_rejected=counts["rejected"],
-        impulses={kind: counts[kind] for kind in kinds},
-        losses={name: losses[name] for name in LOST},
+        impulses=Named({kind: counts[kind] for kind in kinds}),
+        losses=Named({name: losses[name] for name in LOST}),
         greatest_opening=extremes["opening"],
-        greatest_penetration={kind: extremes[kind] for kind in kinds},
+        greatest_penetration=Named({kind: extremes[kind] for kind in kinds}),
     )

@@ -16,6 +16,7 @@ from warpchain.chain.setup import Setup
 from warpchain.engine.tallies import CONTACTS, COUNTS, DEPTHS, EXTREMES, IMPULSES, LOSSES, LOST
 from warpchain.hdf5_files import Stored
 from warpchain.inputs.arrays import Array
+from warpchain.inputs.validation import Named
 from warpchain.kernels import layout
 from warpchain.status import Status
 from warpchain.walks.landmarks import RELEASE
@@ -128,6 +129,12 @@ class Outcome:
     ]
     release: Annotated[dict[str, float], Stored("m", "geometry of the loop at the release", keys=RELEASE)]
     release_speed: Annotated[float, Stored("m/s", "mean speed of the link centres along the loop at the release")]
+
+    def __post_init__(self) -> None:
+        """Make an unknown key of `energy` and the like an `UnknownNameError`."""
+        for name, value in vars(self).items():
+            if isinstance(value, dict):
+                object.__setattr__(self, name, Named(value))
 
     @property
     def energy_at_release(self) -> float:
