@@ -37,11 +37,18 @@ from warpchain.kernels.physics.elementary import TWO
 from warpchain.kernels.types import Integers, Worlds, read_ground
 
 
+@wp.func
+def driven_world(world: int):
+    """What stands in a launch for the number of a world whose chain hangs on a driven sprocket, and the inverse."""
+    return -1 - world
+
+
 @functools.cache
 def make_advance_block(features: Features, block_dim: int, registers: int | None = None):
     """Kernel with the arguments of :func:`cpu.loop.make_advance`, launched with ``wp.launch_tiled``, one block a world.
 
-    ``block_dim`` is at least the number of links of every chain: a multiple of 4, on a GPU of 32. ``registers``: most
+    With ``features.has_drive`` a world whose chain hangs on a driven sprocket is launched under its
+    :func:`driven_world`. ``block_dim`` is at least the number of links of every chain: a multiple of 4, on a GPU of 32. ``registers``: most
     of a thread on a GPU; None: as many as a block of this size can have. A world's scratch has at least
     :func:`gpu.block_memory.board_rows` rows; lists are as on a CPU.
     """
@@ -71,7 +78,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     common_of, begin, attempt, accept = steps.common_of, steps.begin, steps.attempt, steps.accept
     renew_direction, start_is_finite, opening_of = steps.renew_direction, steps.start_is_finite, steps.opening
     renewed = increments.RENEWED
-    plane = tilting_plane(block_dim, touch.votes) if tilts else upright_plane(features.fixed_body)
+    plane = tilting_plane(block_dim, touch.votes) if tilts else upright_plane(features)
     growth, shrinkage = step_controller(tableau.order, tableau.error_order, wp.float32)
     begin_contacts, look, meet = block_contact_pass(features, block_dim, touch, plane)
     load_run, store_run = block_run(features, touch, plane, steps)
@@ -103,6 +110,11 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     def advance_block(launched: Integers, worlds: Worlds):
         block, lane = wp.tid()
         world = launched[block]
+        is_driven = bool(wp.static(features.is_driven))
+        if wp.static(features.has_drive):
+            is_driven = world < 0
+            if is_driven:
+                world = driven_world(world)
         exchange = wp.tile_empty(shape=(wp.static(EXCHANGED * block_dim),), dtype=real, storage="shared")
         starts = wp.tile_empty(shape=(wp.static(starts_size),), dtype=real, storage="shared")
         errors = wp.tile_empty(shape=(wp.static(block_dim),), dtype=wp.int32, storage="shared")
@@ -130,6 +142,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         run = Run()
         run.ground = read_ground(worlds.model, world)
         run.world = world
+        run.is_driven = is_driven
         run.K = K
         run.kept = wp.array(ptr=memory.ptr, shape=(layout.BOARD_VALUES, wp.static(kept_width)), dtype=wp.float64)
         run.L = wp.array(ptr=list_row.ptr, shape=(wp.static(lists_size),), dtype=wp.int32)

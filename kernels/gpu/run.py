@@ -28,24 +28,27 @@ SHARES = 5
 
 
 @wp.func
-def write_bounds(run: Run, worlds: Worlds, is_driven: bool):
+def write_bounds(run: Run, worlds: Worlds):
     """For one thread: writes on the board what bounds steps, when the next sample or frame is due, and when to stop."""
     K = run.K
-    K[BOARD_VALUES, layout.VALUE_CONTACT_STEP] = contact_step(worlds, run.world, is_driven)
-    tolerance = spring_tolerance(worlds, run.world, is_driven)
+    K[BOARD_VALUES, layout.VALUE_CONTACT_STEP] = contact_step(worlds, run.world, run.is_driven)
+    tolerance = spring_tolerance(worlds, run.world, run.is_driven)
     K[BOARD_VALUES, layout.VALUE_INVERSE_TOLERANCE] = ONE / tolerance
     K[BOARD_VALUES, layout.VALUE_STOP_TIME] = worlds.stop_time[run.world]
     K[BOARD_VALUES, layout.VALUE_NEXT_SAMPLE] = next_mark(worlds, run.world)
 
 
 @functools.cache
-def hits_booking(features: Features, touch: TouchLayout):
-    """Warp function ``book_hits(T, worlds, world)``: a block's impulses go to its world's counters; for one thread."""
-    _, _, fixed_count = of_fixed_body(features.is_driven)
+def hits_booking(touch: TouchLayout):
+    """Warp function ``book_hits(run, worlds)``: a block's impulses go to its world's counters; for one thread."""
+    _, _, floor_count = of_fixed_body(is_driven=False)
+    _, _, sprocket_count = of_fixed_body(is_driven=True)
 
     @wp.func
-    def book_hits(T: Integers, worlds: Worlds, world: int):
-        add_count(worlds, world, fixed_count, wp.int64(T[wp.static(touch.fixed_hits)]))
+    def book_hits(run: Run, worlds: Worlds):
+        T = run.T
+        world = run.world
+        add_count(worlds, world, wp.where(run.is_driven, sprocket_count, floor_count), wp.int64(T[wp.static(touch.fixed_hits)]))
         add_count(worlds, world, SELF_IMPULSES, wp.int64(T[wp.static(touch.self_hits)]))
         add_count(worlds, world, STRAND_IMPULSES, wp.int64(T[wp.static(touch.strand_hits)]))
         T[wp.static(touch.fixed_hits)] = 0
@@ -108,9 +111,9 @@ def block_run(features: Features, touch: TouchLayout, plane: PlaneHooks, steps: 
 
     ``load(run, worlds)``, which ends with a barrier, and ``store(run, worlds, time, status, accepted, attempts)``.
     """
-    is_driven = features.is_driven
-    fixed_loss, fixed_depth, _ = of_fixed_body(features.is_driven)
-    book_hits = hits_booking(features, touch)
+    floor_loss, floor_depth, _ = of_fixed_body(is_driven=False)
+    sprocket_loss, sprocket_depth, _ = of_fixed_body(is_driven=True)
+    book_hits = hits_booking(touch)
     write_sample = observation(features, read_totals)
 
     @wp.func
@@ -129,8 +132,9 @@ def block_run(features: Features, touch: TouchLayout, plane: PlaneHooks, steps: 
         if lane == 0:
             write_constants(K, present_chain(worlds, world))
             plane.load(run)
-            write_bounds(run, worlds, wp.static(is_driven))
+            write_bounds(run, worlds)
             K[BOARD_VALUES, layout.VALUE_OPENING] = worlds.extremes[world, layout.OPENING]
+            fixed_depth = wp.where(run.is_driven, sprocket_depth, floor_depth)
             K[BOARD_VALUES, layout.VALUE_FIXED_DEPTH] = worlds.extremes[world, fixed_depth]
             for k in range(wp.static(touch.touching), wp.static(touch.size)):
                 run.T[k] = 0
@@ -161,12 +165,14 @@ def block_run(features: Features, touch: TouchLayout, plane: PlaneHooks, steps: 
             plane.store(run)
             if is_last:
                 write_sample(K, constants(K), worlds, world, time)
-            store_losses(K, layout.BOARD_LOST_FRICTION, worlds, world, run.links, wp.static(fixed_loss))
+            fixed_loss = wp.where(run.is_driven, sprocket_loss, floor_loss)
+            store_losses(K, layout.BOARD_LOST_FRICTION, worlds, world, run.links, fixed_loss)
             worlds.losses[world, layout.LOSS_SELF] = row_total(K, BOARD_LOST_SELF, run.links)
             add_count(worlds, world, layout.ACCEPTED, wp.int64(accepted))
             add_count(worlds, world, layout.REJECTED, wp.int64(attempts - accepted))
-            book_hits(run.T, worlds, world)
+            book_hits(run, worlds)
             worlds.extremes[world, layout.OPENING] = K[BOARD_VALUES, layout.VALUE_OPENING]
+            fixed_depth = wp.where(run.is_driven, sprocket_depth, floor_depth)
             worlds.extremes[world, fixed_depth] = K[BOARD_VALUES, layout.VALUE_FIXED_DEPTH]
             deepest = wp.cast(run.T[wp.static(touch.deepest)], wp.float32)
             raise_extreme(worlds, world, layout.SELF_DEPTH, wp.float64(deepest))
@@ -183,9 +189,10 @@ def block_sample(features: Features, touch: TouchLayout, plane: PlaneHooks, step
     ``take_sample(run, worlds, time)`` → whether the chain has changed, so that its first stage must be evaluated again;
     whether the launch pauses; status.
     """
-    is_driven = features.is_driven
+    has_drive = features.is_driven or features.has_drive
     sample = sampling(features, read_totals, note_drag)
-    book_hits = hits_booking(features, touch)
+    sample_driven = sampling(features.driven, read_totals, note_drag)
+    book_hits = hits_booking(touch)
 
     @wp.func
     def take_sample(run: Run, worlds: Worlds, time: wp.float64):
@@ -200,14 +207,20 @@ def block_sample(features: Features, touch: TouchLayout, plane: PlaneHooks, step
         if run.lane == 0:
             K[BOARD_VALUES, layout.VALUE_DRAG] = ONE
             plane.store(run)
-            book_hits(T, worlds, world)
+            book_hits(run, worlds)
             chain = constants(K)
-            worlds.status[world] = sample(K, chain, worlds, world, time)
+            if wp.static(features.has_drive):
+                if run.is_driven:
+                    worlds.status[world] = sample_driven(K, chain, worlds, world, time)
+                else:
+                    worlds.status[world] = sample(K, chain, worlds, world, time)
+            else:
+                worlds.status[world] = sample(K, chain, worlds, world, time)
             if has_changed(worlds, world, softness, load_factor):
                 after = present_chain(worlds, world)
                 book_softening(chain, after, worlds, world)
                 write_constants(K, after)
-            write_bounds(run, worlds, wp.static(is_driven))
+            write_bounds(run, worlds)
             if clock() > K[BOARD_VALUES, VALUE_DEADLINE]:
                 T[wp.static(touch.is_late)] = 1
         barrier()
@@ -215,8 +228,8 @@ def block_sample(features: Features, touch: TouchLayout, plane: PlaneHooks, step
         pauses = record_is_full(worlds, world) or T[wp.static(touch.is_late)] != 0
         barrier()
         changed = has_changed(worlds, world, softness, load_factor)
-        if wp.static(is_driven):
-            if run.lane < run.links:
+        if wp.static(has_drive):
+            if run.is_driven and run.lane < run.links:
                 if K[BOARD_VALUES, layout.VALUE_DRAG] != ONE:
                     drag_link(K, run.lane, run.before, run.after, K[BOARD_VALUES, layout.VALUE_DRAG])
                 if changed:

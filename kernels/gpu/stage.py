@@ -19,6 +19,7 @@ class Run:
 
     ground: Ground
     world: wp.int32
+    is_driven: wp.bool  # whether its chain hangs on a driven sprocket
     K: Rows  # the board
     kept: Rows  # rows of the scratch, of which some are kept between launches
     L: Integers  # the neighbour list

@@ -6,6 +6,7 @@ from typing import Any
 
 import warp as wp
 
+from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.contacts.proximity import block_contact
 from warpchain.kernels.gpu.stage import Run
 from warpchain.kernels.hooks import Hooks, hook
@@ -46,15 +47,22 @@ class PlaneHooks(Hooks):
 
 
 @functools.cache
-def upright_plane(fixed_body: str) -> PlaneHooks:
-    """A plane that stays upright, for a key of :data:`contacts.fixed_body.BODIES`."""
-    meet_body = block_contact(fixed_body)
+def upright_plane(features: Features) -> PlaneHooks:
+    """A plane that stays upright."""
+    meet_body = block_contact(features.fixed_body)
+    meet_sprocket = block_contact("sprocket")
 
     @wp.func
     def meet(run: Run, worlds: Worlds, time: wp.float64, gap: wp.float32):
         hits = int(0)
         if run.lane < run.links and gap < wp.float32(0.0):
-            hits = meet_body(run, worlds, time)
+            if wp.static(features.has_drive):
+                if run.is_driven:
+                    hits = meet_sprocket(run, worlds, time)
+                else:
+                    hits = meet_body(run, worlds, time)
+            else:
+                hits = meet_body(run, worlds, time)
         return hits
 
     return PlaneHooks(meet)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
 import warp as wp
@@ -117,9 +118,13 @@ def launch_kernel(batch: Batch, kernel: wp.Kernel, worlds: Sequence[int], attemp
 
 
 def launch_blocks(batch: Batch, features: Features, attempts: int, *, block_dim: int) -> None:
-    """Carry all worlds on in the GPU kernel for these features."""
-    kernel = gpu_loop.make_advance_block(features, block_dim)
-    launch_kernel(batch, kernel, range(len(batch.worlds)), attempts, block_dim=block_dim)
+    """Carry all worlds on in the GPU kernel for these features, which chains on a sprocket share with those on a floor."""
+    worlds = range(len(batch.worlds))
+    if features.fixed_body == "sprocket":
+        features, worlds = replace(features, fixed_body="floor"), range(-1, -1 - len(batch.worlds), -1)
+    shared = replace(features, has_drive=not features.tilts and features.fixed_body != "none")
+    kernel = gpu_loop.make_advance_block(shared, block_dim)
+    launch_kernel(batch, kernel, worlds, attempts, block_dim=block_dim)
 
 
 def launch_chains(batch: Batch, features: Features, attempts: int) -> None:

@@ -156,15 +156,26 @@ class Batch:
         while active := [world for world in worlds if self.statuses()[world] == Status.RUNNING]:
             self.launch(active, features)
 
-    def launch(self, worlds: Sequence[int], features: Features, attempts: int | None = None) -> None:
+    def launch(
+        self,
+        worlds: Sequence[int],
+        features: Features,
+        attempts: int | None = None,
+        driven: NDArray[np.bool_] | None = None,
+    ) -> None:
         """Carry worlds on, see :meth:`start`, and wait for the end of the launch."""
-        self.start({features: worlds}, attempts)
+        self.start({features: worlds}, attempts, driven)
         self.finish()
 
     def start(
-        self, groups: Mapping[Features, Sequence[int] | NDArray[np.integer[Any]]], attempts: int | None = None
+        self,
+        groups: Mapping[Features, Sequence[int] | NDArray[np.integer[Any]]],
+        attempts: int | None = None,
+        driven: NDArray[np.bool_] | None = None,
     ) -> None:
         """Begin to carry on groups of worlds, each with its own features, by at most this many attempts, or `ATTEMPTS`.
+
+        `driven`, (W,): whether the chain of each world hangs on a driven sprocket, for features with `has_drive`.
 
         A kernel that is not loaded yet is loaded, and compiled if need be, which takes seconds.
         Until :meth:`finish` the host may not read the worlds. On a GPU this returns at once.
@@ -177,6 +188,9 @@ class Batch:
                 wp.launch(kernel, dim=len(worlds), inputs=[numbers, self.state], device=self.device.warp)
             return
         order = np.concatenate([*groups.values()])
+        if driven is not None:
+            has_drive = np.repeat([features.has_drive for features in groups], [*map(len, groups.values())])
+            order = np.where(has_drive & driven[order], -1 - order, order)  # see `gpu.loop.driven_world`
         self._host["worlds"][: len(order)] = order
         self._stream.wait_stream(self._gpu.filling)
         self._numbers.upload()

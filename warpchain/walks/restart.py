@@ -44,7 +44,7 @@ def state_at(setup: Setup, t: object, end: float) -> State:
             while not (has_come := run.is_free and world.time >= time) and world.status == Status.RUNNING:
                 before = world.snapshot() if run.is_free else None
                 assert run.features is not None
-                batch.launch([0], run.features, attempts)
+                batch.launch([0], run.features, attempts, np.array([run.is_driven]))
                 if before is not None and world.time >= time and attempts > 1:
                     world.restore(before)
                     attempts = max(1, attempts // 8)

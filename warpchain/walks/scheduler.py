@@ -189,6 +189,7 @@ class BatchRun:
         self._running: dict[int, tuple[int, WalkRun]] = {}
         self._kernels = list[Features]()
         self._kernel = np.full(len(batch.worlds), -1)  # that each world needs, by its number; −1: it is free
+        self._is_driven = np.zeros(len(batch.worlds), dtype=bool)
 
     @property
     def filled_share(self) -> float:
@@ -210,7 +211,7 @@ class BatchRun:
             if kernel in self._kernel
         }
         if together:
-            self.batch.start(together)
+            self.batch.start(together, driven=self._is_driven)
         return bool(together)
 
     def finish(self) -> list[tuple[int, WalkRun]]:
@@ -233,6 +234,7 @@ class BatchRun:
         for world, (_, run) in walks.items():
             if run.features is not None and run.features not in self._kernels:
                 self._kernels.append(run.features)
+            self._is_driven[world] = run.is_driven
             self._kernel[world] = -1 if run.features is None else self._kernels.index(run.features)
 
 

@@ -25,6 +25,7 @@ from warpchain.chain.sprocket_motion import motion_rows
 from warpchain.chain.starts import Motion, first_motions
 from warpchain.engine.world import CACHES, World
 from warpchain.inputs.arrays import Array
+from warpchain.inputs.options import on_gpu
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.status import Status
@@ -59,22 +60,35 @@ class Progress:
 
 
 def phase_features(setup: Setup) -> dict[str, Features]:
-    """What kernels are compiled for in those phases that a walk has: `driven`, `moving` (beside a sprocket), `free`."""
+    """What kernels are compiled for in those phases that a walk has: `driven`, `moving` (beside a sprocket), `free`.
+
+    On a GPU chains with a driven sprocket and those with a floor share a kernel: the instructions of two do not fit
+    into the cache of a multiprocessor, and blocks of both would wait for them.
+    """
     scene, options, columns = setup.scene, setup.options, layout.padded_width(setup.scene.links)
     body, tilts = "floor" if scene.is_level else setup.floor.body, scene.plane == "tilting"
     own = options.method, columns, options.self_contact, options.is_mixed
-    return _kernels(*own, body, tilts, setup.has_drive, scene.release is not None)
+    shares = on_gpu(options.device) and not tilts
+    return _kernels(*own, body, tilts, shares, setup.has_drive, scene.release is not None)
 
 
 @functools.cache
 def _kernels(
-    method: str, columns: int, contact: bool, is_mixed: bool, body: str, tilts: bool, has_drive: bool, moves: bool
+    method: str,
+    columns: int,
+    contact: bool,
+    is_mixed: bool,
+    body: str,
+    tilts: bool,
+    shares: bool,
+    has_drive: bool,
+    moves: bool,
 ) -> dict[str, Features]:
-    """See `phase_features`; `moves`: whether the sprocket moves after the release."""
+    """See `phase_features`; `shares`: one kernel, `moves`: whether the sprocket moves after the release."""
     features = partial(Features, method, columns, self_contact=contact, is_mixed=is_mixed)
-    found = {"free": features(body, tilts=tilts)}
+    found = {"free": features(body, tilts=tilts, has_drive=shares)}
     if has_drive:
-        found["driven"] = features("sprocket")
+        found["driven"] = found["free"] if shares else features("sprocket")
         if moves:
             found["moving"] = features(body, tilts=tilts, moving_sprocket=True)
     return found
@@ -116,6 +130,11 @@ class WalkRun:
     def is_free(self) -> bool:
         """Whether the chain walks without a sprocket, and all that its start brings has been done."""
         return self._next is None
+
+    @property
+    def is_driven(self) -> bool:
+        """Whether its chain hangs on a driven sprocket."""
+        return not self.is_released and self.setup.has_drive
 
     def enter(self, kernel: str, following: "Phase | None") -> None:
         """Be in a phase with a kernel of `phase_features`, and know what begins when its chain stops."""

@@ -137,7 +137,7 @@ def block_contact_pass(features: Features, block_dim: int, touch: TouchLayout, p
             if gap < wp.float32(0.0) and lane == 0:
                 raise_value(run.K, layout.VALUE_FIXED_DEPTH, -gap)
                 if wp.static(features.has_floor):
-                    if is_hit:
+                    if is_hit and not run.is_driven:
                         note_floor_impulse(worlds, run.world, time)
         if wp.static(has_self):
             if is_stale:

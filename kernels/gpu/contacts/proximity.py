@@ -8,6 +8,7 @@ from warpchain.kernels import layout
 from warpchain.kernels.contacts.fixed_body import BODIES, link_and_body
 from warpchain.kernels.contacts.impulse import Touching
 from warpchain.kernels.contacts.pair_list import MOST_WAY
+from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.contacts.tilting_floor import greatest_across_speed, middle_height, steepness
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.board import ends_of
@@ -69,11 +70,12 @@ def touching_link(run: Run) -> Touching:
 @functools.cache
 def block_proximity(features: Features, block_dim: int):
     """Warp functions (write_proximity, read_proximity, time_to_contact) for these features."""
-    has_fixed = features.fixed_body != "none"
+    has_fixed, has_drive = features.fixed_body != "none", features.has_drive
     has_self = features.self_contact
     if has_fixed:
         gap_of, _meet = link_and_body(features.fixed_body)
         face_of = BODIES[features.fixed_body].face
+    sprocket_gap_of, _meet = link_and_body("sprocket")
     tilts = features.tilts
     _maximum, write_maxima, read_maxima = block_maxima(block_dim)
 
@@ -104,7 +106,14 @@ def block_proximity(features: Features, block_dim: int):
                 own_gap = wp.float32(wp.min(left, right) - felt.half_width * wp.abs(felt.up_z))
             else:
                 own = with_circles(constants(K), K[RADIUS, run.column])
-                own_gap = wp.float32(gap_of(own, run.ground, face_of(run.ground), placed_link(link, cosine, sine)))
+                placed = placed_link(link, cosine, sine)
+                if wp.static(has_drive):
+                    if run.is_driven:
+                        own_gap = wp.float32(sprocket_gap_of(own, run.ground, Face(), placed))
+                    else:
+                        own_gap = wp.float32(gap_of(own, run.ground, face_of(run.ground), placed))
+                else:
+                    own_gap = wp.float32(gap_of(own, run.ground, face_of(run.ground), placed))
             values[1] = order_key_single(-own_gap)
         if wp.static(has_self):
             dx = wp.float32(right_x - K[layout.BOARD_LISTED_X, run.column])
