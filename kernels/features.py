@@ -1,6 +1,6 @@
 """What a step kernel is compiled for, and the compiler's flags."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +34,7 @@ class Features:
     tilts: bool = False
     load: str = "weight"  # a key of :data:`physics.load.LOADS`
     moving_sprocket: bool = False  # whether the sprocket is there as well, above a floor, and moves
-    # of a GPU: whether chains may hang on a driven sprocket instead of that body, see :mod:`gpu.loop`
+    # GPU: whether chains may hang on a driven sprocket instead of meeting that body, see :mod:`gpu.loop`
     has_drive: bool = False
     is_mixed: bool = False  # whether stages on springs are in single precision, see :mod:`physics.increments`
 
@@ -44,11 +44,6 @@ class Features:
         from warpchain.kernels.contacts.fixed_body import BODIES  # only a kernel that is compiled needs its source
 
         return BODIES[self.fixed_body].is_driven
-
-    @property
-    def driven(self) -> "Features":
-        """The same for the chains on a driven sprocket."""
-        return replace(self, fixed_body="sprocket", has_drive=False)
 
     @property
     def acceleration(self) -> Any:

@@ -86,7 +86,7 @@ def make_advance(features: Features):
         """Takes a sample → the chain as the sample has left it."""
         softness = worlds.softness[world]
         load_factor = worlds.load_factor[world]
-        worlds.status[world] = sample(K, chain, worlds, world, worlds.time[world])
+        worlds.status[world] = sample(K, chain, worlds, world, worlds.time[world], wp.static(features.is_driven))
         after = chain
         if has_changed(worlds, world, softness, load_factor):
             after = present_chain(worlds, world)

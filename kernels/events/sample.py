@@ -58,19 +58,21 @@ def observation(features: Features, summarise: Any = summarise):
 def sampling(features: Features, summarise: Any = summarise, drag_shape: Any = drag_shape):
     """Warp function of a sample of a chain whose ends are placed: time series, frame, watches.
 
-    ``sample(K, chain, worlds, world, time)`` → status. It is called at or after
+    ``sample(K, chain, worlds, world, time, is_driven)`` → status; ``is_driven``: whether the chain hangs on a driven
+    sprocket. It is called at or after
     :func:`next_mark`. If only a frame is due, nothing but the record changes. It may also change the softness of the
     joints, and on a sprocket the chain's loads and the velocities of its links.
 
     On a sprocket it watches until the loop is stationary, on a floor until the chain rests or is far. The sums of a
     plane that tilts must be those of the present state. ``drag_shape(K, chain, left)`` drags all links.
     """
-    has_floor, is_driven = features.has_floor, features.is_driven
+    has_floor, may_be_free = features.has_floor, not features.is_driven
+    may_be_driven = features.is_driven or features.has_drive
     write = observation(features, summarise)
     append_frame = write_frame_in_room if features.tilts else write_frame
 
     @wp.func
-    def sample(K: Rows, chain: Chain, worlds: Worlds, world: int, time: wp.float64):
+    def sample(K: Rows, chain: Chain, worlds: Worlds, world: int, time: wp.float64, is_driven: bool):
         frame_mark = worlds.next_frame[world]
         if frame_mark >= wp.int64(0) and time >= wp.float64(frame_mark) * worlds.control.frame_interval:
             append_frame(K, chain, worlds, world, time)
@@ -86,22 +88,25 @@ def sampling(features: Features, summarise: Any = summarise, drag_shape: Any = d
             append_frame(K, chain, worlds, world, time)
         passed = wp.int64(wp.floor(time / worlds.control.sample_interval))
         worlds.next_sample[world] = wp.max(mark, passed) + wp.int64(1)
-        if wp.static(not is_driven):
-            watch_ending(worlds, world, time, area, is_first)
-        if wp.static(has_floor):
-            watch_stiffening(worlds, world, time)
-            watch_collapse(chain, worlds, world, time, area, is_first)
-        if wp.static(features.tilts):
-            watch_fall(worlds, world, time)
-        if wp.static(has_floor):
-            return watch_rest(worlds, world, worlds.last_sample[world])
-        if wp.static(is_driven):
-            if worlds.load_factor[world] > wp.float64(1.0):
-                rate = drag_rate(chain, worlds, world, worlds.last_sample[world, HEIGHT])
-                drag_shape(K, chain, wp.exp(-rate * (time - last_time)))
-            watch_steadiness(chain, worlds, world, worlds.last_sample[world])
-            worlds.load_factor[world] = load_at(worlds, world, time)
-            watch_drive(worlds, world, time)
-        return RUNNING
+        status = int(RUNNING)
+        if wp.static(may_be_free):
+            if not is_driven:
+                watch_ending(worlds, world, time, area, is_first)
+                if wp.static(has_floor):
+                    watch_stiffening(worlds, world, time)
+                    watch_collapse(chain, worlds, world, time, area, is_first)
+                if wp.static(features.tilts):
+                    watch_fall(worlds, world, time)
+                if wp.static(has_floor):
+                    status = watch_rest(worlds, world, worlds.last_sample[world])
+        if wp.static(may_be_driven):
+            if is_driven:
+                if worlds.load_factor[world] > wp.float64(1.0):
+                    rate = drag_rate(chain, worlds, world, worlds.last_sample[world, HEIGHT])
+                    drag_shape(K, chain, wp.exp(-rate * (time - last_time)))
+                watch_steadiness(chain, worlds, world, worlds.last_sample[world])
+                worlds.load_factor[world] = load_at(worlds, world, time)
+                watch_drive(worlds, world, time)
+        return status
 
     return sample

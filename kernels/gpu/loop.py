@@ -47,8 +47,8 @@ def driven_world(world: int):
 def make_advance_block(features: Features, block_dim: int, registers: int | None = None):
     """Kernel with the arguments of :func:`cpu.loop.make_advance`, launched with ``wp.launch_tiled``, one block a world.
 
-    With ``features.has_drive`` a world whose chain hangs on a driven sprocket is launched under its
-    :func:`driven_world`. ``block_dim`` is at least the number of links of every chain: a multiple of 4, on a GPU of 32. ``registers``: most
+    If ``features.has_drive``, worlds whose chains hang on a driven sprocket are launched as :func:`driven_world`.
+    ``block_dim`` is at least the number of links of every chain: a multiple of 4, on a GPU of 32. ``registers``: most
     of a thread on a GPU; None: as many as a block of this size can have. A world's scratch has at least
     :func:`gpu.block_memory.board_rows` rows; lists are as on a CPU.
     """

@@ -48,7 +48,8 @@ def hits_booking(touch: TouchLayout):
     def book_hits(run: Run, worlds: Worlds):
         T = run.T
         world = run.world
-        add_count(worlds, world, wp.where(run.is_driven, sprocket_count, floor_count), wp.int64(T[wp.static(touch.fixed_hits)]))
+        fixed_count = wp.where(run.is_driven, sprocket_count, floor_count)
+        add_count(worlds, world, fixed_count, wp.int64(T[wp.static(touch.fixed_hits)]))
         add_count(worlds, world, SELF_IMPULSES, wp.int64(T[wp.static(touch.self_hits)]))
         add_count(worlds, world, STRAND_IMPULSES, wp.int64(T[wp.static(touch.strand_hits)]))
         T[wp.static(touch.fixed_hits)] = 0
@@ -191,7 +192,6 @@ def block_sample(features: Features, touch: TouchLayout, plane: PlaneHooks, step
     """
     has_drive = features.is_driven or features.has_drive
     sample = sampling(features, read_totals, note_drag)
-    sample_driven = sampling(features.driven, read_totals, note_drag)
     book_hits = hits_booking(touch)
 
     @wp.func
@@ -209,13 +209,7 @@ def block_sample(features: Features, touch: TouchLayout, plane: PlaneHooks, step
             plane.store(run)
             book_hits(run, worlds)
             chain = constants(K)
-            if wp.static(features.has_drive):
-                if run.is_driven:
-                    worlds.status[world] = sample_driven(K, chain, worlds, world, time)
-                else:
-                    worlds.status[world] = sample(K, chain, worlds, world, time)
-            else:
-                worlds.status[world] = sample(K, chain, worlds, world, time)
+            worlds.status[world] = sample(K, chain, worlds, world, time, run.is_driven)
             if has_changed(worlds, world, softness, load_factor):
                 after = present_chain(worlds, world)
                 book_softening(chain, after, worlds, world)

@@ -56,11 +56,8 @@ def upright_plane(features: Features) -> PlaneHooks:
     def meet(run: Run, worlds: Worlds, time: wp.float64, gap: wp.float32):
         hits = int(0)
         if run.lane < run.links and gap < wp.float32(0.0):
-            if wp.static(features.has_drive):
-                if run.is_driven:
-                    hits = meet_sprocket(run, worlds, time)
-                else:
-                    hits = meet_body(run, worlds, time)
+            if wp.static(features.has_drive) and run.is_driven:
+                hits = meet_sprocket(run, worlds, time)
             else:
                 hits = meet_body(run, worlds, time)
         return hits

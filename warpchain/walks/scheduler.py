@@ -189,7 +189,7 @@ class BatchRun:
         self._running: dict[int, tuple[int, WalkRun]] = {}
         self._kernels = list[Features]()
         self._kernel = np.full(len(batch.worlds), -1)  # that each world needs, by its number; −1: it is free
-        self._is_driven = np.zeros(len(batch.worlds), dtype=bool)
+        self._is_driven = np.zeros(len(batch.worlds), dtype=bool)  # whether its chain hangs on a driven sprocket
 
     @property
     def filled_share(self) -> float:

@@ -70,7 +70,7 @@ def touching_link(run: Run) -> Touching:
 @functools.cache
 def block_proximity(features: Features, block_dim: int):
     """Warp functions (write_proximity, read_proximity, time_to_contact) for these features."""
-    has_fixed, has_drive = features.fixed_body != "none", features.has_drive
+    has_fixed = features.fixed_body != "none"
     has_self = features.self_contact
     if has_fixed:
         gap_of, _meet = link_and_body(features.fixed_body)
@@ -107,11 +107,8 @@ def block_proximity(features: Features, block_dim: int):
             else:
                 own = with_circles(constants(K), K[RADIUS, run.column])
                 placed = placed_link(link, cosine, sine)
-                if wp.static(has_drive):
-                    if run.is_driven:
-                        own_gap = wp.float32(sprocket_gap_of(own, run.ground, Face(), placed))
-                    else:
-                        own_gap = wp.float32(gap_of(own, run.ground, face_of(run.ground), placed))
+                if wp.static(features.has_drive) and run.is_driven:
+                    own_gap = wp.float32(sprocket_gap_of(own, run.ground, Face(), placed))
                 else:
                     own_gap = wp.float32(gap_of(own, run.ground, face_of(run.ground), placed))
             values[1] = order_key_single(-own_gap)
