@@ -33,7 +33,7 @@ SHARED_WALKS = 2000
 On an H200 the 504 walks of Figure 6 took 3.7 s in blocks of five sizes, each with a kernel of its own, and 2.4 s in
 blocks of 192 threads, some of them idle. 2016 walks took as long in both.
 """
-DRAWN_TOGETHER = 32
+DRAWN_TOGETHER = 64
 """Walks that are drawn and laid together, ahead of the worlds that they will have.
 
 To lay w chains takes about F + c w, with F as much as 10 to 20 chains: Python's part, beside that of the numbers. For
@@ -97,7 +97,7 @@ def _groups(setups: Sequence[Setup], walks: int) -> list[list[int]]:
         shares = not on_gpu(setup.options.device) or (walks <= SHARED_WALKS and size <= SHARED_THREADS)
         alike[layout.padded_width(links), 0 if shares else size, setup.options].append(place)
     for places in alike.values():
-        places.sort(key=lambda place: (-setups[place].scene.frequency, -setups[place].scene.links))
+        places.sort(key=lambda place: (-setups[place].scene.frequency, -setups[place].scene.links, setups[place].scene.start))
     return sorted(alike.values(), key=lambda places: -max(setups[place].scene.links for place in places))
 
 
