@@ -325,7 +325,7 @@ def run_shards(planned: Sweep, directory: str, seal: str, shards: Sequence[Shard
     missing = np.bincount(of_walk)
 
     def draw(places: Sequence[int]) -> list[Setup]:
-        drawn = [planned.with_draws(walks[place]) for place in places]
+        drawn = planned.with_draws([walks[place] for place in places])
         fill_drawn(rows, places, [walk.draws for walk in drawn])
         return [walk.setup for walk in drawn]
 
