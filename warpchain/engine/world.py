@@ -226,6 +226,12 @@ class World:
         return np.array(self._host["model/chains"][name][self._at])
 
     @property
+    def radius(self) -> Array:
+        """Radius of the circles of each link [m]."""
+        radii: Array = self._host["model/links"][self._at, layout.OWN_RADIUS, : self.links]
+        return radii
+
+    @property
     def link_values(self) -> LinkValues:
         """What each link and joint has of its own."""
         rows = self._host["model/links"][self._at, :, : self.links]

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.chain.floor import circles_of, raised_by
+from warpchain.chain.floor import raised_by
 from warpchain.chain.keep import NOTHING, Keep
 from warpchain.chain.setup import Setup
 from warpchain.chain.sprocket_motion import motion_rows
@@ -297,9 +297,9 @@ def _walk_from_change(runs: Sequence[WalkRun]) -> None:
 
 def _raised(runs: Sequence[WalkRun], position: Array, clearances: Array) -> Array:
     """How far chains at these positions must be raised to their clearances [m], (w,)."""
-    circles = circles_of(position, np.array([run.setup.parameters.link_length for run in runs]))
-    radius = _together(runs).link_values.radius
-    return raised_by([run.setup.floor for run in runs], circles, np.tile(radius, 2), clearances)
+    floors = [None if run.setup.scene.is_level else run.setup.floor for run in runs]
+    lengths = np.array([run.setup.parameters.link_length for run in runs])
+    return raised_by(floors, position, lengths, _together(runs).radius, clearances)
 
 
 def _release(runs: Sequence[WalkRun], position: Array, velocity: Array) -> None:
