@@ -23,21 +23,25 @@ MISFIT: Final = 1e-9
 """Greatest relative error of a link's length in a chain that is laid."""
 
 
+CACHED: Final = 16
+"""Chains whose curves are divided finely at the same time: such arrays stay in a core's cache."""
+
+
 @dataclass(frozen=True)
 class Curve:
     """A family of closed curves P(s, size), clockwise in s, for w chains at once.
 
     `points` maps s, (m, w), and sizes, (w,), to P [m], ∂P/∂s, and ∂P/∂size at fixed s, (2, m, w) each; `period` sizes
     to the periods of s, and `period_growth` is their derivative; `first_size` maps lengths of chains [m] to sizes for
-    Newton's method to start from. `pace` maps s and sizes to |∂P/∂s|, (m, w), where s is an angle, of period 2π; if s
-    is a length along the curve, it is None.
+    Newton's method to start from. `pace` maps s, (m, k), all sizes and the numbers of k chains to |∂P/∂s|, (m, k), where
+    s is an angle, of period 2π; if s is a length along the curve, it is None.
     """
 
     points: Callable[[Array, Array], tuple[Array, Array, Array]]
     period: Callable[[Array], Array]
     period_growth: float
     first_size: Callable[[Array], Array]
-    pace: Callable[[Array, Array], Array] | None = None
+    pace: Callable[[Array, Array, NDArray[np.intp]], Array] | None = None
 
 
 def stadium(radius: ArrayLike) -> Curve:
@@ -95,11 +99,11 @@ def ellipse(aspect: ArrayLike) -> Curve:
         along = np.stack([wide * cosine, -high * sine])
         return scale * unit, scale * along, unit
 
-    def pace(s: Array, scale: Array) -> Array:
+    def pace(s: Array, scale: Array, at: NDArray[np.intp]) -> Array:
         across, up = np.cos(s), np.sin(s)
         for way, half in ((across, wide), (up, high)):
-            way *= half
-            way *= scale
+            way *= np.broadcast_to(half, len(scale))[at]
+            way *= scale[at]
             way *= way
         across += up
         return np.sqrt(across, out=across)
@@ -199,13 +203,18 @@ def _dot(first: Array, second: Array) -> Array:
     return products
 
 
-def _evenly_spaced(pace: Callable[[Array, Array], Array], links: int, first: Array, size: Array) -> Array:
+def _evenly_spaced(
+    pace: Callable[[Array, Array, NDArray[np.intp]], Array], links: int, first: Array, size: Array
+) -> Array:
     """Places s, (n, w), of joints that divide each curve into arcs of about equal length from a first place on, (w,)."""
-    fine = first + np.linspace(0.0, 2 * np.pi, 1024)[:, np.newaxis]
-    paces, arc = pace(fine, size), np.zeros_like(fine)
-    np.cumsum((paces[1:] + paces[:-1]) / 2 * (fine[1:] - fine[:-1]), axis=0, out=arc[1:])
-    marks = arc[-1] * np.arange(links)[:, np.newaxis] / links
-    return np.stack([np.interp(*each) for each in zip(marks.T, arc.T, fine.T, strict=True)], axis=1)
+    places = np.empty((links, len(size)))
+    for at in np.split(np.arange(len(size)), range(CACHED, len(size), CACHED)):
+        fine = first[at, np.newaxis] + np.linspace(0.0, 2 * np.pi, 1024)
+        paces, arc = pace(fine.T, size, at).T, np.zeros_like(fine)
+        np.cumsum((paces[:, 1:] + paces[:, :-1]) / 2 * (fine[:, 1:] - fine[:, :-1]), axis=1, out=arc[:, 1:])
+        marks = arc[:, -1:] * np.arange(links) / links
+        places[:, at] = np.transpose([np.interp(*each) for each in zip(marks, arc, fine, strict=True)])
+    return places
 
 
 def _solve_loop(to_here: Array, to_following: Array, to_size: Array, right: Array) -> Array:
