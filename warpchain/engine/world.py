@@ -32,6 +32,9 @@ Snapshot = Mapping[str, NDArray[Any]]
 
 KEPT: Final = ("state/", "drive/")
 """How the names of arrays begin that are kept."""
+RESULTS: Final = ("model/chains", *(f"state/{name}" for name in (
+    "time", "watch", "first_sample", "last_sample", "counts", "extremes", "losses")))
+"""Names of the arrays that say how a run went."""
 CACHES: Final = ("scratch", "lists")
 """What follows from the state but for rounding, and fits a chain of the same constants and options only."""
 _LAYOUT: Final = "layout"
@@ -99,6 +102,17 @@ class World:
     def together(cls, worlds: Sequence["World"]) -> "World":
         """Several worlds of one batch as one."""
         return cls([world._at for world in worlds], worlds[0]._host, worlds[0]._caches)
+
+    def taken(self) -> "World":
+        """A copy of `RESULTS` of several worlds, which may be used again; nothing else can be read from it."""
+        parts = {name: self._host[name].take(self._at, axis=0) for name in RESULTS}
+        return World(range(len(self._at)), {**self._host, **parts}, {})
+
+    @classmethod
+    def joined(cls, taken: Sequence["World"]) -> "World":
+        """What was `taken` from worlds of any batches, one behind the other."""
+        parts = {name: np.concatenate([each._host[name] for each in taken]) for name in RESULTS}
+        return cls(range(sum(len(each._at) for each in taken)), {**taken[0]._host, **parts}, {})
 
     @property
     def links(self) -> int:

@@ -176,11 +176,17 @@ def go_on(runs: Sequence[WalkRun]) -> None:
         begin(group)
 
 
-def outcomes(runs: Sequence[WalkRun]) -> dict[str, Any]:
-    """The numbers of walks that are over, see `outcomes_of`."""
+def taken(runs: Sequence[WalkRun]) -> World:
+    """What `outcomes` reads of the worlds of walks that are over, which others may use then."""
+    return _together(runs).taken()
+
+
+def outcomes(runs: Sequence[WalkRun], worlds: Sequence[World] = ()) -> dict[str, Any]:
+    """The numbers of walks that are over, see `outcomes_of`, from their own worlds or from those that were `taken`."""
     setups, statuses = [run.setup for run in runs], [run.status for run in runs]
     driven, released = [run.driven for run in runs], [run.is_released for run in runs]
-    return outcomes_of(_together(runs), setups, statuses, driven, released)
+    world = World.joined(worlds) if worlds else _together(runs)
+    return outcomes_of(world, setups, statuses, driven, released)
 
 
 def _together(runs: Sequence[WalkRun]) -> World:
