@@ -176,7 +176,8 @@ def first_draws(
 
     All samples draw the same q quantities from distributions of the same kinds, each from a generator of its own.
     """
-    tables = {id(each): np.array([law.line + law.bounds for law in each.values()]) for each in distributions}
+    different = {id(each): each for each in distributions}
+    tables = {key: np.array([law.line + law.bounds for law in each.values()]) for key, each in different.items()}
     start, scale, least, most = np.moveaxis(np.stack([tables[id(each)] for each in distributions]), -1, 0)
     kinds = [(kind, len([*laws])) for kind, laws in groupby(law.standard for law in distributions[0].values())]
     drawn = np.empty_like(start)
