@@ -94,25 +94,26 @@ class World:
         """See worlds by their numbers in the arrays of a batch, those on the host and those that stay on the device."""
         self._at: Any = at if isinstance(at, int) else np.asarray(at, dtype=np.intp)
         self._host, self._caches = host, caches
-        self.records = host["record/samples"].shape[1] > 0 or host["record/frames"].shape[1] > 0
-        """Whether samples or frames are kept."""
-        self._longest = host["state/links"].shape[2]
 
     @classmethod
     def together(cls, worlds: Sequence["World"]) -> "World":
         """Several worlds of one batch as one."""
         return cls([world._at for world in worlds], worlds[0]._host, worlds[0]._caches)
 
+    @property
+    def records(self) -> bool:
+        """Whether samples or frames are kept."""
+        return self._host["record/samples"].shape[1] > 0 or self._host["record/frames"].shape[1] > 0
+
     def taken(self) -> "World":
         """A copy of `RESULTS` of several worlds, which may be used again; nothing else can be read from it."""
-        parts = {name: self._host[name].take(self._at, axis=0) for name in RESULTS}
-        return World(range(len(self._at)), {**self._host, **parts}, {})
+        return World(range(len(self._at)), {name: self._host[name].take(self._at, axis=0) for name in RESULTS}, {})
 
     @classmethod
     def joined(cls, taken: Sequence["World"]) -> "World":
         """What was `taken` from worlds of any batches, one behind the other."""
         parts = {name: np.concatenate([each._host[name] for each in taken]) for name in RESULTS}
-        return cls(range(sum(len(each._at) for each in taken)), {**taken[0]._host, **parts}, {})
+        return cls(range(sum(len(each._at) for each in taken)), parts, {})
 
     @property
     def links(self) -> int:
@@ -289,7 +290,7 @@ class World:
             times=times[:count].copy(),
             frames=rows[:, : 2 * n].reshape(-1, 2, n).transpose(0, 2, 1).copy(),
             loads=loads[:count, : 3 * n].reshape(-1, 3, n).transpose(0, 2, 1).copy(),
-            planes=rows[:, 2 * self._longest :].reshape(-1, layout.PLANE_VALUES).copy(),
+            planes=rows[:, 2 * self._host["state/links"].shape[2] :].reshape(-1, layout.PLANE_VALUES).copy(),
         )
 
     def snapshot(self) -> dict[str, NDArray[Any]]:

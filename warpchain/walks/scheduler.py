@@ -204,11 +204,8 @@ class BatchRun:
         }
         self._running |= begun
         self._go_on(begun)
-        together = {
-            features: np.flatnonzero(self._kernel == kernel)
-            for kernel, features in enumerate(self._kernels)
-            if kernel in self._kernel
-        }
+        together = {features: np.flatnonzero(self._kernel == kernel) for kernel, features in enumerate(self._kernels)}
+        together = {features: worlds for features, worlds in together.items() if len(worlds)}
         if together:
             self.batch.start(together)
         return bool(together)
@@ -228,12 +225,14 @@ class BatchRun:
 
     def _go_on(self, walks: Mapping[int, tuple[int, WalkRun]]) -> None:
         """Begin the next phase of walks on worlds, and note what kernels these need."""
-        if walks:
-            go_on([run for _, run in walks.values()])
-        for world, (_, run) in walks.items():
-            if run.features is not None and run.features not in self._kernels:
-                self._kernels.append(run.features)
-            self._kernel[world] = -1 if run.features is None else self._kernels.index(run.features)
+        if not walks:
+            return
+        go_on([run for _, run in walks.values()])
+        wanted = [run.features for _, run in walks.values()]
+        different = {id(features): features for features in wanted}  # which are compared slowly
+        self._kernels += (each for each in different.values() if each is not None and each not in self._kernels)
+        numbers = {key: -1 if each is None else self._kernels.index(each) for key, each in different.items()}
+        self._kernel[[*walks]] = [numbers[id(features)] for features in wanted]
 
 
 def _run_groups(

@@ -155,8 +155,8 @@ class WalkRun:
         self.recorder.drain(self.is_released)
 
 
-Phase = Callable[[Sequence[WalkRun]], None]
-"""What begins a phase of walks that are alike."""
+Phase = Callable[[Sequence[WalkRun], World], None]
+"""What begins a phase of walks that are alike, given their worlds as one."""
 
 
 def go_on(runs: Sequence[WalkRun]) -> None:
@@ -173,7 +173,7 @@ def go_on(runs: Sequence[WalkRun]) -> None:
         else:
             alike[run._next, setup.scene.links, setup.scene.start, setup.start is None].append(run)
     for (begin, *_), group in alike.items():
-        begin(group)
+        begin(group, _together(group))
 
 
 def taken(runs: Sequence[WalkRun]) -> World:
@@ -194,9 +194,9 @@ def _together(runs: Sequence[WalkRun]) -> World:
     return World.together([run.world for run in runs])
 
 
-def _begin(runs: Sequence[WalkRun]) -> None:
+def _begin(runs: Sequence[WalkRun], world: World) -> None:
     """Set worlds up, and begin the first phase."""
-    world, setups = _together(runs), [run.setup for run in runs]
+    setups = [run.setup for run in runs]
     world.set_up(setups)
     if setups[0].start is not None:
         for run in runs:
@@ -204,7 +204,7 @@ def _begin(runs: Sequence[WalkRun]) -> None:
         return
     position, velocity = (np.array(parts) for parts in zip(*(run._motion for run in runs if run._motion), strict=True))
     if not setups[0].has_drive:
-        _release(runs, position, velocity)
+        _release(runs, world, position, velocity)
         return
     drives = drives_of(setups, world.link_values)
     world.set_drive(**drives)
@@ -214,35 +214,34 @@ def _begin(runs: Sequence[WalkRun]) -> None:
     settled = np.array([setup.settling_time for setup in setups])
     world.load(position, velocity, stop_time=settled, stop_status=Status.FINISHED, softness=drives["hold_softness"])
     if setups[0].scene.start != "rest":
-        _hold(runs)
+        _hold(runs, world)
 
 
-def _spin_up(runs: Sequence[WalkRun]) -> None:
+def _spin_up(runs: Sequence[WalkRun], world: World) -> None:
     """Note how chains hang at rest; their sprockets go on and turn."""
     clearances = np.array([run.setup.scene.clearance for run in runs])
-    for run, hanging in zip(runs, _raised(runs, _together(runs).position, clearances).tolist(), strict=True):
+    for run, hanging in zip(runs, _raised(runs, world, world.position, clearances).tolist(), strict=True):
         run._hanging = hanging
-    _hold(runs)
+    _hold(runs, world)
 
 
-def _hold(runs: Sequence[WalkRun]) -> None:
+def _hold(runs: Sequence[WalkRun], world: World) -> None:
     """Carry loops on until they are steady."""
     limits = np.array([run.driven.full_speed_at + run.setup.scene.hold_limit for run in runs])
-    _together(runs).resume(limits, Status.NOT_STEADY)
+    world.resume(limits, Status.NOT_STEADY)
     for run in runs:
         run.enter("driven", _let_go)
 
 
-def _let_go(runs: Sequence[WalkRun]) -> None:
+def _let_go(runs: Sequence[WalkRun], world: World) -> None:
     """Release steady loops from their sprockets, which vanish or move on."""
-    world = _together(runs)
     position, velocity, unloaded_at = world.position, world.velocity, world.unloaded_at
     times, drifts = world.state("time").tolist(), world.watched(layout.DRIFT).tolist()
     tallies = world.state("counts"), world.state("extremes")
     for run, time, drift, counts, extremes in zip(runs, times, drifts, *tallies, strict=True):
         driven = run.driven
         driven.drive_time, driven.drift, driven.counts, driven.extremes = time, drift, counts, extremes
-    _release(runs, position, velocity)
+    _release(runs, world, position, velocity)
     for run, since in zip(runs, unloaded_at.tolist(), strict=True):
         driven, scene = run.driven, run.setup.scene
         run.recorder.release(driven.drive_time, driven.raised, float(np.fmax(driven.full_speed_at, since)))
@@ -252,9 +251,9 @@ def _let_go(runs: Sequence[WalkRun]) -> None:
             run.enter("moving", _walk)
 
 
-def _walk(runs: Sequence[WalkRun]) -> None:
+def _walk(runs: Sequence[WalkRun], world: World) -> None:
     """Let chains walk on until they rest; nothing comes after that."""
-    _together(runs).resume(np.array([run._walk_end for run in runs]), Status.TIME_LIMIT)
+    world.resume(np.array([run._walk_end for run in runs]), Status.TIME_LIMIT)
     for run in runs:
         run.enter("free", None)
 
@@ -269,7 +268,7 @@ def _continue(run: WalkRun) -> None:
     memory, tilts = start.memory, run.setup.scene.plane == "tilting"
     run.is_released = True
     if not memory:
-        _load([run], start.position[np.newaxis], start.velocity[np.newaxis])
+        _load([run], _together([run]), start.position[np.newaxis], start.velocity[np.newaxis])
         return
     run.driven = Driven.remembered(memory)
     is_kept, interval = start.is_placed_as_in(run.setup), run.recorder.keep.frame_interval
@@ -280,7 +279,7 @@ def _continue(run: WalkRun) -> None:
     here |= state_of_plane(world.plane) if tilts else {}
     is_there = all(values.tobytes() == getattr(start, name).tobytes() for name, values in here.items())
     if is_kept and is_there:  # to the bit
-        _walk([run])
+        _walk([run], _together([run]))
         run.recorder.go_on(memory["state/last_sample"], start.time)
         return
     if tilts:
@@ -293,38 +292,37 @@ def _continue(run: WalkRun) -> None:
     run.enter("free", _walk_from_change)
 
 
-def _walk_from_change(runs: Sequence[WalkRun]) -> None:
+def _walk_from_change(runs: Sequence[WalkRun], world: World) -> None:
     """Let chains walk on whose states were changed."""
     for run in runs:
         assert run.setup.start is not None
         run.world.set_state(first_area=run.setup.start.memory["state/first_area"])
-    _walk(runs)
+    _walk(runs, world)
 
 
-def _raised(runs: Sequence[WalkRun], position: Array, clearances: Array) -> Array:
+def _raised(runs: Sequence[WalkRun], world: World, position: Array, clearances: Array) -> Array:
     """How far chains at these positions must be raised to their clearances [m], (w,)."""
     floors = [None if run.setup.scene.is_level else run.setup.floor for run in runs]
     lengths = np.array([run.setup.parameters.link_length for run in runs])
-    return raised_by(floors, position, lengths, _together(runs).radius, clearances)
+    return raised_by(floors, position, lengths, world.radius, clearances)
 
 
-def _release(runs: Sequence[WalkRun], position: Array, velocity: Array) -> None:
+def _release(runs: Sequence[WalkRun], world: World, position: Array, velocity: Array) -> None:
     """Begin the walks of chains on their floors."""
     hangs = np.array([run.setup.scene.clearance_of == "hanging" for run in runs])
-    raised = _raised(runs, position, np.where(hangs, 0.0, [run.setup.scene.clearance for run in runs]))
+    raised = _raised(runs, world, position, np.where(hangs, 0.0, [run.setup.scene.clearance for run in runs]))
     # a loop is wider than it hung, and may reach into a wall
     raised = np.where(hangs, np.fmax([run._hanging for run in runs], raised), raised)
     position[..., 1] += raised[:, np.newaxis]
-    _load(runs, position, velocity)
+    _load(runs, world, position, velocity)
     for run, own, height in zip(runs, position, raised.tolist(), strict=True):
         run.driven.raised, run.is_released = height, True
         if run.setup.scene.plane == "tilting":
             run.world.set_plane(released_plane(run.setup, own))
 
 
-def _load(runs: Sequence[WalkRun], position: Array, velocity: Array) -> None:
+def _load(runs: Sequence[WalkRun], world: World, position: Array, velocity: Array) -> None:
     """Begin the last phase of walks anew."""
-    world = _together(runs)
     world.load(
         position,
         velocity,
@@ -335,7 +333,7 @@ def _load(runs: Sequence[WalkRun], position: Array, velocity: Array) -> None:
         has_frame_marks=np.array([run.recorder.keep.frame_interval > 0 for run in runs]),
     )
     world.set_drive(farthest=np.array([run._farthest for run in runs]))
-    _walk(runs)
+    _walk(runs, world)
 
 
 def _attempts_before(runs: Sequence[WalkRun]) -> NDArray[np.int64]:
