@@ -166,28 +166,28 @@ def lay_chains(
         s[-1] = s[0] + period
         ends, along, growth = curve.points(s, size)
         chord = ends[:, 1:] - ends[:, :-1]
-        residual = _dot(chord, chord) - link_length**2
-        to_here = -2 * _dot(chord, along[:, :-1])
-        to_following = 2 * _dot(chord, along[:, 1:])
-        to_size = 2 * _dot(chord, growth[:, 1:] - growth[:, :-1])
+        missing = link_length**2 - _dot(chord, chord)
+        here, following = _dot(chord, along[:, :-1]), _dot(chord, along[:, 1:])
+        to_size = _dot(chord, growth[:, 1:] - growth[:, :-1])
         # The first joint moves with the period; the last chord ends on it one period later.
-        to_size[0] += to_here[0] * phase * curve.period_growth
-        to_size[-1] += to_following[-1] * (1 + phase) * curve.period_growth
-        last, worst = worst, np.abs(residual).max(0)
+        to_size[0] -= here[0] * phase * curve.period_growth
+        to_size[-1] += following[-1] * (1 + phase) * curve.period_growth
+        last, worst = worst, np.abs(missing).max(0)
         is_done |= (last < MISFIT * link_length**2) & (worst > last / 2)  # rounding is reached
         if is_done.all():
             break
-        change = _solve_loop(to_here, to_following, to_size, -residual)
+        missing /= 2
+        change = _solve_loop(here, following, to_size, missing)
         is_done |= ~np.isfinite(change).all(0)
         change[:, is_done] = 0.0
         s[1:-1] += change[:-1]
         size = np.maximum(size + change[-1], 0.0)
     along, growth = along[:, :-1], growth[:, :-1]
     # Rigid motion along the curve: s[0] moves at unit rate, the chords keep their lengths.
-    drive = np.zeros_like(residual)
-    drive[0] = -to_here[0]
-    drive[-1] -= to_following[-1]
-    rates = _solve_loop(to_here, to_following, to_size, drive)
+    drive = np.zeros_like(here)
+    drive[0] = here[0]
+    drive[-1] -= following[-1]
+    rates = _solve_loop(here, following, to_size, drive)
     size_rate = rates[-1]
     along_rates = np.concatenate([(1.0 + phase * curve.period_growth * size_rate)[np.newaxis], rates[:-1]])
     joint_rate = along_rates * along + size_rate * growth
@@ -217,19 +217,18 @@ def _evenly_spaced(
     return places
 
 
-def _solve_loop(to_here: Array, to_following: Array, to_size: Array, right: Array) -> Array:
+def _solve_loop(here: Array, following: Array, to_size: Array, right: Array) -> Array:
     """Solve the n equations of each loop's chords for the changes of s[1:] and of the size, all shapes (n, w).
 
-    Chord i: to_here[i] δs[i] + to_following[i] δs[i + 1] + to_size[i] δsize = right[i], with δs[0] = δs[n] = 0.
-    From the first chord on, each gives the next δs as a + b δsize; the last one then gives δsize.
+    Chord i: following[i] δs[i + 1] − here[i] δs[i] + to_size[i] δsize = right[i], with δs[0] = δs[n] = 0.
+    From the first chord on, each gives the next δs as a − b δsize; the last one then gives δsize.
     """
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # a singular loop gives no finite change
-        scale = (-to_here[:-1] / to_following[:-1]).cumprod(0)  # of each δs per first δs
-        divisor = to_following[:-1] * scale
-        constant, slope = (scale * (side[:-1] / divisor).cumsum(0) for side in (right, -to_size))
-        last = to_here[-1]
-        size = (right[-1] - last * constant[-1]) / (to_size[-1] + last * slope[-1])
-        return np.concatenate([constant + slope * size, size[np.newaxis]])
+        scale = (here[:-1] / following[:-1]).cumprod(0)  # of each δs per first δs
+        divisor = following[:-1] * scale
+        constant, slope = (scale * (side[:-1] / divisor).cumsum(0) for side in (right, to_size))
+        size = (right[-1] + here[-1] * constant[-1]) / (to_size[-1] + here[-1] * slope[-1])
+        return np.concatenate([constant - slope * size, size[np.newaxis]])
 
 
 def links_between(joints: Array, joint_rate: Array) -> tuple[Array, Array]:
