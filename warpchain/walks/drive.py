@@ -62,7 +62,9 @@ def drives_of(setups: Sequence[Setup], own: LinkValues) -> dict[str, Array]:
     soft, softest = (_as_soft_as(each, stiffness, mean_mass) for each in (SOFT, SOFTEST))
     bearable = LOADED_STRAIN * (soft if options.soften_drive else stiffness) * length
     limit = np.minimum(GREATEST_LOAD, own.greatest_load(length))
-    suitable = np.maximum(1.0, np.fmin(limit, np.divide(bearable, weight, out=np.full_like(weight, np.inf), where=weight > 0)))
+    suitable = np.maximum(
+        1.0, np.fmin(limit, np.divide(bearable, weight, out=np.full_like(weight, np.inf), where=weight > 0))
+    )
     suitable[~alternates] = 1.0  # the loop under load is another
     load_factor = np.where(np.isnan(load_factor), suitable, load_factor)
     softness = loaded_softness = np.zeros_like(speed)

@@ -10,7 +10,6 @@ import numpy as np
 
 from warpchain.chain.keep import NOTHING, Keep
 from warpchain.chain.setup import Setup
-from warpchain.chain.starts import Motion, first_motions
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import Gpu, gpu_turn, start_device
 from warpchain.engine.kernel_choice import block_threads, load_kernels, resident_blocks
@@ -18,7 +17,7 @@ from warpchain.inputs.options import Options, on_gpu
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.status import Status
-from warpchain.walks.walk_phases import WalkRun, go_on, phase_features
+from warpchain.walks.walk_phases import Beginnings, WalkRun, beginnings_of, go_on, phase_features
 
 WORLDS_OF_BLOCK = 2
 """Chains under way for each block that a GPU holds: while some are with the host, the others fill it.
@@ -74,7 +73,7 @@ def run_setups(
     def prepare(places: Sequence[int]) -> Iterator[Prepared]:
         drawn = [setups[place] for place in places] if draw is None else draw(places)
         kept = [NOTHING if keeps is None else keeps[place] for place in places]
-        return zip(places, drawn, kept, first_motions(drawn), strict=True)
+        return zip(places, drawn, kept, beginnings_of(drawn), strict=True)
 
     def group(places: list[int]) -> list[BatchRun]:
         kept = [] if keeps is None else [keeps[place] for place in places]
@@ -97,7 +96,9 @@ def _groups(setups: Sequence[Setup], walks: int) -> list[list[int]]:
         shares = not on_gpu(setup.options.device) or (walks <= SHARED_WALKS and size <= SHARED_THREADS)
         alike[layout.padded_width(links), 0 if shares else size, setup.options].append(place)
     for places in alike.values():
-        places.sort(key=lambda place: (-setups[place].scene.frequency, -setups[place].scene.links, setups[place].scene.start))
+        places.sort(
+            key=lambda place: (-setups[place].scene.frequency, -setups[place].scene.links, setups[place].scene.start)
+        )
     return sorted(alike.values(), key=lambda places: -max(setups[place].scene.links for place in places))
 
 
@@ -148,8 +149,8 @@ def compile_kernels(
         load_kernels(((start_device(device), features, size) for device, features, size in wanted), on_compile)
 
 
-Prepared = tuple[int, Setup, Keep, Motion | None]
-"""Place of a walk, what it is, what is kept of it, and how its chain lies at first."""
+Prepared = tuple[int, Setup, Keep, tuple[Beginnings, int] | None]
+"""Place of a walk, what it is, what is kept of it, and how it begins."""
 
 
 class Waiting:
@@ -199,8 +200,8 @@ class BatchRun:
         """Give waiting walks all free worlds and begin a launch; False if there is nothing to carry on."""
         free = np.flatnonzero(self._kernel < 0).tolist()
         begun = {
-            world: (place, WalkRun(self.batch.worlds[world], setup, keep, motion))
-            for world, (place, setup, keep, motion) in zip(free, self.waiting.take(len(free)), strict=False)
+            world: (place, WalkRun(self.batch.worlds[world], setup, keep, beginning))
+            for world, (place, setup, keep, beginning) in zip(free, self.waiting.take(len(free)), strict=False)
         }
         self._running |= begun
         self._go_on(begun)
