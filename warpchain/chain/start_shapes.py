@@ -33,8 +33,8 @@ class Curve:
 
     `points` maps s, (m, w), and sizes, (w,), to P [m], ∂P/∂s, and ∂P/∂size at fixed s, (2, m, w) each; `period` sizes
     to the periods of s, and `period_growth` is their derivative; `first_size` maps lengths of chains [m] to sizes for
-    Newton's method to start from. `pace` maps s, (m, k), all sizes and the numbers of k chains to |∂P/∂s|, (m, k), where
-    s is an angle, of period 2π; if s is a length along the curve, it is None.
+    Newton's method to start from. `pace` maps s, (m, k), all sizes, and numbers of k chains to |∂P/∂s|, (m, k), where s
+    is an angle, of period 2π; if s is a length along the curve, it is None.
     """
 
     points: Callable[[Array, Array], tuple[Array, Array, Array]]
@@ -206,7 +206,7 @@ def _dot(first: Array, second: Array) -> Array:
 def _evenly_spaced(
     pace: Callable[[Array, Array, NDArray[np.intp]], Array], links: int, first: Array, size: Array
 ) -> Array:
-    """Places s, (n, w), of joints that divide each curve into arcs of about equal length from a first place on, (w,)."""
+    """Places s, (n, w), of joints that divide each curve into about equal arcs from a first place on, (w,)."""
     places = np.empty((links, len(size)))
     for at in np.split(np.arange(len(size)), range(CACHED, len(size), CACHED)):
         fine = first[at, np.newaxis] + np.linspace(0.0, 2 * np.pi, 1024)

@@ -8,7 +8,7 @@ import hashlib
 import math
 import operator
 from collections.abc import Mapping, Sequence
-from typing import Any, Final, NamedTuple, Self
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import warp as wp
@@ -84,42 +84,6 @@ class Recorded(NamedTuple):
     planes: Array
 
 
-class Chains(NamedTuple):
-    """Constants of a chain, or of several of equal length: fields of `Chain` by name, and rows of `Model.links`."""
-
-    constants: dict[str, Any]
-    links: Array
-
-    @classmethod
-    def of(cls, parameters: dict[str, Any], links: int, own: LinkValues) -> Self:
-        """Those that follow from parameters by name, numbers or arrays over the chains, and from what links have."""
-        half = parameters["link_length"] / 2
-        derived = {
-            "link_count": links,
-            "half_length": half,
-            "inverse_square": 1 / (half * half),
-            "mass": own.total_mass,
-            "circle_radius": own.radius.max(-1),
-            "inverse_smoothing": 1 / parameters["friction_smoothing"],
-        }
-        return cls(parameters | derived, np.stack([*vars(own).values()], axis=-2))  # rows as in the layout
-
-    def at(self, rows: Sequence[int]) -> Self:
-        """Some of several."""
-        constants = {
-            name: each[rows] if isinstance(each, np.ndarray) else each for name, each in self.constants.items()
-        }
-        return type(self)(constants, self.links[rows])
-
-
-def chains_of(setups: Sequence[Setup], own: LinkValues | None = None) -> Chains:
-    """The chains of walks with equal numbers of links, given what links have, if that is known."""
-    own = own or link_values([setup.scene for setup in setups], [setup.parameters for setup in setups])
-    values = dict(zip(_PARAMETERS, np.array([_VALUES(setup.parameters) for setup in setups]).T, strict=True))
-    values["sprocket_radius"] = np.array([setup.contact_radius for setup in setups])
-    return Chains.of(values, setups[0].scene.links, own)
-
-
 class World:
     """One chain of a batch, or several that are set and read alike, between launches.
 
@@ -141,7 +105,7 @@ class World:
     @property
     def records(self) -> bool:
         """Whether samples or frames are kept."""
-        return self._host["record/samples"].shape[1] > 0 or self._host["record/frames"].shape[1] > 0
+        return any(self._host[f"record/{name}"].shape[1] > 0 for name in ("samples", "frames"))
 
     def taken(self) -> "World":
         """A copy of `RESULTS` of several worlds, which may be used again; nothing else can be read from it."""
@@ -158,26 +122,35 @@ class World:
         """Number of links n, of several worlds the greatest."""
         return int(np.max(self._host["model/chains"]["link_count"][self._at]))
 
-    def set_up(self, setups: Sequence[Setup], chains: "Chains | None" = None) -> None:
-        """Set the chains of several worlds, which have equal numbers of links, and their floors: constants of walks.
-
-        Given may be the chains, if they are known.
-        """
-        self._set_chains(chains_of(setups) if chains is None else chains)
+    def set_up(self, setups: Sequence[Setup]) -> None:
+        """Set the chains of several worlds, which have equal numbers of links, and their floors: constants of walks."""
+        own = link_values([setup.scene for setup in setups], [setup.parameters for setup in setups])
+        values = dict(zip(_PARAMETERS, np.array([_VALUES(setup.parameters) for setup in setups]).T, strict=True))
+        values["sprocket_radius"] = np.array([setup.contact_radius for setup in setups])
+        self._set_chain(values, setups[0].scene.links, own)
         for world, setup in zip(np.atleast_1d(self._at), setups, strict=True):
             if not setup.scene.is_level:
                 World(int(world), self._host, self._caches).set_floor(setup.floor)
 
     def set_chain(self, parameters: Parameters, links: int, own: LinkValues | None = None) -> None:
         """Set the chain; by default, links alternate."""
-        self._set_chains(Chains.of(vars(parameters), links, own or alternating(parameters, links)))
+        self._set_chain(vars(parameters), links, own or alternating(parameters, links))
 
-    def _set_chains(self, given: "Chains") -> None:
-        """Set the chain, or several."""
+    def _set_chain(self, parameters: dict[str, Any], links: int, own: LinkValues) -> None:
+        """Set chains: values of parameters by name, numbers or arrays over the worlds, and what links have."""
+        half = parameters["link_length"] / 2
+        values = parameters | {
+            "link_count": links,
+            "half_length": half,
+            "inverse_square": 1 / (half * half),
+            "mass": own.total_mass,
+            "circle_radius": own.radius.max(-1),
+            "inverse_smoothing": 1 / parameters["friction_smoothing"],
+        }
         chains = self._host["model/chains"]
         for name in chains.dtype.names or ():
-            chains[name][self._at] = given.constants.get(name, 0)
-        self._host["model/links"][self._at, :, : given.links.shape[-1]] = given.links
+            chains[name][self._at] = values.get(name, 0)
+        self._host["model/links"][self._at, :, :links] = np.stack([*vars(own).values()], axis=-2)  # as in the layout
 
     def set_floor(self, floor: Floor) -> None:
         """Set the floor, after the chain, for whose size the floor's cells are made."""

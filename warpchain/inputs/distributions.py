@@ -29,6 +29,9 @@ from warpchain.inputs.validation import InputError, Whole, field_bounds
 DRAW_LIMIT: Final = 1000
 """Draws of one quantity before giving up; a mean inside the bounds needs two on average at worst."""
 
+Words = NDArray[np.unsignedinteger[Any]]
+"""What random generators are seeded with."""
+
 Seed = Annotated[Whole, Field(ge=0, le=2**128 - 1)]
 """A greater one could repeat the stream of another."""
 
@@ -195,42 +198,45 @@ def random_generator(seed: int, cell: int = 0, sample: int = 0, *more: int) -> G
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(cell, sample, *more)))
 
 
-class _Words(ISeedSequence):
+class _Words(ISeedSequence):  # type: ignore[misc, unused-ignore]
     """Seeds a bit generator with words that are known."""
 
-    def __init__(self, words: NDArray[np.uint64]) -> None:
+    def __init__(self, words: Words) -> None:
         self._words = words
 
-    def generate_state(self, n_words: int, dtype: Any = np.uint64) -> NDArray[Any]:
+    def generate_state(self, n_words: int, dtype: Any = np.uint64) -> Words:
         return self._words
 
 
 def random_generators(seed: int, keys: ArrayLike) -> Iterator[Generator]:
-    """The `random_generator` of each of w samples, given cell and sample of each, (w, 2).
+    """The `random_generator` of each of w samples, given cell and sample of each, (w, 2), in a third of the time.
 
-    It computes what NumPy's `SeedSequence` does, of all samples together in a tenth of the time: words of 32 bits are
-    hashed into a pool of four, and the pool into eight.
+    It computes what NumPy's `SeedSequence` does, of all samples together: words of 32 bits are hashed into a pool of
+    four, and the pool into eight.
     """
-    words = [np.array([seed >> shift & 0xFFFFFFFF], np.uint32) for shift in (0, 32, 64, 96)]
     constant, factor = 0x43B0D7E5, 0x931E8875
 
-    def hashed(word: NDArray[np.uint32]) -> NDArray[np.uint32]:
+    def hashed(word: Words) -> Words:
         nonlocal constant
         word = word ^ np.uint32(constant)
         constant = constant * factor & 0xFFFFFFFF
         word *= np.uint32(constant)
-        return word ^ word >> 16
+        word ^= word >> np.uint32(16)
+        return word
 
-    def mixed(first: NDArray[np.uint32], second: NDArray[np.uint32]) -> NDArray[np.uint32]:
-        word = np.uint32(0xCA01F9DD) * first - np.uint32(0x4973F715) * second
-        return word ^ word >> 16
+    def mixed(first: Words, second: Words) -> Words:
+        word: Words = np.uint32(0xCA01F9DD) * first - np.uint32(0x4973F715) * second
+        word ^= word >> np.uint32(16)
+        return word
 
-    pool = [hashed(word) for word in words]
+    pool = [hashed(np.array([seed >> shift & 0xFFFFFFFF], np.uint32)) for shift in (0, 32, 64, 96)]
     for source in range(4):
-        for place in {0, 1, 2, 3} - {source}:
-            pool[place] = mixed(pool[place], hashed(pool[source]))
-    for word in np.asarray(keys, np.uint32).T:
-        pool = [mixed(own, hashed(word)) for own in pool]
+        for place in range(4):
+            if place != source:
+                pool[place] = mixed(pool[place], hashed(pool[source]))
+    for key in np.asarray(keys, np.uint32).T:
+        pool = [mixed(word, hashed(key)) for word in pool]
     constant, factor = 0x8B51F9DD, 0x58F38DED
-    state = np.stack([hashed(pool[number % 4]) for number in range(8)], axis=-1).astype("<u4").view("<u8")
-    return (Generator(PCG64(_Words(words))) for words in state.astype(np.uint64))
+    state = np.stack([hashed(pool[number % 4]) for number in range(8)], axis=-1)
+    words = state.astype("<u4").view("<u8").astype(np.uint64)
+    return (Generator(PCG64(_Words(each))) for each in words)  # type: ignore[arg-type, unused-ignore]

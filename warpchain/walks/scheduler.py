@@ -10,6 +10,7 @@ import numpy as np
 
 from warpchain.chain.keep import NOTHING, Keep
 from warpchain.chain.setup import Setup
+from warpchain.chain.starts import Motion, first_motions
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import Gpu, gpu_turn, start_device
 from warpchain.engine.kernel_choice import block_threads, load_kernels, resident_blocks
@@ -17,7 +18,7 @@ from warpchain.inputs.options import Options, on_gpu
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.status import Status
-from warpchain.walks.walk_phases import Beginnings, WalkRun, beginnings_of, go_on, phase_features
+from warpchain.walks.walk_phases import WalkRun, go_on, phase_features
 
 WORLDS_OF_BLOCK = 2
 """Chains under way for each block that a GPU holds: while some are with the host, the others fill it.
@@ -35,8 +36,8 @@ blocks of 192 threads, some of them idle. 2016 walks took as long in both.
 DRAWN_TOGETHER = 64
 """Walks that are drawn and laid together, ahead of the worlds that they will have.
 
-To lay w chains takes about F + c w, with F as much as 10 to 20 chains: Python's part, beside that of the numbers. For
-32 it is a third of the whole. To take more would gain little, and let a launch that is over wait longer.
+To lay w chains takes about F + c w, with F as much as 30 chains: Python's part, beside that of the numbers. For 64 it
+is a third of the whole. To take more would gain little, and let a launch that is over wait longer.
 """
 BATCHES_PER_GPU = 4
 """While the host handles one of them, the others go on and fill the device."""
@@ -73,7 +74,7 @@ def run_setups(
     def prepare(places: Sequence[int]) -> Iterator[Prepared]:
         drawn = [setups[place] for place in places] if draw is None else draw(places)
         kept = [NOTHING if keeps is None else keeps[place] for place in places]
-        return zip(places, drawn, kept, beginnings_of(drawn), strict=True)
+        return zip(places, drawn, kept, first_motions(drawn), strict=True)
 
     def group(places: list[int]) -> list[BatchRun]:
         kept = [] if keeps is None else [keeps[place] for place in places]
@@ -149,8 +150,8 @@ def compile_kernels(
         load_kernels(((start_device(device), features, size) for device, features, size in wanted), on_compile)
 
 
-Prepared = tuple[int, Setup, Keep, tuple[Beginnings, int] | None]
-"""Place of a walk, what it is, what is kept of it, and how it begins."""
+Prepared = tuple[int, Setup, Keep, Motion | None]
+"""Place of a walk, what it is, what is kept of it, and how its chain lies at first."""
 
 
 class Waiting:
@@ -200,8 +201,8 @@ class BatchRun:
         """Give waiting walks all free worlds and begin a launch; False if there is nothing to carry on."""
         free = np.flatnonzero(self._kernel < 0).tolist()
         begun = {
-            world: (place, WalkRun(self.batch.worlds[world], setup, keep, beginning))
-            for world, (place, setup, keep, beginning) in zip(free, self.waiting.take(len(free)), strict=False)
+            world: (place, WalkRun(self.batch.worlds[world], setup, keep, motion))
+            for world, (place, setup, keep, motion) in zip(free, self.waiting.take(len(free)), strict=False)
         }
         self._running |= begun
         self._go_on(begun)

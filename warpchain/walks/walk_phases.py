@@ -13,7 +13,7 @@ from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +22,8 @@ from warpchain.chain.floor import raised_by
 from warpchain.chain.keep import NOTHING, Keep
 from warpchain.chain.setup import Setup
 from warpchain.chain.sprocket_motion import motion_rows
-from warpchain.chain.link_values import link_values
-from warpchain.chain.starts import first_motions
-from warpchain.engine.world import CACHES, Chains, World, chains_of
+from warpchain.chain.starts import Motion, first_motions
+from warpchain.engine.world import CACHES, World
 from warpchain.inputs.arrays import Array
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
@@ -81,32 +80,6 @@ def _kernels(
     return found
 
 
-class Beginnings(NamedTuple):
-    """How walks of equal length and start begin: chains, motions (w, n, 3) each, fields of `Drive` (w,), if any."""
-
-    chains: Chains
-    position: Array
-    velocity: Array
-    drives: dict[str, Array]
-
-
-def beginnings_of(setups: Sequence[Setup]) -> list[tuple[Beginnings, int] | None]:
-    """How each walk begins: arrays of those alike, and its row in them; None of one that begins from a given state."""
-    found: list[tuple[Beginnings, int] | None] = [None] * len(setups)
-    alike: dict[tuple[int, str], list[int]] = defaultdict(list)
-    for place, setup in enumerate(setups):
-        if setup.start is None:
-            alike[setup.scene.links, setup.scene.start].append(place)
-    for places in alike.values():
-        chosen = [setups[place] for place in places]
-        own = link_values([setup.scene for setup in chosen], [setup.parameters for setup in chosen])
-        drives = drives_of(chosen, own) if chosen[0].has_drive else {}
-        together = Beginnings(chains_of(chosen, own), *first_motions(chosen), drives)
-        for row, place in enumerate(places):
-            found[place] = together, row
-    return found
-
-
 class WalkRun:
     """One walk on a world, which `go_on` takes from one phase to the next.
 
@@ -119,16 +92,14 @@ class WalkRun:
         is_released: Whether the chain walks, with or without a sprocket that moves.
     """
 
-    def __init__(
-        self, world: World, setup: Setup, keep: Keep = NOTHING, beginning: tuple[Beginnings, int] | None = None
-    ) -> None:
+    def __init__(self, world: World, setup: Setup, keep: Keep = NOTHING, motion: Motion | None = None) -> None:
         """Prepare a walk; the batch of the world has its options, and records what is to be kept.
 
-        ``beginning``: of `beginnings_of`, if that is known.
+        ``motion``: how the chain lies at first, of `first_motions`, if that is known.
         """
         scene = setup.scene
         self.world, self.setup = world, setup
-        self._beginning = beginnings_of([setup])[0] if beginning is None else beginning
+        self._motion = first_motions([setup])[0] if motion is None else motion
         self.features: Features | None = None
         self.recorder = Recorder(world, keep, setup)
         self.driven = Driven(has_sprocket=setup.has_drive)
@@ -193,14 +164,14 @@ def go_on(runs: Sequence[WalkRun]) -> None:
 
     Each world is then to be carried on with the `features` of its walk until it stops; a walk without is over.
     """
-    alike: dict[tuple[Phase, int, int], list[WalkRun]] = defaultdict(list)
+    alike: dict[tuple[Phase, int, str, bool], list[WalkRun]] = defaultdict(list)
     statuses = _together(runs).state("status").tolist()
     for run, status in zip(runs, statuses, strict=True):
+        setup = run.setup
         if run._next is None or (run.features is not None and status != Status.FINISHED):
             run.end(Status(status))
         else:
-            begins = id(run._beginning and run._beginning[0]) if run._next is _begin else 0
-            alike[run._next, run.setup.scene.links, begins].append(run)
+            alike[run._next, setup.scene.links, setup.scene.start, setup.start is None].append(run)
     for (begin, *_), group in alike.items():
         begin(group, _together(group))
 
@@ -225,19 +196,17 @@ def _together(runs: Sequence[WalkRun]) -> World:
 
 def _begin(runs: Sequence[WalkRun], world: World) -> None:
     """Set worlds up, and begin the first phase."""
-    setups, rows = [run.setup for run in runs], [run._beginning[1] for run in runs if run._beginning]
-    if runs[0]._beginning is None:
-        world.set_up(setups)
+    setups = [run.setup for run in runs]
+    world.set_up(setups)
+    if setups[0].start is not None:
         for run in runs:
             _continue(run)
         return
-    chains, position, velocity, drives = runs[0]._beginning[0]
-    position, velocity = position[rows], velocity[rows]
-    world.set_up(setups, chains.at(rows))
-    if not drives:
+    position, velocity = (np.array(parts) for parts in zip(*(run._motion for run in runs if run._motion), strict=True))
+    if not setups[0].has_drive:
         _release(runs, world, position, velocity)
         return
-    drives = {name: values[rows] for name, values in drives.items()}
+    drives = drives_of(setups, world.link_values)
     world.set_drive(**drives)
     for run, start, softness in zip(runs, drives["hold_start"].tolist(), drives["hold_softness"].tolist(), strict=True):
         run.driven.full_speed_at, run._hold_softness = start, softness
