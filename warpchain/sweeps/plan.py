@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from itertools import compress
 from typing import Any, Final
 
 import numpy as np
@@ -116,36 +117,31 @@ class Sweep:
         Then the whole sample is redrawn from its own random stream, which a designed sample does not use before. In
         `saltelli` the d + 2 walks of a sample are redrawn together. An `InputError` says that no draw was possible.
         """
-        drawn: dict[int, tuple[Setup, Point]] = {}
+        firsts: dict[int, Point] = {}
         for number, block in enumerate(self.blocks):
-            places = [place for place, walk in enumerate(walks) if walk.block == number]
-            if places and block.distributions and SAMPLERS[block.sampler].engine is None and not block.independent:
-                drawn |= self._at_once(block, {place: walks[place] for place in places})
-        return [self._with_draws(walk, *drawn.get(place, ())) for place, walk in enumerate(walks)]
+            own = {place: walk for place, walk in enumerate(walks) if walk.block == number}
+            if own and block.distributions and SAMPLERS[block.sampler].engine is None and not block.independent:
+                streams = {cell: self._stream(block, cell) for cell in {walk.cell for walk in own.values()}}
+                rngs = random_generators(self.seed, [(streams[walk.cell], walk.sample) for walk in own.values()])
+                points, is_within = first_draws([walk.laws for walk in own.values()], rngs)
+                for place, point in compress(zip(own, points.tolist(), strict=True), is_within.tolist()):
+                    firsts[place] = dict(zip(block.distributions, point, strict=True))
+        return [self._with_draws(walk, firsts.get(place)) for place, walk in enumerate(walks)]
 
-    def _at_once(self, block: Block, walks: Mapping[int, PlannedWalk]) -> Iterator[tuple[int, tuple[Setup, Point]]]:
-        """Setups and points of those walks of a block whose first random samples are possible, by the walks' keys."""
-        streams = {cell: self._stream(block, cell) for cell in {walk.cell for walk in walks.values()}}
-        keys = [(streams[walk.cell], walk.sample) for walk in walks.values()]
-        values, is_within = first_draws([walk.laws for walk in walks.values()], random_generators(self.seed, keys))
-        for (place, walk), row, is_in in zip(walks.items(), values.tolist(), is_within.tolist(), strict=True):
-            if is_in:
-                point = dict(zip(block.distributions, row, strict=True))
-                with suppress(InputError):
-                    yield place, (walk.setup.with_drawn(point), point)
-
-    def _with_draws(self, walk: PlannedWalk, setup: Setup | None = None, point: Point | None = None) -> PlannedWalk:
-        """A walk with its draws, if these are not given."""
+    def _with_draws(self, walk: PlannedWalk, first: Point | None) -> PlannedWalk:
+        """A walk with its draws; `first` is the first that is random, if it is known and within bounds."""
         block, fixed = self.blocks[walk.block], walk.setup
         if not block.distributions:
             return walk
-        if setup is None or point is None:
-            sampler = SAMPLERS[block.sampler]
-            row, member = divmod(walk.sample, sampler.walks(len(block.distributions)))
-            is_designed = sampler.engine is not None
-            points, setups = self._first_possible(block, walk.cell, fixed, walk.laws, row, is_designed)
-            setup, point = setups[member], points[member]
-        return PlannedWalk(walk.index, walk.block, walk.cell, walk.sample, setup, walk.laws, point)
+        if first is not None:
+            with suppress(InputError):
+                setup = fixed.with_drawn(first)
+                return PlannedWalk(walk.index, walk.block, walk.cell, walk.sample, setup, walk.laws, first)
+        sampler = SAMPLERS[block.sampler]
+        row, member = divmod(walk.sample, sampler.walks(len(block.distributions)))
+        is_designed = sampler.engine is not None
+        points, setups = self._first_possible(block, walk.cell, fixed, walk.laws, row, is_designed)
+        return PlannedWalk(walk.index, walk.block, walk.cell, walk.sample, setups[member], walk.laws, points[member])
 
     def undrawn(self, indices: Iterable[int]) -> Iterator[PlannedWalk]:
         """Walks without their draws, which take most of the time; options and number of links never depend on them."""
