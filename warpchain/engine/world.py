@@ -120,7 +120,7 @@ class World:
     @property
     def links(self) -> int:
         """Number of links n, of several worlds the greatest."""
-        return int(np.max(self._host["model/chains"]["link_count"][self._at]))
+        return int(self._host["model/chains"]["link_count"][self._at].max())
 
     def set_up(self, setups: Sequence[Setup]) -> None:
         """Set the chains of several worlds, which have equal numbers of links, and their floors: constants of walks."""
