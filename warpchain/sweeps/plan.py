@@ -120,7 +120,8 @@ class Sweep:
         firsts: dict[int, Point] = {}
         for number, block in enumerate(self.blocks):
             own = {place: walk for place, walk in enumerate(walks) if walk.block == number}
-            if len(own) > 1 and block.distributions and SAMPLERS[block.sampler].engine is None and not block.independent:
+            is_random = block.distributions and SAMPLERS[block.sampler].engine is None
+            if len(own) > 1 and is_random and not block.independent:
                 streams = {cell: self._stream(block, cell) for cell in {walk.cell for walk in own.values()}}
                 rngs = random_generators(self.seed, [(streams[walk.cell], walk.sample) for walk in own.values()])
                 points, is_within = first_draws([walk.laws for walk in own.values()], rngs)

@@ -92,14 +92,17 @@ def _groups(setups: Sequence[Setup], walks: int) -> list[list[int]]:
     group walks that are spun fast (60 links from rest: 82,000 attempts at 5 Hz, 350,000 at 30; 180: 164,000, 135,000).
     """
     alike: dict[tuple[int, int, Options], list[int]] = defaultdict(list)
+    ranks: dict[int, tuple[float, int, str]] = {}  # by the identities of setups, which walks of a cell share
+    group_of: dict[int, list[int]] = {}
     for place, setup in enumerate(setups):
-        links, size = setup.scene.links, block_threads(setup.scene.links)
-        shares = not on_gpu(setup.options.device) or (walks <= SHARED_WALKS and size <= SHARED_THREADS)
-        alike[layout.padded_width(links), 0 if shares else size, setup.options].append(place)
+        if id(setup) not in ranks:
+            links, size = setup.scene.links, block_threads(setup.scene.links)
+            shares = not on_gpu(setup.options.device) or (walks <= SHARED_WALKS and size <= SHARED_THREADS)
+            group_of[id(setup)] = alike[layout.padded_width(links), 0 if shares else size, setup.options]
+            ranks[id(setup)] = -setup.scene.frequency, -links, setup.scene.start
+        group_of[id(setup)].append(place)
     for places in alike.values():
-        places.sort(
-            key=lambda place: (-setups[place].scene.frequency, -setups[place].scene.links, setups[place].scene.start)
-        )
+        places.sort(key=lambda place: ranks[id(setups[place])])
     return sorted(alike.values(), key=lambda places: -max(setups[place].scene.links for place in places))
 
 
