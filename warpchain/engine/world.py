@@ -122,8 +122,11 @@ class World:
         """Number of links n, of several worlds the greatest."""
         return int(self._host["model/chains"]["link_count"][self._at].max())
 
-    def set_up(self, setups: Sequence[Setup]) -> None:
-        """Set the chains of several worlds, which have equal numbers of links, and their floors: constants of walks."""
+    def set_up(self, setups: Sequence[Setup]) -> LinkValues:
+        """Set the chains of several worlds, which have equal numbers of links, and their floors: constants of walks.
+
+        Returns what links and joints have of their own.
+        """
         own = link_values([setup.scene for setup in setups], [setup.parameters for setup in setups])
         values = dict(zip(_PARAMETERS, np.array([_VALUES(setup.parameters) for setup in setups]).T, strict=True))
         values["sprocket_radius"] = np.array([setup.contact_radius for setup in setups])
@@ -131,6 +134,7 @@ class World:
         for world, setup in zip(np.atleast_1d(self._at), setups, strict=True):
             if not setup.scene.is_level:
                 World(int(world), self._host, self._caches).set_floor(setup.floor)
+        return own
 
     def set_chain(self, parameters: Parameters, links: int, own: LinkValues | None = None) -> None:
         """Set the chain; by default, links alternate."""
@@ -247,12 +251,6 @@ class World:
         """Radius of the circles of each link [m]."""
         radii: Array = self._host["model/links"][self._at, layout.OWN_RADIUS, : self.links]
         return radii
-
-    @property
-    def link_values(self) -> LinkValues:
-        """What each link and joint has of its own."""
-        rows = self._host["model/links"][self._at, :, : self.links]
-        return LinkValues(*np.moveaxis(rows, -2, 0))
 
     @property
     def counts(self) -> dict[str, int]:

@@ -197,7 +197,7 @@ def _together(runs: Sequence[WalkRun]) -> World:
 def _begin(runs: Sequence[WalkRun], world: World) -> None:
     """Set worlds up, and begin the first phase."""
     setups = [run.setup for run in runs]
-    world.set_up(setups)
+    own = world.set_up(setups)
     if setups[0].start is not None:
         for run in runs:
             _continue(run)
@@ -206,7 +206,7 @@ def _begin(runs: Sequence[WalkRun], world: World) -> None:
     if not setups[0].has_drive:
         _release(runs, world, position, velocity)
         return
-    drives = drives_of(setups, world.link_values)
+    drives = drives_of(setups, own)
     world.set_drive(**drives)
     for run, start, softness in zip(runs, drives["hold_start"].tolist(), drives["hold_softness"].tolist(), strict=True):
         run.driven.full_speed_at, run._hold_softness = start, softness
