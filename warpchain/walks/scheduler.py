@@ -223,7 +223,7 @@ class BatchRun:
                 run.drain()
                 if self._watch is not None:
                     self._watch(run)
-        has_stopped = (self._kernel >= 0) & (self.batch.statuses() != Status.RUNNING)
+        has_stopped = (self._kernel >= 0) & (self.batch.statuses() != int(Status.RUNNING))
         stopped = {world: self._running[world] for world in np.flatnonzero(has_stopped).tolist()}
         self._go_on(stopped)
         return [self._running.pop(world) for world, (_, run) in stopped.items() if run.features is None]
