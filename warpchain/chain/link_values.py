@@ -94,6 +94,11 @@ def _mean_of_pairs(pairs: Array) -> float:
 
 _INNER: Final = attrgetter("inner_mass", "inner_inertia", "viscous_friction", "coulomb_friction", "circle_radius")
 _OUTER: Final = attrgetter("outer_mass", "outer_inertia", "viscous_friction", "coulomb_friction", "circle_radius")
+_UNLIKE: Final = attrgetter(
+    *OF_LINKS, "mass_gradient", "charm_radius", "charm_mass", "charm_inertia", "joint_friction_factor"
+)
+_ALIKE: Final = (*(None for _ in OF_LINKS), 0.0, None, 0.0, 0.0, 1.0)
+"""What a scene has of these fields whose links and joints are those of the parameters."""
 
 
 def alternating(parameters: Parameters | Sequence[Parameters], links: int) -> LinkValues:
@@ -109,6 +114,8 @@ def link_values(scenes: Sequence[Scene], parameters: Sequence[Parameters]) -> Li
     """What each link and joint of the chains of some walks has of its own, (w, n)."""
     values = alternating(parameters, scenes[0].links)
     for place, scene in enumerate(scenes):
+        if _UNLIKE(scene) == _ALIKE:
+            continue
         for row, name in zip(vars(values).values(), OF_LINKS, strict=True):
             if (own := getattr(scene, name)) is not None:
                 row[place] = own
