@@ -8,16 +8,15 @@ What is drawn is a mapping of names to distributions, in the order of drawing. A
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from statistics import NormalDist
-from typing import Annotated, Any, ClassVar, Final
+from typing import Annotated, ClassVar, Final
 
 import numpy as np
-from numpy.random import PCG64, Generator
-from numpy.random.bit_generator import ISeedSequence
-from numpy.typing import ArrayLike, NDArray
+from numpy.random import Generator
+from numpy.typing import NDArray
 from pydantic import Field
 
 from warpchain.inputs.arrays import Array
@@ -28,9 +27,6 @@ from warpchain.inputs.validation import InputError, Whole, field_bounds
 
 DRAW_LIMIT: Final = 1000
 """Draws of one quantity before giving up; a mean inside the bounds needs two on average at worst."""
-
-Words = NDArray[np.unsignedinteger[Any]]
-"""What random generators are seeded with."""
 
 Seed = Annotated[Whole, Field(ge=0, le=2**128 - 1)]
 """A greater one could repeat the stream of another."""
@@ -173,7 +169,7 @@ def draw(distributions: Mapping[str, Distribution], rng: Generator) -> dict[str,
 
 
 def first_draws(
-    distributions: Sequence[Mapping[str, Distribution]], generators: Iterator[Generator]
+    distributions: Sequence[Mapping[str, Distribution]], generators: Iterable[Generator]
 ) -> tuple[Array, NDArray[np.bool_]]:
     """What `draw` gives for each of w samples if nothing is drawn twice, (w, q), and of which that is true, (w,).
 
@@ -196,47 +192,3 @@ def first_draws(
 def random_generator(seed: int, cell: int = 0, sample: int = 0, *more: int) -> Generator:
     """The random generator of one sample, given the sweep's seed, the number of its cell, and its own in there."""
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(cell, sample, *more)))
-
-
-class _Words(ISeedSequence):  # type: ignore[misc, unused-ignore]
-    """Seeds a bit generator with words that are known."""
-
-    def __init__(self, words: Words) -> None:
-        self._words = words
-
-    def generate_state(self, n_words: int, dtype: Any = np.uint64) -> Words:
-        return self._words
-
-
-def random_generators(seed: int, keys: ArrayLike) -> Iterator[Generator]:
-    """The `random_generator` of each of w samples, given cell and sample of each, (w, 2), in a third of the time.
-
-    It computes what NumPy's `SeedSequence` does, of all samples together: words of 32 bits are hashed into a pool of
-    four, and the pool into eight.
-    """
-    constant, factor = 0x43B0D7E5, 0x931E8875
-
-    def hashed(word: Words) -> Words:
-        nonlocal constant
-        word = word ^ np.uint32(constant)
-        constant = constant * factor & 0xFFFFFFFF
-        word *= np.uint32(constant)
-        word ^= word >> np.uint32(16)
-        return word
-
-    def mixed(first: Words, second: Words) -> Words:
-        word: Words = np.uint32(0xCA01F9DD) * first - np.uint32(0x4973F715) * second
-        word ^= word >> np.uint32(16)
-        return word
-
-    pool = [hashed(np.array([seed >> shift & 0xFFFFFFFF], np.uint32)) for shift in (0, 32, 64, 96)]
-    for source in range(4):
-        for place in range(4):
-            if place != source:
-                pool[place] = mixed(pool[place], hashed(pool[source]))
-    for key in np.asarray(keys, np.uint32).T:
-        pool = [mixed(word, hashed(key)) for word in pool]
-    constant, factor = 0x8B51F9DD, 0x58F38DED
-    state = np.stack([hashed(pool[number % 4]) for number in range(8)], axis=-1)
-    words = state.astype("<u4").view("<u8").astype(np.uint64)
-    return (Generator(PCG64(_Words(each))) for each in words)  # type: ignore[arg-type, unused-ignore]

@@ -33,7 +33,6 @@ from warpchain.inputs.distributions import (
     draw,
     first_draws,
     random_generator,
-    random_generators,
 )
 from warpchain.inputs.fields import SECTIONS
 from warpchain.inputs.options import Options
@@ -123,7 +122,7 @@ class Sweep:
             is_random = block.distributions and SAMPLERS[block.sampler].engine is None
             if len(own) > 1 and is_random and not block.independent:
                 streams = {cell: self._stream(block, cell) for cell in {walk.cell for walk in own.values()}}
-                rngs = random_generators(self.seed, [(streams[walk.cell], walk.sample) for walk in own.values()])
+                rngs = (random_generator(self.seed, streams[walk.cell], walk.sample) for walk in own.values())
                 points, is_within = first_draws([walk.laws for walk in own.values()], rngs)
                 for place, point in compress(zip(own, points.tolist(), strict=True), is_within.tolist()):
                     firsts[place] = dict(zip(block.distributions, point, strict=True))
