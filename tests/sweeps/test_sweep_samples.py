@@ -186,6 +186,8 @@ def test_distributions(sampler: str, samples: int) -> None:
     given = {name: form for name, (form, *_) in CASES.items()}
     sweep = load_sweep(content(sampler=sampler, samples=samples, grid=None, distributions={"all": "fixed", **given}))
     values = dict(zip(sweep.blocks[0].drawn, drawn(sweep, samples).T, strict=True))
+    together = sweep.with_draws([*sweep.undrawn(range(samples))])  # of which some are drawn again
+    assert np.array_equal([[*walk.draws.values()] for walk in together], np.transpose([*values.values()]))
     assert set(values) == set(CASES)
     for name, (_, whole, lower, upper) in CASES.items():
         low, high = whole.cdf(lower), whole.cdf(upper)
@@ -227,6 +229,7 @@ def test_every_planned_walk_is_possible(sampler: str) -> None:
         )
     )
     walks = [sweep.walk(index) for index in sweep.indices.tolist()]
+    assert sweep.with_draws([*sweep.undrawn(sweep.indices.tolist())]) == walks
     for walk in walks:
         walk.setup.checked()
     per_sample = 4 if sampler == "saltelli" else 1

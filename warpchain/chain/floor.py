@@ -138,15 +138,19 @@ class Flat(Floor):
         return np.zeros(np.shape(x))
 
 
-def raised_by(floors: Sequence[Floor], circles: Array, radius: Array, clearance: Array) -> Array:
-    """How far each of w chains of n links must be raised to its clearance from its floor [m], (w,).
+def raised_by(
+    floors: Sequence[Floor | None], position: Array, link_length: Array, radius: Array, clearance: Array
+) -> Array:
+    """How far each of w chains of n links must be raised to its clearance from its floor [m], (w,); None: y = 0.
 
-    Given are circles, (w, 2 n, 2), radii, (w, 2 n), and clearances, (w,), as for `Floor.raised_by`.
+    Given are positions, (w, n, 3), radii of the links' circles, (w, n), lengths of links and clearances, (w,).
     """
-    raised: Array = clearance - (circles[..., 1] - radius).min(-1)  # from the level y = 0
+    middle, arm = position[..., 1], link_length[:, np.newaxis] / 2 * np.sin(position[..., 2])
+    raised: Array = clearance - np.minimum(middle - arm - radius, middle + arm - radius).min(-1)
     for place, floor in enumerate(floors):
-        if not isinstance(floor, Flat):
-            raised[place] = floor.raised_by(circles[place], radius[place], float(clearance[place]))
+        if floor is not None:
+            circles = circles_of(position[place], link_length[place])
+            raised[place] = floor.raised_by(circles, np.tile(radius[place], 2), float(clearance[place]))
     return raised
 
 

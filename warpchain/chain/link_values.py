@@ -10,6 +10,7 @@ Arrays are of one chain of n links, (n,), or of w chains of as many links each, 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any, Final
 
 import numpy as np
@@ -46,7 +47,8 @@ class LinkValues:
     @property
     def total_mass(self) -> Any:
         """Mass of the chain [kg]; of two kinds of links as many times the rounded sum of a pair as there are pairs."""
-        pairs = np.add.reduceat(self.mass, range(0, self.mass.shape[-1], 2), axis=-1)
+        pairs = self.mass[..., ::2].copy()
+        pairs[..., : self.mass.shape[-1] // 2] += self.mass[..., 1::2]
         return _of_rows(pairs, lambda pair: pair * pairs.shape[-1], math.fsum)
 
     @property
@@ -72,7 +74,8 @@ class LinkValues:
 def _of_rows(values: Array, alike: Callable[[Array], Array], unlike: Callable[[Array], float]) -> Any:
     """A number of each row of values (…, k): of rows of equal values by that value, as arrays, of others one by one."""
     found = np.array(alike(values[..., 0]))
-    for place in map(tuple, np.argwhere((values != values[..., :1]).any(-1))):
+    is_unlike = (values != values[..., :1]).any(-1)
+    for place in map(tuple, np.argwhere(is_unlike)) if is_unlike.any() else ():
         found[place] = unlike(values[place])
     return found[()]
 
@@ -89,15 +92,20 @@ def _mean_of_pairs(pairs: Array) -> float:
     return float(pairs[0] + math.fsum(pairs - pairs[0]) / len(pairs)) / 2
 
 
+_INNER: Final = attrgetter("inner_mass", "inner_inertia", "viscous_friction", "coulomb_friction", "circle_radius")
+_OUTER: Final = attrgetter("outer_mass", "outer_inertia", "viscous_friction", "coulomb_friction", "circle_radius")
+_UNLIKE: Final = attrgetter(
+    *OF_LINKS, "mass_gradient", "charm_radius", "charm_mass", "charm_inertia", "joint_friction_factor"
+)
+_ALIKE: Final = (*(None for _ in OF_LINKS), 0.0, None, 0.0, 0.0, 1.0)
+"""What a scene has of these fields whose links and joints are those of the parameters."""
+
+
 def alternating(parameters: Parameters | Sequence[Parameters], links: int) -> LinkValues:
     """Chains of inner links 0, 2, 4, … and outer links 1, 3, 5, …, whose joints are alike."""
     given = [parameters] if isinstance(parameters, Parameters) else parameters
-    names = ("inner_mass", "inner_inertia", "viscous_friction", "coulomb_friction", "circle_radius")
-    first, second = (
-        np.array([[getattr(each, name) for name in wanted] for each in given]).T[..., np.newaxis]
-        for wanted in (names, [name.replace("inner", "outer") for name in names])
-    )
-    values = np.empty((len(names), len(given), links))
+    first, second = (np.array([*map(kind, given)]).T[..., np.newaxis] for kind in (_INNER, _OUTER))
+    values = np.empty((len(first), len(given), links))
     values[:, :, ::2], values[:, :, 1::2] = first, second
     return LinkValues(*(values[:, 0] if isinstance(parameters, Parameters) else values))
 
@@ -106,6 +114,8 @@ def link_values(scenes: Sequence[Scene], parameters: Sequence[Parameters]) -> Li
     """What each link and joint of the chains of some walks has of its own, (w, n)."""
     values = alternating(parameters, scenes[0].links)
     for place, scene in enumerate(scenes):
+        if _UNLIKE(scene) == _ALIKE:
+            continue
         for row, name in zip(vars(values).values(), OF_LINKS, strict=True):
             if (own := getattr(scene, name)) is not None:
                 row[place] = own

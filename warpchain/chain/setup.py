@@ -90,11 +90,15 @@ class Setup:
             return self.scene.settle_time
         return 2.0 if self.scene.clearance_of == "hanging" else 0.1
 
-    @cached_property
+    @property
     def riding_radius(self) -> float:
         """Height [m] of the joints above a surface that the chain rides on: half of them are at least so high."""
         if self.scene.link_radii is None and self.scene.charm_radius is None:
             return self.parameters.circle_radius
+        return self._median_radius
+
+    @cached_property
+    def _median_radius(self) -> float:
         radius = self.link_values.radius
         return float(np.median(np.maximum(radius, np.roll(radius, -1))))
 

@@ -4,7 +4,7 @@ Joints must close the loop to rounding: at k = 1e9 N/m an opening of 0.1 mm hold
 joints' places on the curve together with the curve's size. The circulating velocities are the exact rigid motion along
 the curve: the derivative of that solution with respect to the first joint's place.
 
-Many chains are laid at once, as arrays with one row for each chain. No number of a chain depends on the others.
+Many chains are laid at once, as arrays with one column for each chain. No number of a chain depends on the others.
 """
 
 import functools
@@ -23,21 +23,25 @@ MISFIT: Final = 1e-9
 """Greatest relative error of a link's length in a chain that is laid."""
 
 
+CACHED: Final = 16
+"""Chains whose curves are divided finely at the same time: such arrays stay in a core's cache."""
+
+
 @dataclass(frozen=True)
 class Curve:
     """A family of closed curves P(s, size), clockwise in s, for w chains at once.
 
-    `points` maps s, (w, m), and sizes, (w,), to P [m], ∂P/∂s, and ∂P/∂size at fixed s, (2, w, m) each; `period` sizes
+    `points` maps s, (m, w), and sizes, (w,), to P [m], ∂P/∂s, and ∂P/∂size at fixed s, (2, m, w) each; `period` sizes
     to the periods of s, and `period_growth` is their derivative; `first_size` maps lengths of chains [m] to sizes for
-    Newton's method to start from. `pace` maps s and sizes to |∂P/∂s|, (w, m), where s is an angle, of period 2π; if s
-    is a length along the curve, it is None.
+    Newton's method to start from. `pace` maps s, (m, k), all sizes, and numbers of k chains to |∂P/∂s|, (m, k), where s
+    is an angle, of period 2π; if s is a length along the curve, it is None.
     """
 
     points: Callable[[Array, Array], tuple[Array, Array, Array]]
     period: Callable[[Array], Array]
     period_growth: float
     first_size: Callable[[Array], Array]
-    pace: Callable[[Array, Array], Array] | None = None
+    pace: Callable[[Array, Array, NDArray[np.intp]], Array] | None = None
 
 
 def stadium(radius: ArrayLike) -> Curve:
@@ -46,30 +50,38 @@ def stadium(radius: ArrayLike) -> Curve:
     Its size is the length of a straight [m], s the arc length from the top [m], `radius` that of the half circles [m],
     one for all chains or one for each, (w,).
     """
-    radii = np.atleast_1d(np.asarray(radius, dtype=float))[:, np.newaxis]
+    radii = np.atleast_1d(np.asarray(radius, dtype=float))
     quarter = np.pi * radii / 2
 
-    def points(s: Array, size: Array) -> tuple[Array, Array, Array]:
-        straight = size[:, np.newaxis]
-        turn = 4 * quarter + 2 * straight
-        laps, s = np.divmod(s, turn)
-        down = np.minimum(np.maximum(s - quarter, 0.0), straight)  # distances along the two straights
-        up = np.minimum(np.maximum(s - 3 * quarter - straight, 0.0), straight)
+    def points(s: Array, straight: Array) -> tuple[Array, Array, Array]:
+        turn, s = 4 * quarter + 2 * straight, s.copy()
+        beyond = np.flatnonzero((s < 0) | (s >= turn))  # the first lap, in which most places lie
+        laps, s.flat[beyond] = np.divmod(s.flat[beyond], turn[beyond % len(turn)])
+        down, up = s - quarter, s - 3 * quarter - straight  # distances along the two straights
+        for way in (down, up):
+            np.minimum(np.maximum(way, 0.0, out=way), straight, out=way)
         angle = (s - down - up) / radii
-        sine, cosine = np.sin(angle), np.cos(angle)
-        along = np.stack([cosine, -sine])
+        along = np.empty((2, *s.shape))
+        np.cos(angle, out=along[0])
+        np.sin(angle, out=along[1])
+        ends = radii * along[::-1]
+        ends[1] -= down
+        ends[1] += up
+        np.negative(along[1], out=along[1])
         # A longer straight moves points at the same s: past its end on the right, past its start and end on the left.
-        down_growth = (s > quarter + straight) * 1.0
-        up_growth = (s > turn - quarter) * 2.0 - (s > 3 * quarter + straight)
-        growth = -(down_growth + up_growth + 2 * laps) * along  # every lap before grows as well
+        down_growth = (s > quarter + straight).view(np.int8)
+        up_growth = 2 * (s > turn - quarter).view(np.int8) - (s > 3 * quarter + straight)
+        onward = (down_growth + up_growth).astype(float)
+        onward.flat[beyond] += 2 * laps  # every lap before grows as well
+        growth = -onward * along
         growth[1] += up_growth - down_growth
-        return np.stack([radii * sine, radii * cosine - down + up]), along, growth
+        return ends, along, growth
 
     return Curve(
         points=points,
-        period=lambda size: 4 * quarter[:, 0] + 2 * size,
+        period=lambda size: 4 * quarter + 2 * size,
         period_growth=2.0,
-        first_size=lambda length: np.maximum((length - 4 * quarter[:, 0]) / 2, 0.0),
+        first_size=lambda length: np.maximum((length - 4 * quarter) / 2, 0.0),
     )
 
 
@@ -79,19 +91,22 @@ def ellipse(aspect: ArrayLike) -> Curve:
     Its size is the geometric mean of the semi-axes [m], s the angle of the parametric form from the top [rad].
     """
     aspects = np.atleast_1d(np.asarray(aspect, dtype=float))
-    wide, high = (1 / np.sqrt(aspects))[:, np.newaxis], np.sqrt(aspects)[:, np.newaxis]
+    wide, high = 1 / np.sqrt(aspects), np.sqrt(aspects)
 
-    def points(s: Array, size: Array) -> tuple[Array, Array, Array]:
-        scale, sine, cosine = size[:, np.newaxis], np.sin(s), np.cos(s)
+    def points(s: Array, scale: Array) -> tuple[Array, Array, Array]:
+        sine, cosine = np.sin(s), np.cos(s)
         unit = np.stack([wide * sine, high * cosine])
         along = np.stack([wide * cosine, -high * sine])
         return scale * unit, scale * along, unit
 
-    def pace(s: Array, size: Array) -> Array:
-        scale = size[:, np.newaxis]
-        across, up = scale * (wide * np.cos(s)), scale * (high * np.sin(s))
-        paces: Array = np.sqrt(across * across + up * up)
-        return paces
+    def pace(s: Array, scale: Array, at: NDArray[np.intp]) -> Array:
+        across, up = np.cos(s), np.sin(s)
+        for way, half in ((across, wide), (up, high)):
+            way *= np.broadcast_to(half, len(scale))[at]
+            way *= scale[at]
+            way *= way
+        across += up
+        return np.sqrt(across, out=across)
 
     return Curve(
         points=points,
@@ -140,77 +155,80 @@ def lay_chains(
         position (w, n, 3): x, y [m], θ [rad] of the links, numbered clockwise; velocity (w, n, 3), their rates; and
         whether each chain fits its curve, (w,). Rows of chains that do not are no chains.
     """
-    length, start = link_length[:, np.newaxis], phase[:, np.newaxis]
     size = curve.first_size(links * link_length)
-    s = curve.period(size)[:, np.newaxis] * (start + np.arange(links) / links)
+    s = curve.period(size) * (phase + np.arange(links + 1)[:, np.newaxis] / links)
     if curve.pace is not None:
-        s = _evenly_spaced(curve.pace, s, size)
+        s[:-1] = _evenly_spaced(curve.pace, links, s[0], size)
     worst, is_done = np.full(len(size), np.inf), np.zeros(len(size), dtype=bool)
     for _ in range(MOST_ITERATIONS):
         period = curve.period(size)
-        s[:, 0] = phase * period
-        ends, along, growth = curve.points(np.concatenate([s, (s[:, 0] + period)[:, np.newaxis]], axis=1), size)
-        chord = ends[..., 1:] - ends[..., :-1]
-        residual = _dot(chord, chord) - length**2
-        to_here = -2 * _dot(chord, along[..., :-1])
-        to_following = 2 * _dot(chord, along[..., 1:])
-        to_size = 2 * _dot(chord, growth[..., 1:] - growth[..., :-1])
+        s[0] = phase * period
+        s[-1] = s[0] + period
+        ends, along, growth = curve.points(s, size)
+        chord = ends[:, 1:] - ends[:, :-1]
+        missing = link_length**2 - _dot(chord, chord)
+        here, following = _dot(chord, along[:, :-1]), _dot(chord, along[:, 1:])
+        to_size = _dot(chord, growth[:, 1:] - growth[:, :-1])
         # The first joint moves with the period; the last chord ends on it one period later.
-        to_size[:, 0] += to_here[:, 0] * phase * curve.period_growth
-        to_size[:, -1] += to_following[:, -1] * (1 + phase) * curve.period_growth
-        last, worst = worst, np.abs(residual).max(-1)
+        to_size[0] -= here[0] * phase * curve.period_growth
+        to_size[-1] += following[-1] * (1 + phase) * curve.period_growth
+        last, worst = worst, np.abs(missing).max(0)
         is_done |= (last < MISFIT * link_length**2) & (worst > last / 2)  # rounding is reached
         if is_done.all():
             break
-        change = _solve_loop(to_here, to_following, to_size, -residual)
-        is_done |= ~np.isfinite(change).all(-1)
-        change[is_done] = 0.0
-        s[:, 1:] += change[:, :-1]
-        size = np.maximum(size + change[:, -1], 0.0)
-    fits = (np.abs(np.hypot(*chord) - length) <= MISFIT * length).all(-1)
-    joints, along, growth = ends[..., :-1], along[..., :-1], growth[..., :-1]
+        missing /= 2
+        change = _solve_loop(here, following, to_size, missing)
+        is_done |= ~np.isfinite(change).all(0)
+        change[:, is_done] = 0.0
+        s[1:-1] += change[:-1]
+        size = np.maximum(size + change[-1], 0.0)
+    along, growth = along[:, :-1], growth[:, :-1]
     # Rigid motion along the curve: s[0] moves at unit rate, the chords keep their lengths.
-    drive = np.zeros_like(s)
-    drive[:, 0] = -to_here[:, 0]
-    drive[:, -1] -= to_following[:, -1]
-    rates = _solve_loop(to_here, to_following, to_size, drive)
-    size_rate = rates[:, -1:]
-    along_rates = np.concatenate([1.0 + start * curve.period_growth * size_rate, rates[:, :-1]], axis=1)
+    drive = np.zeros_like(here)
+    drive[0] = here[0]
+    drive[-1] -= following[-1]
+    rates = _solve_loop(here, following, to_size, drive)
+    size_rate = rates[-1]
+    along_rates = np.concatenate([(1.0 + phase * curve.period_growth * size_rate)[np.newaxis], rates[:-1]])
     joint_rate = along_rates * along + size_rate * growth
-    joint_rate *= (speed / np.sqrt(_dot(joint_rate, joint_rate)).mean(-1))[:, np.newaxis]
-    return *links_between(np.moveaxis(joints, 0, -1), np.moveaxis(joint_rate, 0, -1)), fits
+    joint_rate *= speed / np.sqrt(_dot(joint_rate, joint_rate).T.copy()).mean(-1)
+    fits = worst <= 2 * MISFIT * link_length**2
+    return *links_between(ends[:, :-1].T, joint_rate.T), fits
 
 
 def _dot(first: Array, second: Array) -> Array:
     """Scalar products of vectors (2, …)."""
-    products: Array = first[0] * second[0] + first[1] * second[1]
+    products: Array = first[0] * second[0]
+    products += first[1] * second[1]
     return products
 
 
-def _evenly_spaced(pace: Callable[[Array, Array], Array], s: Array, size: Array) -> Array:
-    """Places s, (w, n), of joints that divide each curve into arcs of about equal length from its first s on."""
-    fine = s[:, :1] + np.linspace(0.0, 2 * np.pi, 1024)
-    paces = pace(fine, size)
-    steps = (paces[:, 1:] + paces[:, :-1]) / 2 * (fine[:, 1:] - fine[:, :-1])
-    arc = np.concatenate([np.zeros((len(size), 1)), steps.cumsum(-1)], axis=1)
-    n = s.shape[1]
-    return np.stack([np.interp(way[-1] * np.arange(n) / n, way, at) for way, at in zip(arc, fine, strict=True)])
+def _evenly_spaced(
+    pace: Callable[[Array, Array, NDArray[np.intp]], Array], links: int, first: Array, size: Array
+) -> Array:
+    """Places s, (n, w), of joints that divide each curve into about equal arcs from a first place on, (w,)."""
+    places = np.empty((links, len(size)))
+    for at in np.split(np.arange(len(size)), range(CACHED, len(size), CACHED)):
+        fine = first[at, np.newaxis] + np.linspace(0.0, 2 * np.pi, 1024)
+        paces, arc = pace(fine.T, size, at).T, np.zeros_like(fine)
+        np.cumsum((paces[:, 1:] + paces[:, :-1]) / 2 * (fine[:, 1:] - fine[:, :-1]), axis=1, out=arc[:, 1:])
+        marks = arc[:, -1:] * np.arange(links) / links
+        places[:, at] = np.transpose([np.interp(*each) for each in zip(marks, arc, fine, strict=True)])
+    return places
 
 
-def _solve_loop(to_here: Array, to_following: Array, to_size: Array, right: Array) -> Array:
-    """Solve the n equations of each loop's chords for the changes of s[1:] and of the size, all shapes (w, n).
+def _solve_loop(here: Array, following: Array, to_size: Array, right: Array) -> Array:
+    """Solve the n equations of each loop's chords for the changes of s[1:] and of the size, all shapes (n, w).
 
-    Chord i: to_here[i] δs[i] + to_following[i] δs[i + 1] + to_size[i] δsize = right[i], with δs[0] = δs[n] = 0.
-    From the first chord on, each gives the next δs as a + b δsize; the last one then gives δsize.
+    Chord i: following[i] δs[i + 1] − here[i] δs[i] + to_size[i] δsize = right[i], with δs[0] = δs[n] = 0.
+    From the first chord on, each gives the next δs as a − b δsize; the last one then gives δsize.
     """
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # a singular loop gives no finite change
-        following = to_following[:, :-1]
-        scale = (-to_here[:, :-1] / following).cumprod(-1)  # of each δs per first δs
-        divisor = following * scale
-        constant, slope = (scale * (side[:, :-1] / divisor).cumsum(-1) for side in (right, -to_size))
-        last = to_here[:, -1]
-        size = (right[:, -1] - last * constant[:, -1]) / (to_size[:, -1] + last * slope[:, -1])
-        return np.concatenate([constant + slope * size[:, np.newaxis], size[:, np.newaxis]], axis=1)
+        scale = (here[:-1] / following[:-1]).cumprod(0)  # of each δs per first δs
+        divisor = following[:-1] * scale
+        constant, slope = (scale * (side[:-1] / divisor).cumsum(0) for side in (right, to_size))
+        size = (right[-1] + here[-1] * constant[-1]) / (to_size[-1] + here[-1] * slope[-1])
+        return np.concatenate([constant - slope * size, size[np.newaxis]])
 
 
 def links_between(joints: Array, joint_rate: Array) -> tuple[Array, Array]:
@@ -219,9 +237,11 @@ def links_between(joints: Array, joint_rate: Array) -> tuple[Array, Array]:
     The rates of the joints, (…, n, 2) [m/s], keep all distances of neighbours.
     """
     before, before_rate = np.roll(joints, 1, axis=-2), np.roll(joint_rate, 1, axis=-2)
-    span, span_rate = joints - before, joint_rate - before_rate
-    angle = np.unwrap(np.arctan2(span[..., 1], span[..., 0]))
-    spin = (span[..., 0] * span_rate[..., 1] - span[..., 1] * span_rate[..., 0]) / np.sum(span**2, axis=-1)
-    position = np.concatenate([(joints + before) / 2, angle[..., np.newaxis]], axis=-1)
-    velocity = np.concatenate([(joint_rate + before_rate) / 2, spin[..., np.newaxis]], axis=-1)
+    x, y = np.moveaxis(joints - before, -1, 0)
+    x_rate, y_rate = np.moveaxis(joint_rate - before_rate, -1, 0)
+    position, velocity = np.empty((2, *x.shape, 3))
+    position[..., :2] = (joints + before) / 2
+    position[..., 2] = np.unwrap(np.arctan2(y, x))
+    velocity[..., :2] = (joint_rate + before_rate) / 2
+    velocity[..., 2] = (x * y_rate - y * x_rate) / (x * x + y * y)
     return position, velocity

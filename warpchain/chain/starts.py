@@ -52,7 +52,7 @@ def first_motions(setups: Sequence[Setup]) -> list[Motion | None]:
         shape = HUNG if chosen[0].has_drive else SHAPES[start]
         length = np.array([setup.parameters.link_length for setup in chosen])
         speed = 2 * np.pi * np.array([setup.scene.frequency * setup.joint_radius for setup in chosen])
-        phase = np.array([0.0 if setup.has_drive else setup.scene.phase for setup in chosen])
+        phase = np.zeros(len(chosen)) if shape is HUNG else np.array([setup.scene.phase for setup in chosen])
         laid = lay_chains(shape.curve(chosen), links, length, 0.0 * speed if start == "rest" else speed, phase)
         for place, position, velocity, fits in zip(places, *laid, strict=True):
             if not fits:

@@ -32,6 +32,11 @@ Snapshot = Mapping[str, NDArray[Any]]
 
 KEPT: Final = ("state/", "drive/")
 """How the names of arrays begin that are kept."""
+RESULTS: Final = (
+    "model/chains",
+    *(f"state/{name}" for name in ("time", "watch", "first_sample", "last_sample", "counts", "extremes", "losses")),
+)
+"""Names of the arrays that say how a run went."""
 CACHES: Final = ("scratch", "lists")
 """What follows from the state but for rounding, and fits a chain of the same constants and options only."""
 _LAYOUT: Final = "layout"
@@ -91,9 +96,6 @@ class World:
         """See worlds by their numbers in the arrays of a batch, those on the host and those that stay on the device."""
         self._at: Any = at if isinstance(at, int) else np.asarray(at, dtype=np.intp)
         self._host, self._caches = host, caches
-        self.records = host["record/samples"].shape[1] > 0 or host["record/frames"].shape[1] > 0
-        """Whether samples or frames are kept."""
-        self._longest = host["state/links"].shape[2]
 
     @classmethod
     def together(cls, worlds: Sequence["World"]) -> "World":
@@ -101,12 +103,30 @@ class World:
         return cls([world._at for world in worlds], worlds[0]._host, worlds[0]._caches)
 
     @property
+    def records(self) -> bool:
+        """Whether samples or frames are kept."""
+        return any(self._host[f"record/{name}"].shape[1] > 0 for name in ("samples", "frames"))
+
+    def taken(self) -> "World":
+        """A copy of `RESULTS` of several worlds, which may be used again; nothing else can be read from it."""
+        return World(range(len(self._at)), {name: self._host[name].take(self._at, axis=0) for name in RESULTS}, {})
+
+    @classmethod
+    def joined(cls, taken: Sequence["World"]) -> "World":
+        """What was `taken` from worlds of any batches, one behind the other."""
+        parts = {name: np.concatenate([each._host[name] for each in taken]) for name in RESULTS}
+        return cls(range(sum(len(each._at) for each in taken)), parts, {})
+
+    @property
     def links(self) -> int:
         """Number of links n, of several worlds the greatest."""
-        return int(np.max(self._host["model/chains"]["link_count"][self._at]))
+        return int(self._host["model/chains"]["link_count"][self._at].max())
 
-    def set_up(self, setups: Sequence[Setup]) -> None:
-        """Set the chains of several worlds, which have equal numbers of links, and their floors: constants of walks."""
+    def set_up(self, setups: Sequence[Setup]) -> LinkValues:
+        """Set the chains of several worlds, which have equal numbers of links, and their floors: constants of walks.
+
+        Returns what links and joints have of their own.
+        """
         own = link_values([setup.scene for setup in setups], [setup.parameters for setup in setups])
         values = dict(zip(_PARAMETERS, np.array([_VALUES(setup.parameters) for setup in setups]).T, strict=True))
         values["sprocket_radius"] = np.array([setup.contact_radius for setup in setups])
@@ -114,6 +134,7 @@ class World:
         for world, setup in zip(np.atleast_1d(self._at), setups, strict=True):
             if not setup.scene.is_level:
                 World(int(world), self._host, self._caches).set_floor(setup.floor)
+        return own
 
     def set_chain(self, parameters: Parameters, links: int, own: LinkValues | None = None) -> None:
         """Set the chain; by default, links alternate."""
@@ -226,10 +247,10 @@ class World:
         return np.array(self._host["model/chains"][name][self._at])
 
     @property
-    def link_values(self) -> LinkValues:
-        """What each link and joint has of its own."""
-        rows = self._host["model/links"][self._at, :, : self.links]
-        return LinkValues(*np.moveaxis(rows, -2, 0))
+    def radius(self) -> Array:
+        """Radius of the circles of each link [m]."""
+        radii: Array = self._host["model/links"][self._at, layout.OWN_RADIUS, : self.links]
+        return radii
 
     @property
     def counts(self) -> dict[str, int]:
@@ -269,7 +290,7 @@ class World:
             times=times[:count].copy(),
             frames=rows[:, : 2 * n].reshape(-1, 2, n).transpose(0, 2, 1).copy(),
             loads=loads[:count, : 3 * n].reshape(-1, 3, n).transpose(0, 2, 1).copy(),
-            planes=rows[:, 2 * self._longest :].reshape(-1, layout.PLANE_VALUES).copy(),
+            planes=rows[:, 2 * self._host["state/links"].shape[2] :].reshape(-1, layout.PLANE_VALUES).copy(),
         )
 
     def snapshot(self) -> dict[str, NDArray[Any]]:

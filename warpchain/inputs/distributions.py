@@ -8,14 +8,18 @@ What is drawn is a mapping of names to distributions, in the order of drawing. A
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from statistics import NormalDist
-from typing import Annotated, Final
+from typing import Annotated, ClassVar, Final
 
 import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
 from pydantic import Field
 
+from warpchain.inputs.arrays import Array
 from warpchain.inputs.fields import FIELDS, SECTION_OF
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene
@@ -41,10 +45,12 @@ class Uniform:
     lower: float
     upper: float
     bounds: tuple[float, float]
+    standard: ClassVar = "random"
 
-    def draw(self, rng: np.random.Generator) -> float:
-        """One value, which need not be physical."""
-        return float(rng.uniform(self.lower, self.upper))
+    @property
+    def line(self) -> tuple[float, float]:
+        """The value for a standard draw of 0, and how much more it is for one of 1."""
+        return self.lower, self.upper - self.lower
 
     def share(self) -> float:
         """The share of all draws that are physical."""
@@ -79,10 +85,12 @@ class Gaussian:
     mean: float | None
     sigma: float
     bounds: tuple[float, float]
+    standard: ClassVar = "standard_normal"
 
-    def draw(self, rng: np.random.Generator) -> float:
-        """One value of the whole Gaussian, which need not be physical."""
-        return float(rng.normal(self._placed_mean, self.sigma))
+    @property
+    def line(self) -> tuple[float, float]:
+        """Mean and standard deviation."""
+        return self._placed_mean, self.sigma
 
     def share(self) -> float:
         """The share of the whole Gaussian's draws that are physical."""
@@ -142,13 +150,13 @@ TABLE: Final[Mapping[str, Distribution]] = {
 release."""
 
 
-def draw(distributions: Mapping[str, Distribution], rng: np.random.Generator) -> dict[str, float]:
+def draw(distributions: Mapping[str, Distribution], rng: Generator) -> dict[str, float]:
     """A value of each of the `placed` distributions, in order, redrawn until in bounds; an `InputError` if none is."""
     drawn = {}
     for name, distribution in distributions.items():
-        least, most = distribution.bounds
+        (least, most), (start, scale) = distribution.bounds, distribution.line
         for _ in range(DRAW_LIMIT):
-            value = distribution.draw(rng)
+            value: float = start + scale * getattr(rng, distribution.standard)()
             if least <= value <= most:
                 drawn[name] = value
                 break
@@ -160,6 +168,27 @@ def draw(distributions: Mapping[str, Distribution], rng: np.random.Generator) ->
     return drawn
 
 
-def random_generator(seed: int, cell: int = 0, sample: int = 0, *more: int) -> np.random.Generator:
+def first_draws(
+    distributions: Sequence[Mapping[str, Distribution]], generators: Iterable[Generator]
+) -> tuple[Array, NDArray[np.bool_]]:
+    """What `draw` gives for each of w samples if nothing is drawn twice, (w, q), and of which that is true, (w,).
+
+    All samples draw the same q quantities from distributions of the same kinds, each from a generator of its own.
+    """
+    different = {id(each): each for each in distributions}
+    tables = {key: np.array([law.line + law.bounds for law in each.values()]) for key, each in different.items()}
+    start, scale, least, most = np.moveaxis(np.stack([tables[id(each)] for each in distributions]), -1, 0)
+    kinds = [(kind, len([*laws])) for kind, laws in groupby(law.standard for law in distributions[0].values())]
+    drawn = np.empty_like(start)
+    for row, rng in zip(drawn, generators, strict=True):
+        first = 0
+        for kind, count in kinds:
+            getattr(rng, kind)(out=row[first : first + count])
+            first += count
+    drawn = start + scale * drawn
+    return drawn, ((least <= drawn) & (drawn <= most)).all(-1)
+
+
+def random_generator(seed: int, cell: int = 0, sample: int = 0, *more: int) -> Generator:
     """The random generator of one sample, given the sweep's seed, the number of its cell, and its own in there."""
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(cell, sample, *more)))

@@ -26,6 +26,7 @@ from warpchain.chain.setup import DEFAULT_PRESET, Setup
 from warpchain.engine.devices import gpu_turn, has_gpu_turn, start_device
 from warpchain.engine.machine import machine_text, own_command
 from warpchain.engine.processors import free_memory, processors
+from warpchain.engine.world import World
 from warpchain.files import AnyPath
 from warpchain.inputs.fields import SECTION_OF, by_section
 from warpchain.inputs.keywords import takes_fields, types_of
@@ -45,7 +46,7 @@ from warpchain.sweeps.sweep_file import VERSION, BlockKeys, SweepFile
 from warpchain.walks.landmarks import LENGTHS
 from warpchain.walks.rows import derived_columns, faults_of_columns, fill_drawn, fill_outcomes, missing_rows
 from warpchain.walks.scheduler import compile_kernels, run_setups
-from warpchain.walks.walk_phases import outcomes
+from warpchain.walks.walk_phases import WalkRun, outcomes, taken
 
 if TYPE_CHECKING:
     from warpchain.typed import SweepFields
@@ -325,26 +326,32 @@ def run_shards(planned: Sweep, directory: str, seal: str, shards: Sequence[Shard
     missing = np.bincount(of_walk)
 
     def draw(places: Sequence[int]) -> list[Setup]:
-        drawn = [planned.with_draws(walks[place]) for place in places]
+        drawn = planned.with_draws([walks[place] for place in places])
         fill_drawn(rows, places, [walk.draws for walk in drawn])
         return [walk.setup for walk in drawn]
 
     with gpu_turn((setup.options.device for setup in setups), stop):
         compile_kernels(setups)  # all at once: a walk that needs one would wait for it alone
         waited = (lambda seconds: None) if pulse is None else pulse.wait
+        ended: dict[int, WalkRun] = {}
+        worlds: list[World] = []
         for over in run_setups(setups, draw=draw, keeps=keeps, stop=stop, waited=waited):
             places = [place for place, _ in over]
-            fill_outcomes(rows, places, outcomes([run for _, run in over]))
+            ended.update(over)
+            worlds.append(taken([run for _, run in over]))
             if pulse is not None:
                 pulse.beat(len(over))
             for place, run in over:
                 if keeps[place].series_every is not None:
                     motions[of_walk[place]][place - firsts[of_walk[place]]] = run.motion()
             np.subtract.at(missing, of_walk[places], 1)
-            for number in np.unique(of_walk[places]):
-                if missing[number] == 0:
-                    shard, first = shards[number], firsts[number]
-                    write_shard(directory, seal, shard, rows[first : first + len(shard)], motions.pop(number, {}))
+            numbers = [number for number in set(of_walk[places].tolist()) if missing[number] == 0]
+            if numbers or len(ended) >= SHARD_WALKS:
+                fill_outcomes(rows, [*ended], outcomes([*ended.values()], worlds))
+                ended, worlds = {}, []
+            for number in numbers:
+                shard, first = shards[number], firsts[number]
+                write_shard(directory, seal, shard, rows[first : first + len(shard)], motions.pop(number, {}))
     return machine_text(sorted({setup.options.device for setup in setups}))
 
 

@@ -13,8 +13,10 @@ import hashlib
 import itertools
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from itertools import compress
 from typing import Any, Final
 
 import numpy as np
@@ -25,7 +27,13 @@ from warpchain.chain.keep import Keep
 from warpchain.chain.setup import Setup
 from warpchain.files import AnyPath
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.distributions import DRAW_LIMIT, Distribution, draw, random_generator
+from warpchain.inputs.distributions import (
+    DRAW_LIMIT,
+    Distribution,
+    draw,
+    first_draws,
+    random_generator,
+)
 from warpchain.inputs.fields import SECTIONS
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS
@@ -98,21 +106,39 @@ class Sweep:
 
     def walk(self, index: int) -> PlannedWalk:
         """The walk with a number, one of `indices`; an `IndexError` if there is none; errors as of `with_draws`."""
-        (walk,) = self.undrawn([index])
-        return self.with_draws(walk)
+        (walk,) = self.with_draws([*self.undrawn([index])])
+        return walk
 
-    def with_draws(self, walk: PlannedWalk) -> PlannedWalk:
-        """A walk of `undrawn` with what is drawn for it.
+    def with_draws(self, walks: Sequence[PlannedWalk]) -> list[PlannedWalk]:
+        """Walks of `undrawn` with what is drawn for them.
 
         A sample may make no possible walk: with the drawn lengths, say, the chain does not reach round its sprocket.
         Then the whole sample is redrawn from its own random stream, which a designed sample does not use before. In
         `saltelli` the d + 2 walks of a sample are redrawn together. An `InputError` says that no draw was possible.
         """
+        firsts: dict[int, Point] = {}
+        for number, block in enumerate(self.blocks):
+            own = {place: walk for place, walk in enumerate(walks) if walk.block == number}
+            is_random = block.distributions and SAMPLERS[block.sampler].engine is None
+            if len(own) > 1 and is_random and not block.independent:
+                streams = {cell: self._stream(block, cell) for cell in {walk.cell for walk in own.values()}}
+                rngs = (random_generator(self.seed, streams[walk.cell], walk.sample) for walk in own.values())
+                points, is_within = first_draws([walk.laws for walk in own.values()], rngs)
+                for place, point in compress(zip(own, points.tolist(), strict=True), is_within.tolist()):
+                    firsts[place] = dict(zip(block.distributions, point, strict=True))
+        return [self._with_draws(walk, firsts.get(place)) for place, walk in enumerate(walks)]
+
+    def _with_draws(self, walk: PlannedWalk, first: Point | None) -> PlannedWalk:
+        """A walk with its draws; `first` is the first that is random, if it is known and within bounds."""
         block, fixed = self.blocks[walk.block], walk.setup
-        if not block.drawn:
+        if not block.distributions:
             return walk
+        if first is not None:
+            with suppress(InputError):
+                setup = fixed.with_drawn(first)
+                return PlannedWalk(walk.index, walk.block, walk.cell, walk.sample, setup, walk.laws, first)
         sampler = SAMPLERS[block.sampler]
-        row, member = divmod(walk.sample, sampler.walks(len(block.drawn)))
+        row, member = divmod(walk.sample, sampler.walks(len(block.distributions)))
         is_designed = sampler.engine is not None
         points, setups = self._first_possible(block, walk.cell, fixed, walk.laws, row, is_designed)
         return PlannedWalk(walk.index, walk.block, walk.cell, walk.sample, setups[member], walk.laws, points[member])
@@ -211,13 +237,17 @@ class Sweep:
 
     def _generators(self, block: Block, cell: Cell, row: int) -> tuple[int, Generator, Generator]:
         """Stream of the samples of a cell; generators of a sample, and of what it draws apart from other cells."""
-        number = 0  # of the cell's random stream among those of the block
+        stream = self._stream(block, cell)
+        rng = random_generator(self.seed, stream, row)
+        return stream, rng, random_generator(self.seed, stream, row, 1, *cell) if block.independent else rng
+
+    def _stream(self, block: Block, cell: Cell) -> int:
+        """Number of the stream of random numbers of a cell."""
+        number = 0  # among those of the block
         for (name, values), place in zip(block.axes.items(), cell, strict=True):
             if name not in self.same_samples_along:
                 number = number * len(values) + place
-        stream = block.first_stream + number
-        rng = random_generator(self.seed, stream, row)
-        return stream, rng, random_generator(self.seed, stream, row, 1, *cell) if block.independent else rng
+        return block.first_stream + number
 
     def expected(self, block: Block, cell: Cell, there: NDArray[np.bool_], drawn: Array) -> Array:
         """What random samples of a cell draw on average, in the order of drawing.

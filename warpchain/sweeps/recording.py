@@ -4,7 +4,7 @@ from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Discriminator, Field, Strict, Tag, model_validator
 
-from warpchain.chain.keep import FRAME_INTERVAL, LONGEST_INTERVAL, Keep
+from warpchain.chain.keep import FRAME_INTERVAL, LONGEST_INTERVAL, NOTHING, Keep
 from warpchain.inputs.options import Options
 from warpchain.inputs.validation import STRICT, InputError, number_field
 
@@ -99,6 +99,8 @@ class Recording(BaseModel):
 
     def keep(self, sample: int, options: Options) -> Keep:
         """What is kept of a sample of a cell with these options."""
+        if not self.choices:
+            return NOTHING
         chosen = {name: choice for name, choice in self.choices.items() if choice.includes(sample)}
         every = {name: choice.steps(options, f"sweep.record.{name}") for name, choice in chosen.items()}
         before = self.frames.before if self.frames and "frames" in chosen else None

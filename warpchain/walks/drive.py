@@ -5,6 +5,8 @@
 
 import math
 from collections.abc import Sequence
+from operator import attrgetter
+from typing import Final
 
 import numpy as np
 
@@ -35,69 +37,78 @@ BY_ITSELF = -1.0
 """As `steady_time` means: the kernel chooses how long to watch, see :mod:`warpchain.kernels.events.release`."""
 
 
-def drives_of(setups: Sequence[Setup], links: LinkValues) -> dict[str, Array]:
-    """The fields of `Drive`, (w,) by name, of walks that begin on a sprocket; `links` are what their chains have."""
-    greatest = links.greatest_load(np.array([setup.parameters.link_length for setup in setups]))
-    facts = (values.tolist() for values in (links.mean_mass, links.alternates, greatest))
-    drives = [_drive_of(*given) for given in zip(setups, *facts, strict=True)]
-    return {name: np.array([drive[name] for drive in drives]) for name in drives[0]}
+_SCENE: Final = attrgetter(
+    "links", "frequency", "spin_up_time", "load_factor", "steady_time", "steady_tolerance", "extra_hold", "phase"
+)
+_PARAMETERS: Final = attrgetter("link_length", "gravity", "joint_stiffness")
 
 
-def _drive_of(setup: Setup, mean_mass: float, alternates: bool, greatest_load: float) -> dict[str, float]:
-    """The fields of `Drive` of a walk, given three facts of its `LinkValues`."""
-    scene, parameters, options = setup.scene, setup.parameters, setup.options
-    from_rest = scene.start == "rest"
-    radius = setup.joint_radius
-    speed = 2 * math.pi * scene.frequency * radius
-    density = mean_mass / parameters.link_length
+def drives_of(setups: Sequence[Setup], own: LinkValues) -> dict[str, Array]:
+    """The fields of `Drive`, (w,) by name, of walks of equal options that begin on a sprocket; `own` have their chains.
+
+    Logarithms and the like are taken one by one, since arrays of them may be rounded otherwise.
+    """
+    options, from_rest = setups[0].options, np.array([setup.scene.start == "rest" for setup in setups])
+    scenes = np.array([_SCENE(setup.scene) for setup in setups], dtype=float).T  # None is NaN
+    links, frequency, spin_up_time, load_factor, steady_time, steady_tolerance, extra_hold, phase = scenes
+    length, gravity, stiffness = np.array([_PARAMETERS(setup.parameters) for setup in setups]).T
+    radius, settled = np.array([(setup.joint_radius, setup.settling_time) for setup in setups]).T
+    alternates, mean_mass = own.alternates, own.mean_mass
+    speed = 2 * math.pi * frequency * radius
+    density = mean_mass / length
     tension = density * speed**2
-    side = max(0.0, scene.links * parameters.link_length / 2 - math.pi * radius)
-    weight = density * parameters.gravity * side / 2  # the tension that it causes in the middle of the sides
-    own = parameters.joint_stiffness
-    soft, softest = (_as_soft_as(each, own, mean_mass) for each in (SOFT, SOFTEST))
-    suitable = 1.0  # unless links alternate: the loop under load is another
-    if alternates:
-        bearable = LOADED_STRAIN * (soft if options.soften_drive else own) * parameters.link_length
-        limit = min(GREATEST_LOAD, greatest_load)
-        suitable = max(1.0, min(limit, bearable / weight) if weight > 0 else limit)
-    load_factor = scene.load_factor or suitable
-    softness = loaded_softness = 0.0
+    side = np.maximum(0.0, links * length / 2 - math.pi * radius)
+    weight = density * gravity * side / 2  # the tension that it causes in the middle of the sides
+    soft, softest = (_as_soft_as(each, stiffness, mean_mass) for each in (SOFT, SOFTEST))
+    bearable = LOADED_STRAIN * (soft if options.soften_drive else stiffness) * length
+    limit = np.minimum(GREATEST_LOAD, own.greatest_load(length))
+    suitable = np.maximum(
+        1.0, np.fmin(limit, np.divide(bearable, weight, out=np.full_like(weight, np.inf), where=weight > 0))
+    )
+    suitable[~alternates] = 1.0  # the loop under load is another
+    load_factor = np.where(np.isnan(load_factor), suitable, load_factor)
+    softness = loaded_softness = np.zeros_like(speed)
     if options.soften_drive:
-        pull, length = tension + load_factor * weight, parameters.link_length
-        softness = _softness(own, soft, softest, tension / (HOLD_STRAIN * length))
-        loaded_softness = _softness(own, soft, softest, pull / (LOADED_STRAIN * length))
-    period = scene.links * parameters.link_length / speed if speed > 0 else STILL_PERIOD
-    window = min(max(period / 2, SHORTEST_WINDOW), LONGEST_WINDOW)
-    if not alternates:  # the loop swings as it turns: only over whole turns does its mean stay
-        window = period * math.ceil(SHORTEST_WINDOW / period)
+        pull = tension + load_factor * weight
+        softness = _softness(stiffness, soft, softest, tension / (HOLD_STRAIN * length))
+        loaded_softness = _softness(stiffness, soft, softest, pull / (LOADED_STRAIN * length))
+    period = np.divide(links * length, speed, out=np.full_like(speed, STILL_PERIOD), where=speed > 0)
+    window = np.minimum(np.maximum(period / 2, SHORTEST_WINDOW), LONGEST_WINDOW)
+    # a loop of links that do not alternate swings as it turns: only over whole turns does its mean stay
+    window = np.where(alternates, window, period * np.ceil(SHORTEST_WINDOW / period))
     longest_step = max(options.contact_step, options.soft_contact_step if options.soften_drive else 0.0)
-    settled, spin_up = setup.settling_time, scene.spin_up_time if from_rest and speed > 0 else 0.0
+    spin_up = np.where(from_rest & (speed > 0), spin_up_time, 0.0)
     return {
-        "sprocket_speed": -2 * math.pi * scene.frequency,  # clockwise, so that the walk goes towards +x
+        "sprocket_speed": -2 * math.pi * frequency,  # clockwise, so that the walk goes towards +x
         "spin_up_start": settled,
         "spin_up_time": spin_up,
         "hold_start": settled + spin_up,
-        "loop_speed": setup.loop_speed,
+        "loop_speed": np.array([setup.loop_speed for setup in setups]),
         "loop_period": period,
         "load_factor": load_factor,
         "steady_window": window,
-        "steady_time": BY_ITSELF if scene.steady_time is None else scene.steady_time,
-        "steady_tolerance": scene.steady_tolerance,
-        "extra_hold": scene.extra_hold,
-        "release_phase": scene.phase,
+        "steady_time": np.where(np.isnan(steady_time), BY_ITSELF, steady_time),
+        "steady_tolerance": steady_tolerance,
+        "extra_hold": extra_hold,
+        "release_phase": phase,
         "hold_softness": softness,
         "loaded_softness": loaded_softness,
-        "push_rate": min(FASTEST_PUSH, PUSH / longest_step),
+        "push_rate": np.full_like(speed, min(FASTEST_PUSH, PUSH / longest_step)),
     }
 
 
-def _as_soft_as(joints: Joints, own: float, mean_mass: float) -> float:
-    """Stiffness [N/m] of a chain's joints that are as soft as these; none becomes stiffer than its own."""
+def _as_soft_as(joints: Joints, own: Array, mean_mass: Array) -> Array:
+    """Stiffness [N/m] of chains' joints that are as soft as these; none becomes stiffer than its own."""
     heavier = mean_mass / SOFT_MASS
-    return min(own, (heavier if heavier > 2 else 1.0) * joints.stiffness)
+    return np.minimum(own, np.where(heavier > 2, heavier, 1.0) * joints.stiffness)
 
 
-def _softness(own: float, soft: float, softest: float, wanted: float) -> float:
+def _softness(*stiffnesses: Array) -> Array:
+    """See `_softness_of`, of several chains."""
+    return np.array([*map(_softness_of, *(each.tolist() for each in stiffnesses))])
+
+
+def _softness_of(own: float, soft: float, softest: float, wanted: float) -> float:
     """Softness of joints as stiff as wanted: from 0, their own stiffness, over 1, soft, to 2, softest, all in N/m."""
     if softest == own or wanted <= softest:
         return 2.0

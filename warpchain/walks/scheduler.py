@@ -33,11 +33,11 @@ SHARED_WALKS = 2000
 On an H200 the 504 walks of Figure 6 took 3.7 s in blocks of five sizes, each with a kernel of its own, and 2.4 s in
 blocks of 192 threads, some of them idle. 2016 walks took as long in both.
 """
-DRAWN_TOGETHER = 32
+DRAWN_TOGETHER = 64
 """Walks that are drawn and laid together, ahead of the worlds that they will have.
 
-To lay w chains takes about F + c w, with F as much as 10 to 20 chains: Python's part, beside that of the numbers. For
-32 it is a third of the whole. To take more would gain little, and let a launch that is over wait longer.
+To lay w chains takes about F + c w, with F as much as 30 chains: Python's part, beside that of the numbers. For 64 it
+is a third of the whole. To take more would gain little, and let a launch that is over wait longer.
 """
 BATCHES_PER_GPU = 4
 """While the host handles one of them, the others go on and fill the device."""
@@ -92,12 +92,17 @@ def _groups(setups: Sequence[Setup], walks: int) -> list[list[int]]:
     group walks that are spun fast (60 links from rest: 82,000 attempts at 5 Hz, 350,000 at 30; 180: 164,000, 135,000).
     """
     alike: dict[tuple[int, int, Options], list[int]] = defaultdict(list)
+    ranks: dict[int, tuple[float, int, str]] = {}  # by the identities of setups, which walks of a cell share
+    group_of: dict[int, list[int]] = {}
     for place, setup in enumerate(setups):
-        links, size = setup.scene.links, block_threads(setup.scene.links)
-        shares = not on_gpu(setup.options.device) or (walks <= SHARED_WALKS and size <= SHARED_THREADS)
-        alike[layout.padded_width(links), 0 if shares else size, setup.options].append(place)
+        if id(setup) not in ranks:
+            links, size = setup.scene.links, block_threads(setup.scene.links)
+            shares = not on_gpu(setup.options.device) or (walks <= SHARED_WALKS and size <= SHARED_THREADS)
+            group_of[id(setup)] = alike[layout.padded_width(links), 0 if shares else size, setup.options]
+            ranks[id(setup)] = -setup.scene.frequency, -links, setup.scene.start
+        group_of[id(setup)].append(place)
     for places in alike.values():
-        places.sort(key=lambda place: (-setups[place].scene.frequency, -setups[place].scene.links))
+        places.sort(key=lambda place: ranks[id(setups[place])])
     return sorted(alike.values(), key=lambda places: -max(setups[place].scene.links for place in places))
 
 
@@ -205,11 +210,8 @@ class BatchRun:
         }
         self._running |= begun
         self._go_on(begun)
-        together = {
-            features: np.flatnonzero(self._kernel == kernel)
-            for kernel, features in enumerate(self._kernels)
-            if kernel in self._kernel
-        }
+        together = {features: np.flatnonzero(self._kernel == kernel) for kernel, features in enumerate(self._kernels)}
+        together = {features: worlds for features, worlds in together.items() if len(worlds)}
         if together:
             self.batch.start(together, driven=self._is_driven)
         return bool(together)
@@ -222,20 +224,22 @@ class BatchRun:
                 run.drain()
                 if self._watch is not None:
                     self._watch(run)
-        has_stopped = (self._kernel >= 0) & (self.batch.statuses() != Status.RUNNING)
+        has_stopped = (self._kernel >= 0) & (self.batch.statuses() != int(Status.RUNNING))
         stopped = {world: self._running[world] for world in np.flatnonzero(has_stopped).tolist()}
         self._go_on(stopped)
         return [self._running.pop(world) for world, (_, run) in stopped.items() if run.features is None]
 
     def _go_on(self, walks: Mapping[int, tuple[int, WalkRun]]) -> None:
         """Begin the next phase of walks on worlds, and note what kernels these need."""
-        if walks:
-            go_on([run for _, run in walks.values()])
-        for world, (_, run) in walks.items():
-            if run.features is not None and run.features not in self._kernels:
-                self._kernels.append(run.features)
-            self._is_driven[world] = run.is_driven
-            self._kernel[world] = -1 if run.features is None else self._kernels.index(run.features)
+        if not walks:
+            return
+        go_on([run for _, run in walks.values()])
+        wanted = [run.features for _, run in walks.values()]
+        different = {id(features): features for features in wanted}  # which are compared slowly
+        self._kernels += (each for each in different.values() if each is not None and each not in self._kernels)
+        numbers = {key: -1 if each is None else self._kernels.index(each) for key, each in different.items()}
+        self._is_driven[[*walks]] = [run.is_driven for _, run in walks.values()]
+        self._kernel[[*walks]] = [numbers[id(features)] for features in wanted]
 
 
 def _run_groups(

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.chain.floor import circles_of, raised_by
+from warpchain.chain.floor import raised_by
 from warpchain.chain.keep import NOTHING, Keep
 from warpchain.chain.setup import Setup
 from warpchain.chain.sprocket_motion import motion_rows
@@ -174,8 +174,8 @@ class WalkRun:
         self.recorder.drain(self.is_released)
 
 
-Phase = Callable[[Sequence[WalkRun]], None]
-"""What begins a phase of walks that are alike."""
+Phase = Callable[[Sequence[WalkRun], World], None]
+"""What begins a phase of walks that are alike, given their worlds as one."""
 
 
 def go_on(runs: Sequence[WalkRun]) -> None:
@@ -192,14 +192,20 @@ def go_on(runs: Sequence[WalkRun]) -> None:
         else:
             alike[run._next, setup.scene.links, setup.scene.start, setup.start is None].append(run)
     for (begin, *_), group in alike.items():
-        begin(group)
+        begin(group, _together(group))
 
 
-def outcomes(runs: Sequence[WalkRun]) -> dict[str, Any]:
-    """The numbers of walks that are over, see `outcomes_of`."""
+def taken(runs: Sequence[WalkRun]) -> World:
+    """What `outcomes` reads of the worlds of walks that are over, which others may use then."""
+    return _together(runs).taken()
+
+
+def outcomes(runs: Sequence[WalkRun], worlds: Sequence[World] = ()) -> dict[str, Any]:
+    """The numbers of walks that are over, see `outcomes_of`, from their own worlds or from those that were `taken`."""
     setups, statuses = [run.setup for run in runs], [run.status for run in runs]
     driven, released = [run.driven for run in runs], [run.is_released for run in runs]
-    return outcomes_of(_together(runs), setups, statuses, driven, released)
+    world = World.joined(worlds) if worlds else _together(runs)
+    return outcomes_of(world, setups, statuses, driven, released)
 
 
 def _together(runs: Sequence[WalkRun]) -> World:
@@ -207,19 +213,19 @@ def _together(runs: Sequence[WalkRun]) -> World:
     return World.together([run.world for run in runs])
 
 
-def _begin(runs: Sequence[WalkRun]) -> None:
+def _begin(runs: Sequence[WalkRun], world: World) -> None:
     """Set worlds up, and begin the first phase."""
-    world, setups = _together(runs), [run.setup for run in runs]
-    world.set_up(setups)
+    setups = [run.setup for run in runs]
+    own = world.set_up(setups)
     if setups[0].start is not None:
         for run in runs:
             _continue(run)
         return
     position, velocity = (np.array(parts) for parts in zip(*(run._motion for run in runs if run._motion), strict=True))
     if not setups[0].has_drive:
-        _release(runs, position, velocity)
+        _release(runs, world, position, velocity)
         return
-    drives = drives_of(setups, world.link_values)
+    drives = drives_of(setups, own)
     world.set_drive(**drives)
     for run, start, softness in zip(runs, drives["hold_start"].tolist(), drives["hold_softness"].tolist(), strict=True):
         run.driven.full_speed_at, run._hold_softness = start, softness
@@ -227,35 +233,34 @@ def _begin(runs: Sequence[WalkRun]) -> None:
     settled = np.array([setup.settling_time for setup in setups])
     world.load(position, velocity, stop_time=settled, stop_status=Status.FINISHED, softness=drives["hold_softness"])
     if setups[0].scene.start != "rest":
-        _hold(runs)
+        _hold(runs, world)
 
 
-def _spin_up(runs: Sequence[WalkRun]) -> None:
+def _spin_up(runs: Sequence[WalkRun], world: World) -> None:
     """Note how chains hang at rest; their sprockets go on and turn."""
     clearances = np.array([run.setup.scene.clearance for run in runs])
-    for run, hanging in zip(runs, _raised(runs, _together(runs).position, clearances).tolist(), strict=True):
+    for run, hanging in zip(runs, _raised(runs, world, world.position, clearances).tolist(), strict=True):
         run._hanging = hanging
-    _hold(runs)
+    _hold(runs, world)
 
 
-def _hold(runs: Sequence[WalkRun]) -> None:
+def _hold(runs: Sequence[WalkRun], world: World) -> None:
     """Carry loops on until they are steady."""
     limits = np.array([run.driven.full_speed_at + run.setup.scene.hold_limit for run in runs])
-    _together(runs).resume(limits, Status.NOT_STEADY)
+    world.resume(limits, Status.NOT_STEADY)
     for run in runs:
         run.enter("driven", _let_go)
 
 
-def _let_go(runs: Sequence[WalkRun]) -> None:
+def _let_go(runs: Sequence[WalkRun], world: World) -> None:
     """Release steady loops from their sprockets, which vanish or move on."""
-    world = _together(runs)
     position, velocity, unloaded_at = world.position, world.velocity, world.unloaded_at
     times, drifts = world.state("time").tolist(), world.watched(layout.DRIFT).tolist()
     tallies = world.state("counts"), world.state("extremes")
     for run, time, drift, counts, extremes in zip(runs, times, drifts, *tallies, strict=True):
         driven = run.driven
         driven.drive_time, driven.drift, driven.counts, driven.extremes = time, drift, counts, extremes
-    _release(runs, position, velocity)
+    _release(runs, world, position, velocity)
     for run, since in zip(runs, unloaded_at.tolist(), strict=True):
         driven, scene = run.driven, run.setup.scene
         run.recorder.release(driven.drive_time, driven.raised, float(np.fmax(driven.full_speed_at, since)))
@@ -265,9 +270,9 @@ def _let_go(runs: Sequence[WalkRun]) -> None:
             run.enter("moving", _walk)
 
 
-def _walk(runs: Sequence[WalkRun]) -> None:
+def _walk(runs: Sequence[WalkRun], world: World) -> None:
     """Let chains walk on until they rest; nothing comes after that."""
-    _together(runs).resume(np.array([run._walk_end for run in runs]), Status.TIME_LIMIT)
+    world.resume(np.array([run._walk_end for run in runs]), Status.TIME_LIMIT)
     for run in runs:
         run.enter("free", None)
 
@@ -282,7 +287,7 @@ def _continue(run: WalkRun) -> None:
     memory, tilts = start.memory, run.setup.scene.plane == "tilting"
     run.is_released = True
     if not memory:
-        _load([run], start.position[np.newaxis], start.velocity[np.newaxis])
+        _load([run], _together([run]), start.position[np.newaxis], start.velocity[np.newaxis])
         return
     run.driven = Driven.remembered(memory)
     is_kept, interval = start.is_placed_as_in(run.setup), run.recorder.keep.frame_interval
@@ -293,7 +298,7 @@ def _continue(run: WalkRun) -> None:
     here |= state_of_plane(world.plane) if tilts else {}
     is_there = all(values.tobytes() == getattr(start, name).tobytes() for name, values in here.items())
     if is_kept and is_there:  # to the bit
-        _walk([run])
+        _walk([run], _together([run]))
         run.recorder.go_on(memory["state/last_sample"], start.time)
         return
     if tilts:
@@ -306,38 +311,37 @@ def _continue(run: WalkRun) -> None:
     run.enter("free", _walk_from_change)
 
 
-def _walk_from_change(runs: Sequence[WalkRun]) -> None:
+def _walk_from_change(runs: Sequence[WalkRun], world: World) -> None:
     """Let chains walk on whose states were changed."""
     for run in runs:
         assert run.setup.start is not None
         run.world.set_state(first_area=run.setup.start.memory["state/first_area"])
-    _walk(runs)
+    _walk(runs, world)
 
 
-def _raised(runs: Sequence[WalkRun], position: Array, clearances: Array) -> Array:
+def _raised(runs: Sequence[WalkRun], world: World, position: Array, clearances: Array) -> Array:
     """How far chains at these positions must be raised to their clearances [m], (w,)."""
-    circles = circles_of(position, np.array([run.setup.parameters.link_length for run in runs]))
-    radius = _together(runs).link_values.radius
-    return raised_by([run.setup.floor for run in runs], circles, np.tile(radius, 2), clearances)
+    floors = [None if run.setup.scene.is_level else run.setup.floor for run in runs]
+    lengths = np.array([run.setup.parameters.link_length for run in runs])
+    return raised_by(floors, position, lengths, world.radius, clearances)
 
 
-def _release(runs: Sequence[WalkRun], position: Array, velocity: Array) -> None:
+def _release(runs: Sequence[WalkRun], world: World, position: Array, velocity: Array) -> None:
     """Begin the walks of chains on their floors."""
     hangs = np.array([run.setup.scene.clearance_of == "hanging" for run in runs])
-    raised = _raised(runs, position, np.where(hangs, 0.0, [run.setup.scene.clearance for run in runs]))
+    raised = _raised(runs, world, position, np.where(hangs, 0.0, [run.setup.scene.clearance for run in runs]))
     # a loop is wider than it hung, and may reach into a wall
     raised = np.where(hangs, np.fmax([run._hanging for run in runs], raised), raised)
     position[..., 1] += raised[:, np.newaxis]
-    _load(runs, position, velocity)
+    _load(runs, world, position, velocity)
     for run, own, height in zip(runs, position, raised.tolist(), strict=True):
         run.driven.raised, run.is_released = height, True
         if run.setup.scene.plane == "tilting":
             run.world.set_plane(released_plane(run.setup, own))
 
 
-def _load(runs: Sequence[WalkRun], position: Array, velocity: Array) -> None:
+def _load(runs: Sequence[WalkRun], world: World, position: Array, velocity: Array) -> None:
     """Begin the last phase of walks anew."""
-    world = _together(runs)
     world.load(
         position,
         velocity,
@@ -348,7 +352,7 @@ def _load(runs: Sequence[WalkRun], position: Array, velocity: Array) -> None:
         has_frame_marks=np.array([run.recorder.keep.frame_interval > 0 for run in runs]),
     )
     world.set_drive(farthest=np.array([run._farthest for run in runs]))
-    _walk(runs)
+    _walk(runs, world)
 
 
 def _attempts_before(runs: Sequence[WalkRun]) -> NDArray[np.int64]:
