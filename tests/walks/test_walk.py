@@ -176,3 +176,29 @@ def test_step_limit(start, limit):
     assert np.isnan(walk.dx)
     assert walk.steps_accepted + walk.steps_rejected == limit
     assert walk.walk_time > 0
+
+
+def test_a_gpu_drives_and_releases_a_chain_in_one_kernel() -> None:
+    """A loop held for a moment leaves its sprocket as fast as that turns, and falls without losing energy unseen."""
+    walk = warpchain.walk(
+        links=30,
+        frequency=15,
+        start="spinning",
+        preset="soft",
+        settle_time=0.02,
+        spin_up_time=0.02,
+        steady_time=0.02,
+        steady_tolerance=0.9,
+        walk_limit=0.05,
+        seed=1,
+        method="dp5",
+        tolerance=1e-3,
+        precision="double",
+        device="fibers",
+    )
+    assert walk.status == Status.TIME_LIMIT
+    assert walk.impulses["sprocket"] > 1000
+    assert walk.release_speed == pytest.approx(2 * np.pi * 15 * (SOFT.sprocket_radius + SOFT.circle_radius), rel=0.01)
+    fallen = walk.center[0, 1] - walk.center[-1, 1] + walk.time[-1] * walk.center_velocity[0, 1]
+    assert fallen == pytest.approx(0.5 * walk.setup.parameters.gravity * walk.time[-1] ** 2, rel=1e-3)
+    assert abs(walk.energy_error) < 1e-3
