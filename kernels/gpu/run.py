@@ -21,7 +21,7 @@ from warpchain.kernels.gpu.upright import PlaneHooks
 from warpchain.kernels.layout import BOARD_LOST_SELF, BOARD_VALUES, SELF_IMPULSES, STRAND_IMPULSES, VALUE_DEADLINE
 from warpchain.kernels.physics.elementary import ONE, ZERO
 from warpchain.kernels.physics.scaled_loads import drag_link, write_link
-from warpchain.kernels.types import Chain, Integers, Row, Rows, Worlds
+from warpchain.kernels.types import Chain, Row, Rows, Worlds
 
 SHARES = 5
 """Doubles of a thread in the memory in which stages exchange ends."""

@@ -118,7 +118,7 @@ def launch_kernel(batch: Batch, kernel: wp.Kernel, worlds: Sequence[int], attemp
 
 
 def launch_blocks(batch: Batch, features: Features, attempts: int, *, block_dim: int) -> None:
-    """Carry all worlds on in the GPU kernel for these features, which chains on a sprocket share with those on a floor."""
+    """Carry all worlds on in the GPU kernel that chains on a sprocket share with those on a floor."""
     worlds = range(len(batch.worlds))
     if features.fixed_body == "sprocket":
         features, worlds = replace(features, fixed_body="floor"), range(-1, -1 - len(batch.worlds), -1)
