@@ -27,6 +27,7 @@ from warpchain.engine.world import CACHES, World
 from warpchain.inputs.arrays import Array
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
+from warpchain.kernels.methods.explicit_tableaus import HYBRID, HYBRID_SPRINGS
 from warpchain.status import Status
 from warpchain.walks.drive import drives_of
 from warpchain.walks.moving_plane import released_plane, state_of_plane
@@ -71,12 +72,13 @@ def _kernels(
     method: str, columns: int, contact: bool, is_mixed: bool, body: str, tilts: bool, has_drive: bool, moves: bool
 ) -> dict[str, Features]:
     """See `phase_features`; `moves`: whether the sprocket moves after the release."""
-    features = partial(Features, method, columns, self_contact=contact, is_mixed=is_mixed)
-    found = {"free": features(body, tilts=tilts)}
+    features = partial(Features, columns=columns, self_contact=contact, is_mixed=is_mixed)
+    found = {"free": features(method, fixed_body=body, tilts=tilts)}
     if has_drive:
-        found["driven"] = features("sprocket")
+        # on a sprocket no joint becomes rigid, and the release loads a chain anew: both methods may share this kernel
+        found["driven"] = features(HYBRID_SPRINGS if method == HYBRID else method, fixed_body="sprocket")
         if moves:
-            found["moving"] = features(body, tilts=tilts, moving_sprocket=True)
+            found["moving"] = features(method, fixed_body=body, tilts=tilts, moving_sprocket=True)
     return found
 
 
