@@ -216,7 +216,7 @@ def make_entry(module: wp.Module, is_block: bool):
     """Kernel without a body: name, arguments, threads of a step kernel; ``is_block``: for ``wp.launch_tiled``."""
 
     def advance(launched: Integers, worlds: Worlds):
-        _world = launched[wp.tid()]
+        _place, _ = wp.tid()
 
     def advance_block(launched: Integers, worlds: Worlds):
         _block, _lane = wp.tid()

@@ -58,7 +58,7 @@ def state_is_finite(K: Rows, chain: Chain):
 
 @functools.cache
 def make_advance(features: Features):
-    """Kernel with :data:`types.STEP_ARGUMENTS`, one thread per chain.
+    """Kernel with the arguments of :func:`types.make_entry`, one thread per chain: launched over (chains, 1).
 
     Worlds whose status is not RUNNING are left alone.
     """
@@ -114,7 +114,8 @@ def make_advance(features: Features):
         name="advance", module="unique", enable_backward=False, module_options={"cpu_compiler_flags": COMPILER_FLAGS}
     )
     def advance(launched: Integers, worlds: Worlds):
-        world = launched[wp.tid()]
+        place, _ = wp.tid()  # with one number alone Warp compiles the loop twice, once for contiguous arguments
+        world = launched[place]
         if worlds.status[world] != RUNNING:
             return
         memory = worlds.scratch[world]

@@ -24,7 +24,7 @@ COARSE = {
     "samples": 1,
     "preset": "paper",
     "scene": {"start": "ellipse", "walk_limit": 0.02, "links": 30},
-    "options": {"method": "dp5"},
+    "options": {"method": "os32"},
 }
 """Two walks, of which the first has a tolerance that does not suit its stiff joints."""
 

@@ -131,7 +131,7 @@ def launch_chains(batch: Batch, features: Features, attempts: int) -> None:
     """Carry all worlds on in the CPU kernel for these features."""
     batch.control.attempts = attempts
     inputs = [wp.array(range(len(batch.worlds)), dtype=wp.int32, device="cpu"), batch.state]
-    wp.launch(cpu_loop.make_advance(features), dim=len(batch.worlds), inputs=inputs, device="cpu")
+    wp.launch(cpu_loop.make_advance(features), dim=(len(batch.worlds), 1), inputs=inputs, device="cpu")
 
 
 def listed_pairs(batch: Batch, world: int = 0) -> set[tuple[int, int]]:

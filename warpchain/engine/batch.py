@@ -185,7 +185,7 @@ class Batch:
         if self._gpu is None:
             for kernel, worlds in zip(kernels, groups.values(), strict=True):
                 numbers = wp.array(np.asarray(worlds, dtype=np.int32), dtype=wp.int32, device=self.device.warp)
-                wp.launch(kernel, dim=len(worlds), inputs=[numbers, self.state], device=self.device.warp)
+                wp.launch(kernel, dim=(len(worlds), 1), inputs=[numbers, self.state], device=self.device.warp)
             return
         order = np.concatenate([*groups.values()])
         if driven is not None:

@@ -28,6 +28,7 @@ from warpchain.inputs.arrays import Array
 from warpchain.inputs.options import on_gpu
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
+from warpchain.kernels.methods.explicit_tableaus import HYBRID, HYBRID_SPRINGS
 from warpchain.status import Status
 from warpchain.walks.drive import drives_of
 from warpchain.walks.moving_plane import released_plane, state_of_plane
@@ -85,12 +86,14 @@ def _kernels(
     moves: bool,
 ) -> dict[str, Features]:
     """See `phase_features`; `shares`: one kernel, `moves`: whether the sprocket moves after the release."""
-    features = partial(Features, method, columns, self_contact=contact, is_mixed=is_mixed)
-    found = {"free": features(body, tilts=tilts, has_drive=shares)}
+    features = partial(Features, columns=columns, self_contact=contact, is_mixed=is_mixed)
+    found = {"free": features(method, fixed_body=body, tilts=tilts, has_drive=shares)}
     if has_drive:
-        found["driven"] = found["free"] if shares else features("sprocket")
+        # on a sprocket no joint becomes rigid, and the release loads a chain anew: both methods may share this kernel
+        driven = features(HYBRID_SPRINGS if method == HYBRID else method, fixed_body="sprocket")
+        found["driven"] = found["free"] if shares else driven
         if moves:
-            found["moving"] = features(body, tilts=tilts, moving_sprocket=True)
+            found["moving"] = features(method, fixed_body=body, tilts=tilts, moving_sprocket=True)
     return found
 
 

@@ -4,19 +4,11 @@ from collections.abc import Iterator
 
 import pytest
 
-from warpchain.kernels.cpu import loop as cpu_loop
-from warpchain.kernels.gpu import loop as gpu_loop
+from tests.support.kernels_compiled_otherwise import PLAIN, compiled_with
 
 
 @pytest.fixture(scope="module")
 def without_fused_operations() -> Iterator[None]:
     """Step kernels without fused operations, for all tests of a module."""
-    factories = (cpu_loop.make_advance, gpu_loop.make_advance_block)
-    with pytest.MonkeyPatch.context() as patch:
-        for module in (cpu_loop, gpu_loop):
-            patch.setattr(module, "COMPILER_FLAGS", "-ffp-contract=off")
-        for factory in factories:
-            factory.cache_clear()
+    with compiled_with(PLAIN):
         yield
-    for factory in factories:
-        factory.cache_clear()

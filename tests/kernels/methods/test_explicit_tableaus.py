@@ -10,6 +10,7 @@ import pytest
 
 import warpchain
 from tests.oracle_model.motion_equations import acceleration
+from tests.support.kernels_compiled_otherwise import PLAIN, compiled_with
 from warpchain.chain.start_shapes import ellipse, lay_chain
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
@@ -123,8 +124,8 @@ def test_a_tableau_is_all_that_a_new_method_takes(new_method: str) -> None:
     """Once registered it is an option and walks on a CPU: the chain falls freely, and its ledger closes."""
     assert Options(method=new_method).method == new_method
     settings = {"links": 12, "frequency": 15.0, "start": "ellipse", "clearance": 0.05, "walk_limit": 5e-3}
-    settings["self_contact"] = False  # a kernel that is compiled soon
-    walk = warpchain.walk(preset="soft", method=new_method, **settings)
+    with compiled_with(PLAIN):
+        walk = warpchain.walk(preset="soft", method=new_method, **settings)
     assert walk.status == warpchain.Status.TIME_LIMIT
     assert walk.steps_accepted > 100
     fall = walk.center[0, 1] - walk.center[:, 1]
