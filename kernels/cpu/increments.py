@@ -33,7 +33,6 @@ class Steps:
     begin: Any  # ``(K, S, chain)`` rounds the state at the start of a step, whose ends are placed
     first_stage: Any  # ``(K, S, chain)`` evaluates the first stage
     take_last_stage: Any  # ``(S, n)`` takes the last stage of the step before for the first one
-    shift_first_stage: Any  # ``(S, before, now)`` changes it from one plane to another
     attempt: Any  # ``(K, S, chain, h, tolerance)`` → bits of the greatest error ratio, see :func:`order_bits`
     commit: Any  # ``(K, S, chain, h)`` takes the new state and places its ends
     start_is_finite: Any  # ``(S, n)``
@@ -42,7 +41,7 @@ class Steps:
 @functools.cache
 def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
     """Steps of one tableau in single or double precision; load: ``WEIGHT``, ``PLANE``, or a script's Warp function."""
-    algebra = increments(real)
+    algebra, exact = increments(real), increments(wp.float64)
     Numbers = wp.array2d(dtype=real)
     six = wp.types.vector(length=6, dtype=real)
     is_single = real is wp.float32
@@ -77,6 +76,9 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
         S[at.RATE, i] = joint.u
         S[at.RATE + 1, i] = joint.v
         S[at.SPIN, i] = joint.spin
+        if wp.static(on_plane):
+            S[at.OPENING, i] = joint.x
+            S[at.OPENING + 1, i] = joint.y
 
     @wp.func
     def begin(K: Rows, S: Numbers, chain: Chain):
@@ -91,9 +93,6 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
             S[at.ARM_Y, i] = real(a * K[layout.SINE, i])
             for k in range(3):
                 S[at.U + k, i] = real(K[layout.U + k, i])
-            if wp.static(on_plane):
-                S[at.X, i] = real(K[layout.X, i])
-                S[at.Y, i] = real(K[layout.Y, i])
             i += 1
         begin_joint(K, S, stage, a, n - 1, 0)
 
@@ -112,6 +111,7 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
     def pull_joints(S: Numbers, stage: algebra.Stage, n: int, power_row: int, is_first: bool, has_power: bool):
         """Forces and torques of the joints in a stage."""
         vectors = whole_vectors(n)
+        pull_apart = stage.even * (real(0.5) * stage.stiffness * stage.even + stage.damping)
         i = int(0)
         while i < vectors:
             force_x = S[at.FORCE_AT_START, i]
@@ -123,6 +123,13 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
                 force_x = algebra.force(stage, force_x, rate_x, S[at.LEFT, i + 1], S[at.RIGHT, i])
                 force_y = algebra.force(stage, force_y, rate_y, S[at.LEFT + 1, i + 1], S[at.RIGHT + 1, i])
                 spin += S[at.STAGE_SPIN, i] - S[at.STAGE_SPIN, i + 1]
+                if wp.static(on_plane):
+                    force_x += pull_apart * S[at.FALL, i]
+                    force_y += pull_apart * S[at.FALL + 1, i]
+                    spin += stage.even * S[at.FALL_SPIN, i]
+                    if has_power:
+                        rate_x += stage.even * S[at.FALL, i]
+                        rate_y += stage.even * S[at.FALL + 1, i]
                 if has_power:
                     rate_x += S[at.LEFT_RATE, i + 1] - S[at.RIGHT_RATE, i]
                     rate_y += S[at.LEFT_RATE + 1, i + 1] - S[at.RIGHT_RATE + 1, i]
@@ -157,19 +164,37 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
         return link
 
     @wp.func
-    def without_fall(plane: algebra.PlaneMotion) -> algebra.PlaneMotion:
-        """A plane without gravity: what falls as a whole opens no joint."""
-        turning = plane
-        turning.fall_x = real(0.0)
-        turning.fall_y = real(0.0)
-        return turning
+    def end_in_middle(S: Numbers, plane: algebra.PlaneMotion, half: real, i: int):
+        """:func:`Increments.end_load` of a link in the middle of a step."""
+        turn = half * S[at.OMEGA, i]
+        arm_x = S[at.ARM_X, i]
+        arm_y = S[at.ARM_Y, i]
+        return algebra.end_load(plane, arm_x - turn * arm_y, arm_y + turn * arm_x)
+
+    @wp.func
+    def part_joints(S: Numbers, chain: Chain, h: real):
+        """Writes how the links of each joint fall apart, in the step that begins, on a plane that turns."""
+        n = chain.link_count
+        plane = algebra.plane_motion(chain)
+        half = real(0.5) * h
+        for row in range(wp.static(at.ARM_X), wp.static(at.OMEGA + 1)):
+            S[row, n] = S[row, 0]
+        vectors = whole_vectors(n)
+        i = int(0)
+        while i < vectors:
+            end_x, end_y, turn = end_in_middle(S, plane, half, i)
+            next_x, next_y, next_turn = end_in_middle(S, plane, half, i + 1)
+            across = plane.turn_x * S[at.OPENING + 1, i] - plane.turn_y * S[at.OPENING, i]
+            S[at.FALL, i] = end_x + next_x - plane.turn_y * across
+            S[at.FALL + 1, i] = end_y + next_y + plane.turn_x * across
+            S[at.FALL_SPIN, i] = turn - next_turn
+            i += 1
 
     @wp.func
     def accelerate(
         K: Rows,
         S: Numbers,
         chain: Chain,
-        plane: algebra.PlaneMotion,
         row: int,
         power_row: int,
         i: int,
@@ -192,19 +217,6 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
             S[at.FORCE + 1, i + 1],
             S[at.TORQUE, i + 1],
         )
-        if wp.static(on_plane):
-            x = S[at.X, i]
-            y = S[at.Y, i]
-            if not is_first:
-                x += S[at.WAY, i]
-                y += S[at.WAY + 1, i]
-            load_x, load_y, load_turn = algebra.plane_load(without_fall(plane), x, y, arm_x, arm_y)
-            ax += load_x
-            ay += load_y
-            turn += load_turn
-            if has_power:
-                S[power_row + 4, i] = load_x
-                S[power_row + 5, i] = load_y
         if wp.static(of_script is not None):
             link = link_in_stage(K, S, chain, i, arm_row, is_first)
             load_x, load_y, load_turn = wp.static(of_script)(
@@ -218,7 +230,7 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
         S[row + 2, i] = turn
 
     @wp.func
-    def displace(S: Numbers, stage: algebra.Stage, plane: algebra.PlaneMotion, i: int, sums: six, has_power: bool):
+    def displace(S: Numbers, stage: algebra.Stage, i: int, sums: six, has_power: bool):
         """Writes a link in a stage, from sums over the accelerations of the stages before."""
         omega = S[at.OMEGA, i]
         moved = algebra.displace(
@@ -236,17 +248,12 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
         S[at.STAGE_ARM_X, i] = moved.arm_x
         S[at.STAGE_ARM_Y, i] = moved.arm_y
         S[at.STAGE_SPIN, i] = moved.spin
-        if wp.static(not is_weight):
+        if wp.static(of_script is not None):
             square = stage.h * stage.h
             S[at.WAY, i] = stage.even * S[at.U, i] + square * sums[3]
             S[at.WAY + 1, i] = stage.even * S[at.V, i] + square * sums[4]
-            if wp.static(on_plane):
-                fallen = real(0.5) * stage.even * stage.even
-                S[at.WAY, i] = S[at.WAY, i] + fallen * plane.fall_x
-                S[at.WAY + 1, i] = S[at.WAY + 1, i] + fallen * plane.fall_y
-            if wp.static(of_script is not None):
-                S[at.CHANGE, i] = stage.h * sums[0]
-                S[at.CHANGE + 1, i] = stage.h * sums[1]
+            S[at.CHANGE, i] = stage.h * sums[0]
+            S[at.CHANGE + 1, i] = stage.h * sums[1]
 
     @wp.func
     def close_loop(S: Numbers, n: int, has_power: bool):
@@ -260,7 +267,6 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
     @wp.func
     def first_stage(K: Rows, S: Numbers, chain: Chain):
         stage = algebra.stage_at(chain, real(0.0), real(0.0))
-        plane = algebra.plane_motion(chain)
         pull_joints(S, stage, chain.link_count, wp.static(power_rows[0]), True, wp.static(needs_power[0]))
         vectors = whole_vectors(chain.link_count)
         i = int(0)
@@ -269,7 +275,6 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
                 K,
                 S,
                 chain,
-                plane,
                 wp.static(rows[0]),
                 wp.static(power_rows[0]),
                 i,
@@ -280,32 +285,16 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
             i += 1
 
     @wp.func
-    def shift_first_stage(S: Numbers, before: Chain, now: Chain):
-        old = without_fall(algebra.plane_motion(before))
-        new = without_fall(algebra.plane_motion(now))
-        vectors = whole_vectors(now.link_count)
-        i = int(0)
-        while i < vectors:
-            ax, ay, turn = algebra.plane_load(new, S[at.X, i], S[at.Y, i], S[at.ARM_X, i], S[at.ARM_Y, i])
-            bx, by, back = algebra.plane_load(old, S[at.X, i], S[at.Y, i], S[at.ARM_X, i], S[at.ARM_Y, i])
-            S[wp.static(rows[0]), i] = S[wp.static(rows[0]), i] + (ax - bx)
-            S[wp.static(rows[0]) + 1, i] = S[wp.static(rows[0]) + 1, i] + (ay - by)
-            S[wp.static(rows[0]) + 2, i] = S[wp.static(rows[0]) + 2, i] + (turn - back)
-            if wp.static(needs_power[0]):
-                S[wp.static(power_rows[0]) + 4, i] = S[wp.static(power_rows[0]) + 4, i] + (ax - bx)
-                S[wp.static(power_rows[0]) + 5, i] = S[wp.static(power_rows[0]) + 5, i] + (ay - by)
-            i += 1
-
-    @wp.func
     def attempt(K: Rows, S: Numbers, chain: Chain, step: wp.float64, tolerance: wp.float64):
         n = chain.link_count
         vectors = whole_vectors(n)
         h = real(step)
-        plane = algebra.plane_motion(chain)
         stage = algebra.stage_at(chain, h, wp.static(real(nodes[1])) * h)
+        if wp.static(on_plane):
+            part_joints(S, chain, h)
         i = int(0)
         while i < vectors:
-            displace(S, stage, plane, i, wp.static(stage_sums[1])(S, i), wp.static(needs_power[1]))
+            displace(S, stage, i, wp.static(stage_sums[1])(S, i), wp.static(needs_power[1]))
             i += 1
         for s in range(1, wp.static(stages)):
             close_loop(S, n, wp.static(needs_power[s]))
@@ -319,7 +308,6 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
                         K,
                         S,
                         chain,
-                        plane,
                         wp.static(rows[s]),
                         wp.static(power_rows[s]),
                         i,
@@ -328,7 +316,7 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
                         wp.static(needs_power[s]),
                     )
                     displace(
-                        S, stage, plane, i, wp.static(stage_sums[later(s)])(S, i), wp.static(needs_power[later(s)])
+                        S, stage, i, wp.static(stage_sums[later(s)])(S, i), wp.static(needs_power[later(s)])
                     )
                     i += 1
         inverse = real(wp.float64(1.0) / tolerance)
@@ -338,7 +326,6 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
                 K,
                 S,
                 chain,
-                plane,
                 wp.static(rows[-1]),
                 wp.static(power_rows[-1]),
                 i,
@@ -381,19 +368,32 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
         return total
 
     @wp.func
+    def fall_at_middle(K: Rows, plane: exact.PlaneMotion, a: wp.float64, step: wp.float64, i: int):
+        """Minus what gravity and the motion of the plane add to a link's velocities in a step, from its middle."""
+        half = HALF * step
+        turn = half * K[layout.OMEGA, i]
+        arm_x = a * (K[layout.COSINE, i] - turn * K[layout.SINE, i])
+        arm_y = a * (K[layout.SINE, i] + turn * K[layout.COSINE, i])
+        x = K[layout.X, i] + half * K[layout.U, i]
+        y = K[layout.Y, i] + half * K[layout.V, i]
+        load_x, load_y, load_turn = exact.plane_load(plane, x, y, arm_x, arm_y)
+        return -step * wp.vec3d(load_x, load_y, load_turn)
+
+    @wp.func
     def commit(K: Rows, S: Numbers, chain: Chain, step: wp.float64):
         n = chain.link_count
         lanes = whole_lanes(n)
-        fall = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+        fall = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
         if wp.static(is_weight):
-            fall = wp.vec2d(wp.float64(0.0), chain.gravity * step)
-        if wp.static(on_plane):
-            fall = wp.vec2d(chain.gravity * chain.up_x * step, chain.gravity * chain.up_y * step)
+            fall = wp.vec3d(wp.float64(0.0), chain.gravity * step, wp.float64(0.0))
+        plane = exact.plane_motion(chain)
         h = real(step)
         square = h * h
         i = int(0)
         while i < lanes:
             made = new_state(S, i)
+            if wp.static(on_plane):
+                fall = fall_at_middle(K, plane, chain.half_length, step, i)
             for c in range(2):
                 K[layout.LOST_FRICTION + c, i] = K[layout.LOST_FRICTION + c, i] + wp.float64(h * impulse(S, c, i))
             for c in range(3):
@@ -403,10 +403,10 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
                 if wp.static((is_weight or on_plane) and c < 2):
                     # the impulse of a joint is the same number on both of its links: momentum stays to the last bits
                     push = wp.float64(impulse(S, 2 + c, i + 1)) - wp.float64(impulse(S, 2 + c, i))
-                    change = step * push * K[layout.INVERSE_MASS, i] - fall[c]
+                    change = step * push * K[layout.INVERSE_MASS, i]
+                if wp.static(on_plane or (is_weight and c < 2)):
+                    change -= fall[c]
                     way -= HALF * fall[c] * step
-                    if wp.static(on_plane):
-                        change += wp.float64(h * impulse(S, 4 + c, i))
                 K[layout.X + c, i] = K[layout.X + c, i] + (step * rate + way)
                 K[layout.U + c, i] = rate + change
             i += 1
@@ -436,5 +436,5 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
         return finite
 
     return Steps(
-        take_constants, begin, first_stage, take_last_stage, shift_first_stage, attempt, commit, start_is_finite
+        take_constants, begin, first_stage, take_last_stage, attempt, commit, start_is_finite
     )
