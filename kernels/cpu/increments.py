@@ -368,32 +368,42 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
         return total
 
     @wp.func
-    def fall_at_middle(K: Rows, plane: exact.PlaneMotion, a: wp.float64, step: wp.float64, i: int):
-        """Minus what gravity and the motion of the plane add to a link's velocities in a step, from its middle."""
+    def write_fall(K: Rows, chain: Chain, step: wp.float64):
+        """Writes how much velocity gravity and the motion of the plane take from each link, by its middle of the step."""
+        plane = exact.plane_motion(chain)
+        a = chain.half_length
         half = HALF * step
-        turn = half * K[layout.OMEGA, i]
-        arm_x = a * (K[layout.COSINE, i] - turn * K[layout.SINE, i])
-        arm_y = a * (K[layout.SINE, i] + turn * K[layout.COSINE, i])
-        x = K[layout.X, i] + half * K[layout.U, i]
-        y = K[layout.Y, i] + half * K[layout.V, i]
-        load_x, load_y, load_turn = exact.plane_load(plane, x, y, arm_x, arm_y)
-        return -step * wp.vec3d(load_x, load_y, load_turn)
+        n = chain.link_count
+        lanes = whole_lanes(n)
+        i = int(0)
+        while i < lanes:
+            turn = half * K[layout.OMEGA, i]
+            arm_x = a * (K[layout.COSINE, i] - turn * K[layout.SINE, i])
+            arm_y = a * (K[layout.SINE, i] + turn * K[layout.COSINE, i])
+            x = K[layout.X, i] + half * K[layout.U, i]
+            y = K[layout.Y, i] + half * K[layout.V, i]
+            load_x, load_y, load_turn = exact.plane_load(plane, x, y, arm_x, arm_y)
+            # links behind the last stay where they are: that they turn slowly would make numbers of stages subnormal
+            less = wp.where(i < n, -step, wp.float64(0.0))
+            K[layout.FALL, i] = less * load_x
+            K[layout.FALL + 1, i] = less * load_y
+            K[layout.FALL + 2, i] = less * load_turn
+            i += 1
 
     @wp.func
     def commit(K: Rows, S: Numbers, chain: Chain, step: wp.float64):
         n = chain.link_count
         lanes = whole_lanes(n)
-        fall = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
+        fall = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
         if wp.static(is_weight):
-            fall = wp.vec3d(wp.float64(0.0), chain.gravity * step, wp.float64(0.0))
-        plane = exact.plane_motion(chain)
+            fall = wp.vec2d(wp.float64(0.0), chain.gravity * step)
+        if wp.static(on_plane):
+            write_fall(K, chain, step)
         h = real(step)
         square = h * h
         i = int(0)
         while i < lanes:
             made = new_state(S, i)
-            if wp.static(on_plane):
-                fall = fall_at_middle(K, plane, chain.half_length, step, i)
             for c in range(2):
                 K[layout.LOST_FRICTION + c, i] = K[layout.LOST_FRICTION + c, i] + wp.float64(h * impulse(S, c, i))
             for c in range(3):
@@ -404,9 +414,12 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
                     # the impulse of a joint is the same number on both of its links: momentum stays to the last bits
                     push = wp.float64(impulse(S, 2 + c, i + 1)) - wp.float64(impulse(S, 2 + c, i))
                     change = step * push * K[layout.INVERSE_MASS, i]
-                if wp.static(on_plane or (is_weight and c < 2)):
+                if wp.static(is_weight and c < 2):
                     change -= fall[c]
                     way -= HALF * fall[c] * step
+                if wp.static(on_plane):
+                    change -= K[layout.FALL + c, i]
+                    way -= HALF * K[layout.FALL + c, i] * step
                 K[layout.X + c, i] = K[layout.X + c, i] + (step * rate + way)
                 K[layout.U + c, i] = rate + change
             i += 1
