@@ -24,6 +24,9 @@ from warpchain.kernels.types import Chain, Rows
 WEIGHT, PLANE = "weight", "plane"
 """Loads that stages know: weight alone, which opens no joint, and that of a plane that tilts."""
 
+LEAST_TURN = 1e-12
+"""Slower turns of a plane [rad/s] open no joint: their squares would make numbers of stages subnormal, thus slow."""
+
 
 @dataclass(frozen=True)
 class Steps:
@@ -176,6 +179,8 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
         """Writes how the links of each joint fall apart, in the step that begins, on a plane that turns."""
         n = chain.link_count
         plane = algebra.plane_motion(chain)
+        plane.turn_x = wp.where(wp.abs(plane.turn_x) < wp.static(real(LEAST_TURN)), real(0.0), plane.turn_x)
+        plane.turn_y = wp.where(wp.abs(plane.turn_y) < wp.static(real(LEAST_TURN)), real(0.0), plane.turn_y)
         half = real(0.5) * h
         for row in range(wp.static(at.ARM_X), wp.static(at.OMEGA + 1)):
             S[row, n] = S[row, 0]

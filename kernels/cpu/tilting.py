@@ -88,13 +88,12 @@ def tilting_gap(K: Rows, chain: Chain, _ground: Ground, _face: Face):
     i = int(0)
     while i < whole_lanes(chain.link_count):
         own = with_circles(chain, K[layout.RADIUS, i])
-        left = order_key(tilting_floor.middle_height(own, slope, K[LEFT_X, i], K[layout.LEFT_Y, i]))
-        right = order_key(tilting_floor.middle_height(own, slope, K[layout.RIGHT_X, i], K[layout.RIGHT_Y, i]))
-        middle = wp.min(left, right)
-        K[GAP, i] = wp.where(i < chain.link_count, from_order_key(middle) - tipped, ONE)
-        lowest = wp.min(lowest, wp.where(i < chain.link_count, middle, FURTHEST))
+        rise = chain.half_length * wp.abs(K[layout.COSINE, i] * chain.up_x + K[layout.SINE, i] * chain.up_y)
+        middle = tilting_floor.middle_height(own, slope, K[layout.X, i], K[layout.Y, i]) - rise
+        K[GAP, i] = wp.where(i < chain.link_count, middle - tipped, ONE)
+        lowest = wp.min(lowest, wp.where(i < chain.link_count, order_key(middle), FURTHEST))
         i += 1
-    return from_order_key(lowest) - chain.half_width * wp.abs(chain.up_z)
+    return from_order_key(lowest) - tipped
 
 
 @wp.func
