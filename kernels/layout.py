@@ -20,7 +20,6 @@ LOST_FRICTION, LOST_DAMPING, LOST_FIXED = range(19, 22)
 LISTED_X, LISTED_Y = 22, 23
 # Of links: gap to the floor or sprocket [m]; terms of sums, if the plane of the chain tilts.
 GAP, SUMS = 24, 25
-FALL = 25
 SCRATCH_ROWS = 30
 """Rows of a chain's scratch on a CPU, without those of stages, see :mod:`cpu.stage_rows`, and of flights."""
 

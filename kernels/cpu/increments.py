@@ -24,10 +24,6 @@ from warpchain.kernels.types import Chain, Rows
 WEIGHT, PLANE = "weight", "plane"
 """Loads that stages know: weight alone, which opens no joint, and that of a plane that tilts."""
 
-LEAST_TURN = 1e-12
-"""Slower turns of a plane [rad/s] open no joint: their squares would make numbers of stages subnormal, thus slow."""
-
-
 @dataclass(frozen=True)
 class Steps:
     """Warp functions of a method's steps. On a plane that may move ``chain`` is on that of mid-step."""
@@ -179,8 +175,6 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
         """Writes how the links of each joint fall apart, in the step that begins, on a plane that turns."""
         n = chain.link_count
         plane = algebra.plane_motion(chain)
-        plane.turn_x = wp.where(wp.abs(plane.turn_x) < wp.static(real(LEAST_TURN)), real(0.0), plane.turn_x)
-        plane.turn_y = wp.where(wp.abs(plane.turn_y) < wp.static(real(LEAST_TURN)), real(0.0), plane.turn_y)
         half = real(0.5) * h
         for row in range(wp.static(at.ARM_X), wp.static(at.OMEGA + 1)):
             S[row, n] = S[row, 0]
@@ -190,9 +184,10 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
             end_x, end_y, turn = end_in_middle(S, plane, half, i)
             next_x, next_y, next_turn = end_in_middle(S, plane, half, i + 1)
             across = plane.turn_x * S[at.OPENING + 1, i] - plane.turn_y * S[at.OPENING, i]
-            S[at.FALL, i] = end_x + next_x - plane.turn_y * across
-            S[at.FALL + 1, i] = end_y + next_y + plane.turn_x * across
-            S[at.FALL_SPIN, i] = turn - next_turn
+            # links behind the last do not move: numbers of theirs could be subnormal, which takes a hundred cycles each
+            S[at.FALL, i] = wp.where(i < n, end_x + next_x - plane.turn_y * across, real(0.0))
+            S[at.FALL + 1, i] = wp.where(i < n, end_y + next_y + plane.turn_x * across, real(0.0))
+            S[at.FALL_SPIN, i] = wp.where(i < n, turn - next_turn, real(0.0))
             i += 1
 
     @wp.func
@@ -373,27 +368,18 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
         return total
 
     @wp.func
-    def write_fall(K: Rows, chain: Chain, step: wp.float64):
-        """Writes how much velocity gravity and the motion of the plane take from each link, by its middle of the step."""
-        plane = exact.plane_motion(chain)
+    def fall_on_plane(K: Rows, plane: exact.PlaneMotion, chain: Chain, step: wp.float64, i: int):
+        """What gravity and the motion of the plane take from a link's velocities in a step, where its middle is."""
         a = chain.half_length
         half = HALF * step
-        n = chain.link_count
-        lanes = whole_lanes(n)
-        i = int(0)
-        while i < lanes:
-            turn = half * K[layout.OMEGA, i]
-            arm_x = a * (K[layout.COSINE, i] - turn * K[layout.SINE, i])
-            arm_y = a * (K[layout.SINE, i] + turn * K[layout.COSINE, i])
-            x = K[layout.X, i] + half * K[layout.U, i]
-            y = K[layout.Y, i] + half * K[layout.V, i]
-            load_x, load_y, load_turn = exact.plane_load(plane, x, y, arm_x, arm_y)
-            # links behind the last stay where they are: that they turn slowly would make numbers of stages subnormal
-            less = wp.where(i < n, -step, wp.float64(0.0))
-            K[layout.FALL, i] = less * load_x
-            K[layout.FALL + 1, i] = less * load_y
-            K[layout.FALL + 2, i] = less * load_turn
-            i += 1
+        turn = half * K[layout.OMEGA, i]
+        arm_x = a * (K[layout.COSINE, i] - turn * K[layout.SINE, i])
+        arm_y = a * (K[layout.SINE, i] + turn * K[layout.COSINE, i])
+        x = K[layout.X, i] + half * K[layout.U, i]
+        y = K[layout.Y, i] + half * K[layout.V, i]
+        load_x, load_y, load_turn = exact.plane_load(plane, x, y, arm_x, arm_y)
+        less = wp.where(i < chain.link_count, -step, wp.float64(0.0))  # see part_joints
+        return wp.vec3d(less * load_x, less * load_y, less * load_turn)
 
     @wp.func
     def commit(K: Rows, S: Numbers, chain: Chain, step: wp.float64):
@@ -402,13 +388,14 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
         fall = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
         if wp.static(is_weight):
             fall = wp.vec2d(wp.float64(0.0), chain.gravity * step)
-        if wp.static(on_plane):
-            write_fall(K, chain, step)
+        plane = exact.plane_motion(chain)
         h = real(step)
         square = h * h
         i = int(0)
         while i < lanes:
             made = new_state(S, i)
+            if wp.static(on_plane):
+                own_fall = fall_on_plane(K, plane, chain, step, i)
             for c in range(2):
                 K[layout.LOST_FRICTION + c, i] = K[layout.LOST_FRICTION + c, i] + wp.float64(h * impulse(S, c, i))
             for c in range(3):
@@ -423,8 +410,8 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
                     change -= fall[c]
                     way -= HALF * fall[c] * step
                 if wp.static(on_plane):
-                    change -= K[layout.FALL + c, i]
-                    way -= HALF * K[layout.FALL + c, i] * step
+                    change -= own_fall[c]
+                    way -= HALF * own_fall[c] * step
                 K[layout.X + c, i] = K[layout.X + c, i] + (step * rate + way)
                 K[layout.U + c, i] = rate + change
             i += 1

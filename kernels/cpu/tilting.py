@@ -51,10 +51,18 @@ def _source_of_sums() -> str:
     lines += [f"sums[{k}] += {term};" for k, term in enumerate((*terms, "x * mv - y * mu + j * w"))]
     lines += [
         "}",
-        f"for (int k = 0; k < {SUMMED}; ++k) {{",
-        "const Lanes a = sums[k];",
-        f"P.data[{layout.PLANE_SUMS} + k] = ((a[0] + a[1]) + (a[2] + a[3])) + ((a[4] + a[5]) + (a[6] + a[7]));",
-        "}",
+    ]
+    # add neighbours, then pairs, then halves: the lanes of one vector become the sums
+    orders = (0, 8, 2, 10, 4, 12, 6, 14), (0, 1, 8, 9, 4, 5, 12, 13), (0, 1, 2, 3, 8, 9, 10, 11)
+    for order, apart, left in zip(orders, (1, 2, 4), (4, 2, 1), strict=True):
+        first, second = (", ".join(str(lane + shift) for lane in order) for shift in (0, apart))
+        pair = "sums[2 * k], sums[2 * k + 1]"
+        lines.append(
+            f"for (int k = 0; k < {left}; ++k) sums[k] = __builtin_shufflevector({pair}, {first})"
+            f" + __builtin_shufflevector({pair}, {second});"
+        )
+    lines += [
+        f"*reinterpret_cast<Lanes*>(&P.data[{layout.PLANE_SUMS}]) = sums[0];",
     ]
     return "\n".join(lines)
 
