@@ -23,6 +23,9 @@ from warpchain.kernels.types import Chain, Rows
 
 WEIGHT, PLANE = "weight", "plane"
 """Loads that stages know: weight alone, which opens no joint, and that of a plane that tilts."""
+LEAST_TURN = 1e-9
+"""A plane that turns more slowly [rad/s] opens no joint: squares of such numbers are subnormal or nearly so."""
+
 
 @dataclass(frozen=True)
 class Steps:
@@ -175,6 +178,8 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
         """Writes how the links of each joint fall apart, in the step that begins, on a plane that turns."""
         n = chain.link_count
         plane = algebra.plane_motion(chain)
+        plane.turn_x = wp.where(wp.abs(plane.turn_x) < wp.static(real(LEAST_TURN)), real(0.0), plane.turn_x)
+        plane.turn_y = wp.where(wp.abs(plane.turn_y) < wp.static(real(LEAST_TURN)), real(0.0), plane.turn_y)
         half = real(0.5) * h
         for row in range(wp.static(at.ARM_X), wp.static(at.OMEGA + 1)):
             S[row, n] = S[row, 0]
@@ -184,7 +189,7 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
             end_x, end_y, turn = end_in_middle(S, plane, half, i)
             next_x, next_y, next_turn = end_in_middle(S, plane, half, i + 1)
             across = plane.turn_x * S[at.OPENING + 1, i] - plane.turn_y * S[at.OPENING, i]
-            # links behind the last do not move: numbers of theirs could be subnormal, which takes a hundred cycles each
+            # links behind the last do not move: squares of small numbers are subnormal, and take a hundred cycles each
             S[at.FALL, i] = wp.where(i < n, end_x + next_x - plane.turn_y * across, real(0.0))
             S[at.FALL + 1, i] = wp.where(i < n, end_y + next_y + plane.turn_x * across, real(0.0))
             S[at.FALL_SPIN, i] = wp.where(i < n, turn - next_turn, real(0.0))
