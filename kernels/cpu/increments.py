@@ -4,6 +4,9 @@ The algebra is that of :mod:`physics.increments`. K is the chain's scratch in do
 what stages work on, see :mod:`cpu.stage_rows`. A stage is two loops: one over joints, and one over links, which finds
 their accelerations and displaces them for the next stage. Loops have the form that clang vectorises: ``while`` loops
 with an integer of their own, arrays of static shape, no branch and no library call inside.
+
+A link of a plane that tilts falls, besides, as gravity and the plane accelerate it in the middle of the step; this is
+of second order, like the plane's own step. Stages know of this fall that it opens joints: by G t²/2, at the rate G t.
 """
 
 import functools
@@ -24,7 +27,7 @@ from warpchain.kernels.types import Chain, Rows
 WEIGHT, PLANE = "weight", "plane"
 """Loads that stages know: weight alone, which opens no joint, and that of a plane that tilts."""
 LEAST_TURN = 1e-9
-"""A plane that turns more slowly [rad/s] opens no joint: squares of such numbers are subnormal or nearly so."""
+"""A plane that turns more slowly [rad/s] opens no joint: powers of smaller numbers are subnormal, which takes long."""
 
 
 @dataclass(frozen=True)
@@ -189,7 +192,7 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
             end_x, end_y, turn = end_in_middle(S, plane, half, i)
             next_x, next_y, next_turn = end_in_middle(S, plane, half, i + 1)
             across = plane.turn_x * S[at.OPENING + 1, i] - plane.turn_y * S[at.OPENING, i]
-            # links behind the last do not move: squares of small numbers are subnormal, and take a hundred cycles each
+            # links behind the last stay at rest: powers of their slow motion would be subnormal, a hundred cycles each
             S[at.FALL, i] = wp.where(i < n, end_x + next_x - plane.turn_y * across, real(0.0))
             S[at.FALL + 1, i] = wp.where(i < n, end_y + next_y + plane.turn_x * across, real(0.0))
             S[at.FALL_SPIN, i] = wp.where(i < n, turn - next_turn, real(0.0))
@@ -320,9 +323,7 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
                         False,
                         wp.static(needs_power[s]),
                     )
-                    displace(
-                        S, stage, i, wp.static(stage_sums[later(s)])(S, i), wp.static(needs_power[later(s)])
-                    )
+                    displace(S, stage, i, wp.static(stage_sums[later(s)])(S, i), wp.static(needs_power[later(s)]))
                     i += 1
         inverse = real(wp.float64(1.0) / tolerance)
         i = int(0)
@@ -445,6 +446,4 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
                 finite = finite and wp.isfinite(S[wp.static(rows[0]) + row, i])
         return finite
 
-    return Steps(
-        take_constants, begin, first_stage, take_last_stage, attempt, commit, start_is_finite
-    )
+    return Steps(take_constants, begin, first_stage, take_last_stage, attempt, commit, start_is_finite)

@@ -121,8 +121,7 @@ def make_advance(features: Features):
         K = wp.array(ptr=memory.ptr, shape=(wp.static(rows), wp.static(columns)), dtype=wp.float64)
         list_memory = worlds.lists[world]
         L = wp.array(ptr=list_memory.ptr, shape=(wp.static(list_size),), dtype=wp.int32)
-        plane_memory = worlds.plane[world]
-        P = wp.array(ptr=plane_memory.ptr, shape=(wp.static(layout.PLANE_ROWS),), dtype=wp.float64)
+        P = worlds.plane[world]
         ground = read_ground(worlds.model, world)
         still = face_of(ground)
         chain = present_chain(worlds, world)

@@ -1,4 +1,4 @@
-"""A chain whose plane may tilt, as hooks of the CPU loop: sums over links, changes of a first stage, the floor."""
+"""A chain whose plane may tilt, as hooks of the CPU loop: sums over links, and the floor."""
 
 import functools
 
@@ -10,7 +10,7 @@ from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.cpu.contacts.proximity import FURTHEST, any_negative, placed_link
 from warpchain.kernels.cpu.joints import Joints
 from warpchain.kernels.cpu.upright import PlaneHooks
-from warpchain.kernels.layout import GAP, LEFT_X, LOST_FIXED, SUMS, U
+from warpchain.kernels.layout import GAP, LOST_FIXED, SUMS, U
 from warpchain.kernels.physics import plane
 from warpchain.kernels.physics.elementary import ONE, ZERO, from_order_key, order_key
 from warpchain.kernels.physics.geometry import LANES, whole_lanes
@@ -34,24 +34,22 @@ def row_sum(K: Rows, row: int, count: int) -> wp.float64:
     """Sum of the first ``count`` columns of a row, a multiple of 8; in pure Warp clang adds one after the other."""
 
 
-def _source_of_sums() -> str:
+def sums_source() -> str:
     """Source of :func:`write_sums`: eight links at a time, each row is read once, and sums stay in registers."""
-    names = {"MASS": "m", "INERTIA": "j", "X": "x", "Y": "y", "U": "u", "V": "v", "OMEGA": "w", "COSINE": "c", "SINE": "s"}
+    rows = "m j x y u v w c s".split(), "MASS INERTIA X Y U V OMEGA COSINE SINE".split()
     lines = [
         "typedef ::wp::float64 Lanes __attribute__((ext_vector_type(8), aligned(8)));",
         f"Lanes sums[{SUMMED}] = {{}};",
         "for (int i = 0; i < count; i += 8) {",
-        "    const ::wp::float64* column = &K.data[i];",
-        "    const size_t row = K.strides[0] / sizeof(::wp::float64);",
+        "const ::wp::float64* column = &K.data[i];",
+        "const size_t row = K.strides[0] / sizeof(::wp::float64);",
     ]
-    for name, symbol in names.items():
+    for symbol, name in zip(*rows, strict=True):
         lines.append(f"const Lanes {symbol} = *reinterpret_cast<const Lanes*>(column + {getattr(layout, name)} * row);")
     terms = "mx", "my", "mx * x + j * c * c", "mx * y + j * c * s", "my * y + j * s * s", "mu", "mv"
     lines.append("const Lanes mx = m * x, my = m * y, mu = m * u, mv = m * v;")
     lines += [f"sums[{k}] += {term};" for k, term in enumerate((*terms, "x * mv - y * mu + j * w"))]
-    lines += [
-        "}",
-    ]
+    lines.append("}")
     # add neighbours, then pairs, then halves: the lanes of one vector become the sums
     orders = (0, 8, 2, 10, 4, 12, 6, 14), (0, 1, 8, 9, 4, 5, 12, 13), (0, 1, 2, 3, 8, 9, 10, 11)
     for order, apart, left in zip(orders, (1, 2, 4), (4, 2, 1), strict=True):
@@ -61,18 +59,16 @@ def _source_of_sums() -> str:
             f"for (int k = 0; k < {left}; ++k) sums[k] = __builtin_shufflevector({pair}, {first})"
             f" + __builtin_shufflevector({pair}, {second});"
         )
-    lines += [
-        f"*reinterpret_cast<Lanes*>(&P.data[{layout.PLANE_SUMS}]) = sums[0];",
-    ]
+    lines.append(f"*reinterpret_cast<Lanes*>(&P.data[{layout.PLANE_SUMS}]) = sums[0];")
     return "\n".join(lines)
 
 
-@wp.func_native(_source_of_sums())
+@wp.func_native(sums_source())
 def write_sums(K: Rows, P: Row, count: int):
     """Writes the sums over the first ``count`` columns of a placed chain, a multiple of 8, but for the links' width.
 
-    The terms are those of :func:`plane.place_terms` and :func:`plane.motion_terms`; columns behind the links have no
-    mass. Loops in Warp would store each term, because clang keeps the order of sums.
+    Terms are those of :func:`plane.place_terms` and :func:`plane.motion_terms`; columns behind the links have no mass.
+    In pure Warp each term is stored before it is added, because clang keeps the order of sums: twice as long.
     """
 
 
