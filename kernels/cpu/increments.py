@@ -4,6 +4,9 @@ The algebra is that of :mod:`physics.increments`. K is the chain's scratch in do
 what stages work on, see :mod:`cpu.stage_rows`. A stage is two loops: one over joints, and one over links, which finds
 their accelerations and displaces them for the next stage. Loops have the form that clang vectorises: ``while`` loops
 with an integer of their own, arrays of static shape, no branch and no library call inside.
+
+A link of a plane that tilts falls, besides, as gravity and the plane accelerate it in the middle of the step; this is
+of second order, like the plane's own step. Stages know of this fall that it opens joints: by G t²/2, at the rate G t.
 """
 
 import functools
@@ -23,6 +26,8 @@ from warpchain.kernels.types import Chain, Rows
 
 WEIGHT, PLANE = "weight", "plane"
 """Loads that stages know: weight alone, which opens no joint, and that of a plane that tilts."""
+LEAST_TURN = 1e-9
+"""A plane that turns more slowly [rad/s] opens no joint: powers of smaller numbers are subnormal, which takes long."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +38,6 @@ class Steps:
     begin: Any  # ``(K, S, chain)`` rounds the state at the start of a step, whose ends are placed
     first_stage: Any  # ``(K, S, chain)`` evaluates the first stage
     take_last_stage: Any  # ``(S, n)`` takes the last stage of the step before for the first one
-    shift_first_stage: Any  # ``(S, before, now)`` changes it from one plane to another
     attempt: Any  # ``(K, S, chain, h, tolerance)`` → bits of the greatest error ratio, see :func:`order_bits`
     commit: Any  # ``(K, S, chain, h)`` takes the new state and places its ends
     start_is_finite: Any  # ``(S, n)``
@@ -42,7 +46,7 @@ class Steps:
 @functools.cache
 def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
     """Steps of one tableau in single or double precision; load: ``WEIGHT``, ``PLANE``, or a script's Warp function."""
-    algebra = increments(real)
+    algebra, exact = increments(real), increments(wp.float64)
     Numbers = wp.array2d(dtype=real)
     six = wp.types.vector(length=6, dtype=real)
     is_single = real is wp.float32
@@ -77,6 +81,9 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
         S[at.RATE, i] = joint.u
         S[at.RATE + 1, i] = joint.v
         S[at.SPIN, i] = joint.spin
+        if wp.static(on_plane):
+            S[at.OPENING, i] = joint.x
+            S[at.OPENING + 1, i] = joint.y
 
     @wp.func
     def begin(K: Rows, S: Numbers, chain: Chain):
@@ -91,9 +98,6 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
             S[at.ARM_Y, i] = real(a * K[layout.SINE, i])
             for k in range(3):
                 S[at.U + k, i] = real(K[layout.U + k, i])
-            if wp.static(on_plane):
-                S[at.X, i] = real(K[layout.X, i])
-                S[at.Y, i] = real(K[layout.Y, i])
             i += 1
         begin_joint(K, S, stage, a, n - 1, 0)
 
@@ -112,6 +116,7 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
     def pull_joints(S: Numbers, stage: algebra.Stage, n: int, power_row: int, is_first: bool, has_power: bool):
         """Forces and torques of the joints in a stage."""
         vectors = whole_vectors(n)
+        pull_apart = stage.even * (real(0.5) * stage.stiffness * stage.even + stage.damping)
         i = int(0)
         while i < vectors:
             force_x = S[at.FORCE_AT_START, i]
@@ -123,6 +128,13 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
                 force_x = algebra.force(stage, force_x, rate_x, S[at.LEFT, i + 1], S[at.RIGHT, i])
                 force_y = algebra.force(stage, force_y, rate_y, S[at.LEFT + 1, i + 1], S[at.RIGHT + 1, i])
                 spin += S[at.STAGE_SPIN, i] - S[at.STAGE_SPIN, i + 1]
+                if wp.static(on_plane):
+                    force_x += pull_apart * S[at.FALL, i]
+                    force_y += pull_apart * S[at.FALL + 1, i]
+                    spin += stage.even * S[at.FALL_SPIN, i]
+                    if has_power:
+                        rate_x += stage.even * S[at.FALL, i]
+                        rate_y += stage.even * S[at.FALL + 1, i]
                 if has_power:
                     rate_x += S[at.LEFT_RATE, i + 1] - S[at.RIGHT_RATE, i]
                     rate_y += S[at.LEFT_RATE + 1, i + 1] - S[at.RIGHT_RATE + 1, i]
@@ -157,19 +169,40 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
         return link
 
     @wp.func
-    def without_fall(plane: algebra.PlaneMotion) -> algebra.PlaneMotion:
-        """A plane without gravity: what falls as a whole opens no joint."""
-        turning = plane
-        turning.fall_x = real(0.0)
-        turning.fall_y = real(0.0)
-        return turning
+    def end_in_middle(S: Numbers, plane: algebra.PlaneMotion, half: real, i: int):
+        """:func:`Increments.end_load` of a link in the middle of a step."""
+        turn = half * S[at.OMEGA, i]
+        arm_x = S[at.ARM_X, i]
+        arm_y = S[at.ARM_Y, i]
+        return algebra.end_load(plane, arm_x - turn * arm_y, arm_y + turn * arm_x)
+
+    @wp.func
+    def part_joints(S: Numbers, chain: Chain, h: real):
+        """Writes how the links of each joint fall apart, in the step that begins, on a plane that turns."""
+        n = chain.link_count
+        plane = algebra.plane_motion(chain)
+        plane.turn_x = wp.where(wp.abs(plane.turn_x) < wp.static(real(LEAST_TURN)), real(0.0), plane.turn_x)
+        plane.turn_y = wp.where(wp.abs(plane.turn_y) < wp.static(real(LEAST_TURN)), real(0.0), plane.turn_y)
+        half = real(0.5) * h
+        for row in range(wp.static(at.ARM_X), wp.static(at.OMEGA + 1)):
+            S[row, n] = S[row, 0]
+        vectors = whole_vectors(n)
+        i = int(0)
+        while i < vectors:
+            end_x, end_y, turn = end_in_middle(S, plane, half, i)
+            next_x, next_y, next_turn = end_in_middle(S, plane, half, i + 1)
+            across = plane.turn_x * S[at.OPENING + 1, i] - plane.turn_y * S[at.OPENING, i]
+            # links behind the last stay at rest: powers of their slow motion would be subnormal, a hundred cycles each
+            S[at.FALL, i] = wp.where(i < n, end_x + next_x - plane.turn_y * across, real(0.0))
+            S[at.FALL + 1, i] = wp.where(i < n, end_y + next_y + plane.turn_x * across, real(0.0))
+            S[at.FALL_SPIN, i] = wp.where(i < n, turn - next_turn, real(0.0))
+            i += 1
 
     @wp.func
     def accelerate(
         K: Rows,
         S: Numbers,
         chain: Chain,
-        plane: algebra.PlaneMotion,
         row: int,
         power_row: int,
         i: int,
@@ -192,19 +225,6 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
             S[at.FORCE + 1, i + 1],
             S[at.TORQUE, i + 1],
         )
-        if wp.static(on_plane):
-            x = S[at.X, i]
-            y = S[at.Y, i]
-            if not is_first:
-                x += S[at.WAY, i]
-                y += S[at.WAY + 1, i]
-            load_x, load_y, load_turn = algebra.plane_load(without_fall(plane), x, y, arm_x, arm_y)
-            ax += load_x
-            ay += load_y
-            turn += load_turn
-            if has_power:
-                S[power_row + 4, i] = load_x
-                S[power_row + 5, i] = load_y
         if wp.static(of_script is not None):
             link = link_in_stage(K, S, chain, i, arm_row, is_first)
             load_x, load_y, load_turn = wp.static(of_script)(
@@ -218,7 +238,7 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
         S[row + 2, i] = turn
 
     @wp.func
-    def displace(S: Numbers, stage: algebra.Stage, plane: algebra.PlaneMotion, i: int, sums: six, has_power: bool):
+    def displace(S: Numbers, stage: algebra.Stage, i: int, sums: six, has_power: bool):
         """Writes a link in a stage, from sums over the accelerations of the stages before."""
         omega = S[at.OMEGA, i]
         moved = algebra.displace(
@@ -236,17 +256,12 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
         S[at.STAGE_ARM_X, i] = moved.arm_x
         S[at.STAGE_ARM_Y, i] = moved.arm_y
         S[at.STAGE_SPIN, i] = moved.spin
-        if wp.static(not is_weight):
+        if wp.static(of_script is not None):
             square = stage.h * stage.h
             S[at.WAY, i] = stage.even * S[at.U, i] + square * sums[3]
             S[at.WAY + 1, i] = stage.even * S[at.V, i] + square * sums[4]
-            if wp.static(on_plane):
-                fallen = real(0.5) * stage.even * stage.even
-                S[at.WAY, i] = S[at.WAY, i] + fallen * plane.fall_x
-                S[at.WAY + 1, i] = S[at.WAY + 1, i] + fallen * plane.fall_y
-            if wp.static(of_script is not None):
-                S[at.CHANGE, i] = stage.h * sums[0]
-                S[at.CHANGE + 1, i] = stage.h * sums[1]
+            S[at.CHANGE, i] = stage.h * sums[0]
+            S[at.CHANGE + 1, i] = stage.h * sums[1]
 
     @wp.func
     def close_loop(S: Numbers, n: int, has_power: bool):
@@ -260,7 +275,6 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
     @wp.func
     def first_stage(K: Rows, S: Numbers, chain: Chain):
         stage = algebra.stage_at(chain, real(0.0), real(0.0))
-        plane = algebra.plane_motion(chain)
         pull_joints(S, stage, chain.link_count, wp.static(power_rows[0]), True, wp.static(needs_power[0]))
         vectors = whole_vectors(chain.link_count)
         i = int(0)
@@ -269,7 +283,6 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
                 K,
                 S,
                 chain,
-                plane,
                 wp.static(rows[0]),
                 wp.static(power_rows[0]),
                 i,
@@ -280,32 +293,16 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
             i += 1
 
     @wp.func
-    def shift_first_stage(S: Numbers, before: Chain, now: Chain):
-        old = without_fall(algebra.plane_motion(before))
-        new = without_fall(algebra.plane_motion(now))
-        vectors = whole_vectors(now.link_count)
-        i = int(0)
-        while i < vectors:
-            ax, ay, turn = algebra.plane_load(new, S[at.X, i], S[at.Y, i], S[at.ARM_X, i], S[at.ARM_Y, i])
-            bx, by, back = algebra.plane_load(old, S[at.X, i], S[at.Y, i], S[at.ARM_X, i], S[at.ARM_Y, i])
-            S[wp.static(rows[0]), i] = S[wp.static(rows[0]), i] + (ax - bx)
-            S[wp.static(rows[0]) + 1, i] = S[wp.static(rows[0]) + 1, i] + (ay - by)
-            S[wp.static(rows[0]) + 2, i] = S[wp.static(rows[0]) + 2, i] + (turn - back)
-            if wp.static(needs_power[0]):
-                S[wp.static(power_rows[0]) + 4, i] = S[wp.static(power_rows[0]) + 4, i] + (ax - bx)
-                S[wp.static(power_rows[0]) + 5, i] = S[wp.static(power_rows[0]) + 5, i] + (ay - by)
-            i += 1
-
-    @wp.func
     def attempt(K: Rows, S: Numbers, chain: Chain, step: wp.float64, tolerance: wp.float64):
         n = chain.link_count
         vectors = whole_vectors(n)
         h = real(step)
-        plane = algebra.plane_motion(chain)
         stage = algebra.stage_at(chain, h, wp.static(real(nodes[1])) * h)
+        if wp.static(on_plane):
+            part_joints(S, chain, h)
         i = int(0)
         while i < vectors:
-            displace(S, stage, plane, i, wp.static(stage_sums[1])(S, i), wp.static(needs_power[1]))
+            displace(S, stage, i, wp.static(stage_sums[1])(S, i), wp.static(needs_power[1]))
             i += 1
         for s in range(1, wp.static(stages)):
             close_loop(S, n, wp.static(needs_power[s]))
@@ -319,7 +316,6 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
                         K,
                         S,
                         chain,
-                        plane,
                         wp.static(rows[s]),
                         wp.static(power_rows[s]),
                         i,
@@ -327,9 +323,7 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
                         False,
                         wp.static(needs_power[s]),
                     )
-                    displace(
-                        S, stage, plane, i, wp.static(stage_sums[later(s)])(S, i), wp.static(needs_power[later(s)])
-                    )
+                    displace(S, stage, i, wp.static(stage_sums[later(s)])(S, i), wp.static(needs_power[later(s)]))
                     i += 1
         inverse = real(wp.float64(1.0) / tolerance)
         i = int(0)
@@ -338,7 +332,6 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
                 K,
                 S,
                 chain,
-                plane,
                 wp.static(rows[-1]),
                 wp.static(power_rows[-1]),
                 i,
@@ -381,19 +374,34 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
         return total
 
     @wp.func
+    def fall_on_plane(K: Rows, plane: exact.PlaneMotion, chain: Chain, step: wp.float64, i: int):
+        """What gravity and the motion of the plane take from a link's velocities in a step, where its middle is."""
+        a = chain.half_length
+        half = HALF * step
+        turn = half * K[layout.OMEGA, i]
+        arm_x = a * (K[layout.COSINE, i] - turn * K[layout.SINE, i])
+        arm_y = a * (K[layout.SINE, i] + turn * K[layout.COSINE, i])
+        x = K[layout.X, i] + half * K[layout.U, i]
+        y = K[layout.Y, i] + half * K[layout.V, i]
+        load_x, load_y, load_turn = exact.plane_load(plane, x, y, arm_x, arm_y)
+        less = wp.where(i < chain.link_count, -step, wp.float64(0.0))  # see part_joints
+        return wp.vec3d(less * load_x, less * load_y, less * load_turn)
+
+    @wp.func
     def commit(K: Rows, S: Numbers, chain: Chain, step: wp.float64):
         n = chain.link_count
         lanes = whole_lanes(n)
         fall = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
         if wp.static(is_weight):
             fall = wp.vec2d(wp.float64(0.0), chain.gravity * step)
-        if wp.static(on_plane):
-            fall = wp.vec2d(chain.gravity * chain.up_x * step, chain.gravity * chain.up_y * step)
+        plane = exact.plane_motion(chain)
         h = real(step)
         square = h * h
         i = int(0)
         while i < lanes:
             made = new_state(S, i)
+            if wp.static(on_plane):
+                own_fall = fall_on_plane(K, plane, chain, step, i)
             for c in range(2):
                 K[layout.LOST_FRICTION + c, i] = K[layout.LOST_FRICTION + c, i] + wp.float64(h * impulse(S, c, i))
             for c in range(3):
@@ -403,10 +411,13 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
                 if wp.static((is_weight or on_plane) and c < 2):
                     # the impulse of a joint is the same number on both of its links: momentum stays to the last bits
                     push = wp.float64(impulse(S, 2 + c, i + 1)) - wp.float64(impulse(S, 2 + c, i))
-                    change = step * push * K[layout.INVERSE_MASS, i] - fall[c]
+                    change = step * push * K[layout.INVERSE_MASS, i]
+                if wp.static(is_weight and c < 2):
+                    change -= fall[c]
                     way -= HALF * fall[c] * step
-                    if wp.static(on_plane):
-                        change += wp.float64(h * impulse(S, 4 + c, i))
+                if wp.static(on_plane):
+                    change -= own_fall[c]
+                    way -= HALF * own_fall[c] * step
                 K[layout.X + c, i] = K[layout.X + c, i] + (step * rate + way)
                 K[layout.U + c, i] = rate + change
             i += 1
@@ -435,6 +446,4 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
                 finite = finite and wp.isfinite(S[wp.static(rows[0]) + row, i])
         return finite
 
-    return Steps(
-        take_constants, begin, first_stage, take_last_stage, shift_first_stage, attempt, commit, start_is_finite
-    )
+    return Steps(take_constants, begin, first_stage, take_last_stage, attempt, commit, start_is_finite)

@@ -31,8 +31,6 @@ class Joints(Hooks):
     settle: Any = hook(K=Rows, chain=Chain, worlds=Worlds, world=int)
     # evaluates the first stage of a step on springs, if it is not known
     first_stage: Any = hook(K=Rows, chain=Chain, worlds=Worlds, world=int)
-    # changes the first stage from one plane to another
-    shift_first_stage: Any = hook(K=Rows, before=Chain, now=Chain)
     # → error ratio as ordered bits
     attempt: Any = hook(K=Rows, chain=Chain, worlds=Worlds, world=int, h=wp.float64, tolerance=wp.float64)
     # → factor of the step after rejection, see methods.controller
@@ -80,10 +78,6 @@ def springs(name: str, columns: int, is_mixed: bool, load: Any) -> Joints:
             worlds.has_first_stage[world] = wp.static(ROUNDED)
 
     @wp.func
-    def shift_first_stage(K: Rows, before: Chain, now: Chain):
-        steps.shift_first_stage(rows(K), before, now)
-
-    @wp.func
     def attempt(K: Rows, chain: Chain, _worlds: Worlds, _world: int, h: wp.float64, tolerance: wp.float64):
         return steps.attempt(K, rows(K), chain, h, tolerance)
 
@@ -110,7 +104,6 @@ def springs(name: str, columns: int, is_mixed: bool, load: Any) -> Joints:
         take_constants,
         nothing,
         first_stage,
-        shift_first_stage,
         attempt,
         shrinkage,
         accept,

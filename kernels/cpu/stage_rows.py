@@ -18,13 +18,15 @@ CACHE_LINE = 64
 # Joints at the start of the step: force, rate of opening, spin; constants.
 FORCE_AT_START, RATE, SPIN = 0, 2, 4
 VISCOUS, COULOMB = 5, 6
-# Links: constants; at the start of the step arm and velocity, and place if a load depends on it.
+# Links: constants; arm and velocity at the start of the step.
 INVERSE_MASS, INVERSE_INERTIA = 7, 8
 ARM_X, ARM_Y = 9, 10
 U, V, OMEGA = 11, 12, 13
-X, Y = 14, 15
-# A stage, see physics.increments.Moved; way [m] and change of velocity [m/s] of the links' centres, if a load depends
-# on them. Rows of left ends and of the spin are padded: column n repeats column 0.
+# Joints of a plane that tilts: opening at the start of the step; how their links fall apart [m/s²], [rad/s²].
+OPENING = 14
+FALL, FALL_SPIN = 27, 29
+# A stage, see physics.increments.Moved; way [m] and change of velocity [m/s] of the links' centres under a load of a
+# script, in rows that planes use otherwise. Rows of left ends and of the spin are padded: column n repeats column 0.
 LEFT, RIGHT = 16, 18
 LEFT_RATE, RIGHT_RATE = 20, 22
 STAGE_ARM_X, STAGE_ARM_Y, STAGE_SPIN = 24, 25, 26
@@ -35,9 +37,9 @@ ERROR = 31
 # waits for the store of an earlier column, and vectorises by half as many.
 FORCE, TORQUE = 35, 37
 # Per stage: accelerations of x, y, θ; and if it has a weight in the new state, of each joint the power lost to friction
-# and damping and, shifted by one, the force; then what a plane that tilts adds to the accelerations of x and y.
+# and damping and, shifted by one, the force.
 STAGES = 41
-POWER_ROWS = 6
+POWER_ROWS = 4
 
 
 def needs_power(tableau: Tableau) -> tuple[bool, ...]:

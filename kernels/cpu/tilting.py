@@ -1,4 +1,4 @@
-"""A chain whose plane may tilt, as hooks of the CPU loop: sums over links, changes of a first stage, the floor."""
+"""A chain whose plane may tilt, as hooks of the CPU loop: sums over links, and the floor."""
 
 import functools
 
@@ -10,7 +10,7 @@ from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.cpu.contacts.proximity import FURTHEST, any_negative, placed_link
 from warpchain.kernels.cpu.joints import Joints
 from warpchain.kernels.cpu.upright import PlaneHooks
-from warpchain.kernels.layout import GAP, LEFT_X, LOST_FIXED, SUMS, SUMS_OF_MOTION, U
+from warpchain.kernels.layout import GAP, LOST_FIXED, SUMS, U
 from warpchain.kernels.physics import plane
 from warpchain.kernels.physics.elementary import ONE, ZERO, from_order_key, order_key
 from warpchain.kernels.physics.geometry import LANES, whole_lanes
@@ -18,6 +18,7 @@ from warpchain.kernels.types import Chain, Ground, Row, Rows, Worlds, with_circl
 
 SUMMED_IN_CONTACT = 3
 """Impulse on the plane and its two moments."""
+SUMMED = layout.SUMS_OF_PLACES + layout.SUMS_OF_MOTION
 TOUCHES = SUMS + SUMMED_IN_CONTACT
 """Row of −1 for links that touch the floor, 0 for others."""
 
@@ -33,44 +34,51 @@ def row_sum(K: Rows, row: int, count: int) -> wp.float64:
     """Sum of the first ``count`` columns of a row, a multiple of 8; in pure Warp clang adds one after the other."""
 
 
-@wp.func_native("""
-    typedef ::wp::float64 Lanes __attribute__((ext_vector_type(8), aligned(8)));
-    for (int k = 0; k < rows; ++k) {
-        const ::wp::float64* values = &K.data[(row + k) * (K.strides[0] / sizeof(::wp::float64))];
-        Lanes sums = 0.0;
-        for (int i = 0; i < count; i += 8) sums += *reinterpret_cast<const Lanes*>(values + i);
-        P.data[first + k] = ((sums[0] + sums[1]) + (sums[2] + sums[3])) + ((sums[4] + sums[5]) + (sums[6] + sums[7]));
-    }
-""")
-def write_row_sums(K: Rows, row: int, rows: int, count: int, P: Row, first: int):
-    """Writes the sums of rows of K, over their first ``count`` columns, a multiple of 8; as fast as memory allows."""
+def sums_source() -> str:
+    """Source of :func:`write_sums`: eight links at a time, each row is read once, and sums stay in registers."""
+    rows = "m j x y u v w c s".split(), "MASS INERTIA X Y U V OMEGA COSINE SINE".split()
+    lines = [
+        "typedef ::wp::float64 Lanes __attribute__((ext_vector_type(8), aligned(8)));",
+        f"Lanes sums[{SUMMED}] = {{}};",
+        "for (int i = 0; i < count; i += 8) {",
+        "const ::wp::float64* column = &K.data[i];",
+        "const size_t row = K.strides[0] / sizeof(::wp::float64);",
+    ]
+    for symbol, name in zip(*rows, strict=True):
+        lines.append(f"const Lanes {symbol} = *reinterpret_cast<const Lanes*>(column + {getattr(layout, name)} * row);")
+    terms = "mx", "my", "mx * x + j * c * c", "mx * y + j * c * s", "my * y + j * s * s", "mu", "mv"
+    lines.append("const Lanes mx = m * x, my = m * y, mu = m * u, mv = m * v;")
+    lines += [f"sums[{k}] += {term};" for k, term in enumerate((*terms, "x * mv - y * mu + j * w"))]
+    lines.append("}")
+    # add neighbours, then pairs, then halves: the lanes of one vector become the sums
+    orders = (0, 8, 2, 10, 4, 12, 6, 14), (0, 1, 8, 9, 4, 5, 12, 13), (0, 1, 2, 3, 8, 9, 10, 11)
+    for order, apart, left in zip(orders, (1, 2, 4), (4, 2, 1), strict=True):
+        first, second = (", ".join(str(lane + shift) for lane in order) for shift in (0, apart))
+        pair = "sums[2 * k], sums[2 * k + 1]"
+        lines.append(
+            f"for (int k = 0; k < {left}; ++k) sums[k] = __builtin_shufflevector({pair}, {first})"
+            f" + __builtin_shufflevector({pair}, {second});"
+        )
+    lines.append(f"*reinterpret_cast<Lanes*>(&P.data[{layout.PLANE_SUMS}]) = sums[0];")
+    return "\n".join(lines)
 
 
-@wp.func
-def write_sums_of_motion(K: Rows, P: Row, chain: Chain):
-    """Writes the sums over the links that depend on velocities."""
-    count = whole_lanes(chain.link_count)
-    i = int(0)
-    while i < count:
-        motion = plane.motion_terms(K, i)
-        for k in range(wp.static(SUMS_OF_MOTION)):
-            K[wp.static(SUMS + k), i] = wp.where(i < chain.link_count, motion[k], ZERO)
-        i += 1
-    write_row_sums(K, SUMS, SUMS_OF_MOTION, count, P, layout.MOTION_SUMS)
+@wp.func_native(sums_source())
+def write_sums(K: Rows, P: Row, count: int):
+    """Writes the sums over the first ``count`` columns of a placed chain, a multiple of 8, but for the links' width.
+
+    Terms are those of :func:`plane.place_terms` and :func:`plane.motion_terms`; columns behind the links have no mass.
+    In pure Warp each term is stored before it is added, because clang keeps the order of sums: twice as long.
+    """
 
 
 @wp.func
 def write_plane_sums(K: Rows, P: Row, chain: Chain):
     """Writes all sums over the placed links, and the inverse of the plane's mass matrix."""
-    count = whole_lanes(chain.link_count)
-    i = int(0)
-    while i < count:
-        places = plane.place_terms(K, chain, i)
-        for k in range(wp.static(layout.SUMS_OF_PLACES)):
-            K[wp.static(SUMS + k), i] = wp.where(i < chain.link_count, places[k], ZERO)
-        i += 1
-    write_row_sums(K, SUMS, layout.SUMS_OF_PLACES, count, P, layout.PLANE_SUMS)
-    write_sums_of_motion(K, P, chain)
+    write_sums(K, P, whole_lanes(chain.link_count))
+    side = chain.mass * chain.half_width * chain.half_width * plane.THIRD
+    P[layout.SUM_XX] = P[layout.SUM_XX] + side
+    P[layout.SUM_YY] = P[layout.SUM_YY] + side
     P[layout.SUM_MASS] = chain.mass
     plane.invert_mass(P)
 
@@ -84,13 +92,12 @@ def tilting_gap(K: Rows, chain: Chain, _ground: Ground, _face: Face):
     i = int(0)
     while i < whole_lanes(chain.link_count):
         own = with_circles(chain, K[layout.RADIUS, i])
-        left = order_key(tilting_floor.middle_height(own, slope, K[LEFT_X, i], K[layout.LEFT_Y, i]))
-        right = order_key(tilting_floor.middle_height(own, slope, K[layout.RIGHT_X, i], K[layout.RIGHT_Y, i]))
-        middle = wp.min(left, right)
-        K[GAP, i] = wp.where(i < chain.link_count, from_order_key(middle) - tipped, ONE)
-        lowest = wp.min(lowest, wp.where(i < chain.link_count, middle, FURTHEST))
+        rise = chain.half_length * wp.abs(K[layout.COSINE, i] * chain.up_x + K[layout.SINE, i] * chain.up_y)
+        middle = tilting_floor.middle_height(own, slope, K[layout.X, i], K[layout.Y, i]) - rise
+        K[GAP, i] = wp.where(i < chain.link_count, middle - tipped, ONE)
+        lowest = wp.min(lowest, wp.where(i < chain.link_count, order_key(middle), FURTHEST))
         i += 1
-    return from_order_key(lowest) - chain.half_width * wp.abs(chain.up_z)
+    return from_order_key(lowest) - tipped
 
 
 @wp.func
@@ -154,7 +161,7 @@ def resolve_tilting_floor(K: Rows, P: Row, chain: Chain, ground: Ground, face: F
     for k in range(wp.static(SUMMED_IN_CONTACT)):
         push[k] = row_sum(K, wp.static(SUMS + k), count)
     K[LOST_FIXED, 0] = K[LOST_FIXED, 0] + tilting_floor.push_plane_by(P, push)
-    write_sums_of_motion(K, P, chain)
+    write_plane_sums(K, P, chain)
     return impulses
 
 
@@ -168,13 +175,9 @@ def tilting_plane(joints: Joints) -> PlaneHooks:
 
     @wp.func
     def begin_step(K: Rows, P: Row, chain: Chain, worlds: Worlds, world: int, h: wp.float64) -> Chain:
-        before = plane.on_plane(chain, P, wp.static(layout.PLANE_MID))
         plane.begin_step(P, chain.gravity, h)
         felt = plane.on_plane(chain, P, wp.static(layout.PLANE_MID))
-        was_known = worlds.has_first_stage[world] != 0
         joints.first_stage(K, felt, worlds, world)
-        if was_known:
-            joints.shift_first_stage(K, before, felt)
         return felt
 
     @wp.func

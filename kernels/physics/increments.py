@@ -95,6 +95,9 @@ class Increments:
     plane_motion: Any  # ``(chain)`` → PlaneMotion
     # ``(plane, x, y, arm_x, arm_y)`` → ẍ, ÿ, θ̈ of a link at a place by gravity and the motion of its plane
     plane_load: Any
+    # ``(plane, arm_x, arm_y)`` → ẍ, ÿ that the plane would add at a link's right end if it were no part of the link,
+    # less those of this end; and θ̈
+    end_load: Any
     # ``(stage, error ẍ, ÿ, θ̈, value u, v, ω, rate ẍ, ÿ, θ̈, turn, 1/tolerance)`` → error ratio of a link
     error_ratio: Any
 
@@ -263,6 +266,14 @@ def increments(real: Any) -> Increments:
         return plane.fall_x - plane.turn_y * across, plane.fall_y + plane.turn_x * across, turn
 
     @wp.func
+    def end_load(plane: PlaneMotion, arm_x: real, arm_y: real):
+        # along the rod; at the left end the opposite
+        about_rod = arm_x * plane.turn_x + arm_y * plane.turn_y
+        across_rod = arm_x * plane.turn_y - arm_y * plane.turn_x
+        stretch = across_rod * across_rod * plane.inverse_square
+        return arm_x * stretch, arm_y * stretch, -(about_rod * across_rod) * plane.inverse_square
+
+    @wp.func
     def error_ratio(
         stage: Stage,
         eu: real,
@@ -311,5 +322,6 @@ def increments(real: Any) -> Increments:
         acceleration,
         plane_motion,
         plane_load,
+        end_load,
         error_ratio,
     )
