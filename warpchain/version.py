@@ -7,7 +7,8 @@ VERSION: Final = "0.2.0.dev0"
 NUMERICS_VERSION: Final = 19
 """Raised by every change that changes a number of any walk; shards of two versions never mix.
 
-19: on a CPU links of a tilting plane fall by its loads in the middle of a step; mean Δx 0.003 ± 0.020 %.
+19: on a CPU links of a tilting plane fall by its loads in the middle of a step, mean Δx 0.003 ± 0.020 %; on a GPU one
+kernel carries chains on the sprocket and on the floor, which changes roundings.
 """
 FORMAT_VERSION: Final = 11
 """Of all files of results: sweep.h5, shards, merged files and walks."""
