@@ -264,22 +264,24 @@ def compiles_for_gpus(folder: Path, features: Features, block_dim: int, *generat
     module.options["block_dim"] = block_dim
     wp.compile_aot_module(module, arch=list(generations), module_dir=str(folder), use_ptx=False)
     assert len(list(folder.glob("*.cubin"))) == len(generations)
-    shared = [size for path in folder.glob("*.meta") for size in json.loads(path.read_text(encoding="utf-8")).values()]
-    assert 0 < max(shared) <= SHARED_MEMORY
+    assert 0 < shared_memory(folder) <= SHARED_MEMORY
 
 
+def shared_memory(folder: Path) -> int:
+    """Bytes of shared memory of a block of a compiled kernel."""
+    sizes = [size for path in folder.glob("*.meta") for size in json.loads(path.read_text(encoding="utf-8")).values()]
+    return int(max(sizes))
+
+
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("fixed_body", "moves", "generations"),
-    [
-        ("sprocket", False, (80,)),
-        pytest.param("sprocket", False, (80, 90), marks=pytest.mark.thorough),
-        pytest.param("terrain", False, (80,), marks=pytest.mark.thorough),
-        pytest.param("floor", True, (90,), marks=pytest.mark.thorough),
-    ],
+    [("floor", False, (80, 90)), ("terrain", False, (80,)), ("floor", True, (90,))],
 )
 def test_a_kernel_compiles_for_gpus(tmp_path: Path, fixed_body: str, moves: bool, generations: tuple[int, ...]) -> None:
-    """That of the drive compiles for older GPUs, and as those of a profile and of a moving sprocket for newer ones."""
-    features = Features("os32", layout.padded_width(60), fixed_body, True, moving_sprocket=moves, is_mixed=moves)
+    """That of usual walks compiles for older and newer GPUs, and so do those of a profile and of a moving sprocket."""
+    kind = {"moving_sprocket": moves, "has_drive": not moves, "is_mixed": moves}
+    features = Features("os32", layout.padded_width(60), fixed_body, True, **kind)
     compiles_for_gpus(tmp_path, features, 64, *generations)
 
 
@@ -300,12 +302,14 @@ def attempt_loop(ptx: str) -> list[str]:
 def test_attempts_in_mixed_precision_hardly_use_double_precision(tmp_path: Path) -> None:
     """An attempt has a barrier a stage and one for the error; at most a twentieth of its work is in double precision.
 
-    That is what the new state takes. Conversions between the state and its increments are counted apart.
+    That is what the new state takes. Conversions between the state and its increments are counted apart. The kernel is
+    that of usual walks, and its block fits into the shared memory of older GPUs.
     """
-    features = Features("os32", layout.padded_width(60), "floor", True, is_mixed=True)
+    features = Features("os32", layout.padded_width(60), "floor", True, has_drive=True, is_mixed=True)
     module = make_advance_block(features, 64, most_registers(64)).module
     module.options["block_dim"] = 64
     wp.compile_aot_module(module, arch=90, module_dir=str(tmp_path), use_ptx=True)
+    assert 0 < shared_memory(tmp_path) <= SHARED_MEMORY
     (path,) = tmp_path.glob("*.ptx")
     loop = attempt_loop(path.read_text(encoding="utf-8", errors="replace"))
     assert sum(line.startswith("bar.sync") for line in loop) == len(find_method("os32").tableau.matrix)
