@@ -10,10 +10,10 @@ from warpchain.kernels.cpu import loop as cpu_loop
 from warpchain.kernels.gpu import loop as gpu_loop
 
 PLAIN = "-ffp-contract=off -O0"
-"""Flags without fused products and without optimisation, which takes a fifth of the time.
+"""Flags without fused products and without optimisation, with which kernels compile faster and run more slowly.
 
-A compiler that is given no liberties keeps IEEE arithmetic in the order of the source, optimised or not. So these flags
-give the numbers of `-ffp-contract=off` to the bit. A step takes ten times as long.
+Without fused products the compiler keeps the arithmetic of the source, optimised or not. So these flags give the same
+numbers to the bit as `-ffp-contract=off` alone.
 """
 
 

@@ -179,7 +179,7 @@ def test_step_limit(start, limit):
 
 
 def test_a_gpu_drives_and_releases_a_chain_in_one_kernel() -> None:
-    """A loop held for a moment leaves its sprocket as fast as that turns, and falls without losing energy unseen."""
+    """A loop that is held briefly leaves the sprocket at its speed and falls freely, and its energy ledger closes."""
     walk = warpchain.walk(
         links=30,
         frequency=15,
