@@ -4,9 +4,6 @@ The algebra is that of :mod:`physics.increments`. K is the chain's scratch in do
 what stages work on, see :mod:`cpu.stage_rows`. A stage is two loops: one over joints, and one over links, which finds
 their accelerations and displaces them for the next stage. Loops have the form that clang vectorises: ``while`` loops
 with an integer of their own, arrays of static shape, no branch and no library call inside.
-
-A link of a plane that tilts falls, besides, as gravity and the plane accelerate it in the middle of the step; this is
-of second order, like the plane's own step. Stages know of this fall that it opens joints: by G t²/2, at the rate G t.
 """
 
 import functools
@@ -26,8 +23,6 @@ from warpchain.kernels.types import Chain, Rows
 
 WEIGHT, PLANE = "weight", "plane"
 """Loads that stages know: weight alone, which opens no joint, and that of a plane that tilts."""
-LEAST_TURN = 1e-9
-"""A plane that turns more slowly [rad/s] opens no joint: powers of smaller numbers are subnormal, which takes long."""
 
 
 @dataclass(frozen=True)
@@ -81,9 +76,6 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
         S[at.RATE, i] = joint.u
         S[at.RATE + 1, i] = joint.v
         S[at.SPIN, i] = joint.spin
-        if wp.static(on_plane):
-            S[at.OPENING, i] = joint.x
-            S[at.OPENING + 1, i] = joint.y
 
     @wp.func
     def begin(K: Rows, S: Numbers, chain: Chain):
@@ -116,7 +108,6 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
     def pull_joints(S: Numbers, stage: algebra.Stage, n: int, power_row: int, is_first: bool, has_power: bool):
         """Forces and torques of the joints in a stage."""
         vectors = whole_vectors(n)
-        pull_apart = stage.even * (real(0.5) * stage.stiffness * stage.even + stage.damping)
         i = int(0)
         while i < vectors:
             force_x = S[at.FORCE_AT_START, i]
@@ -128,13 +119,6 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
                 force_x = algebra.force(stage, force_x, rate_x, S[at.LEFT, i + 1], S[at.RIGHT, i])
                 force_y = algebra.force(stage, force_y, rate_y, S[at.LEFT + 1, i + 1], S[at.RIGHT + 1, i])
                 spin += S[at.STAGE_SPIN, i] - S[at.STAGE_SPIN, i + 1]
-                if wp.static(on_plane):
-                    force_x += pull_apart * S[at.FALL, i]
-                    force_y += pull_apart * S[at.FALL + 1, i]
-                    spin += stage.even * S[at.FALL_SPIN, i]
-                    if has_power:
-                        rate_x += stage.even * S[at.FALL, i]
-                        rate_y += stage.even * S[at.FALL + 1, i]
                 if has_power:
                     rate_x += S[at.LEFT_RATE, i + 1] - S[at.RIGHT_RATE, i]
                     rate_y += S[at.LEFT_RATE + 1, i + 1] - S[at.RIGHT_RATE + 1, i]
@@ -169,33 +153,18 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
         return link
 
     @wp.func
-    def end_in_middle(S: Numbers, plane: algebra.PlaneMotion, half: real, i: int):
-        """:func:`Increments.end_load` of a link in the middle of a step."""
-        turn = half * S[at.OMEGA, i]
-        arm_x = S[at.ARM_X, i]
-        arm_y = S[at.ARM_Y, i]
-        return algebra.end_load(plane, arm_x - turn * arm_y, arm_y + turn * arm_x)
-
-    @wp.func
-    def part_joints(S: Numbers, chain: Chain, h: real):
-        """Writes how the links of each joint fall apart, in the step that begins, on a plane that turns."""
-        n = chain.link_count
+    def load_ends(S: Numbers, chain: Chain, h: real):
+        """Writes the loads of the links' ends, in the step that begins, on a plane that turns."""
         plane = algebra.plane_motion(chain)
-        plane.turn_x = wp.where(wp.abs(plane.turn_x) < wp.static(real(LEAST_TURN)), real(0.0), plane.turn_x)
-        plane.turn_y = wp.where(wp.abs(plane.turn_y) < wp.static(real(LEAST_TURN)), real(0.0), plane.turn_y)
         half = real(0.5) * h
-        for row in range(wp.static(at.ARM_X), wp.static(at.OMEGA + 1)):
-            S[row, n] = S[row, 0]
-        vectors = whole_vectors(n)
+        vectors = whole_vectors(chain.link_count)
         i = int(0)
         while i < vectors:
-            end_x, end_y, turn = end_in_middle(S, plane, half, i)
-            next_x, next_y, next_turn = end_in_middle(S, plane, half, i + 1)
-            across = plane.turn_x * S[at.OPENING + 1, i] - plane.turn_y * S[at.OPENING, i]
+            load = algebra.end_load(plane, half, S[at.OMEGA, i], S[at.ARM_X, i], S[at.ARM_Y, i])
             # links behind the last stay at rest: powers of their slow motion would be subnormal, a hundred cycles each
-            S[at.FALL, i] = wp.where(i < n, end_x + next_x - plane.turn_y * across, real(0.0))
-            S[at.FALL + 1, i] = wp.where(i < n, end_y + next_y + plane.turn_x * across, real(0.0))
-            S[at.FALL_SPIN, i] = wp.where(i < n, turn - next_turn, real(0.0))
+            S[at.END_LOAD, i] = wp.where(i < chain.link_count, load.x, real(0.0))
+            S[at.END_LOAD + 1, i] = wp.where(i < chain.link_count, load.y, real(0.0))
+            S[at.END_LOAD + 2, i] = wp.where(i < chain.link_count, load.turn, real(0.0))
             i += 1
 
     @wp.func
@@ -244,6 +213,9 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
         moved = algebra.displace(
             stage, S[at.ARM_X, i], S[at.ARM_Y, i], omega, sums[0], sums[1], sums[2], sums[3], sums[4], sums[5]
         )
+        if wp.static(on_plane):
+            load = algebra.EndLoad(S[at.END_LOAD, i], S[at.END_LOAD + 1, i], S[at.END_LOAD + 2, i])
+            moved = algebra.ends_drawn(stage, moved, load)
         S[at.LEFT, i] = moved.left_x
         S[at.LEFT + 1, i] = moved.left_y
         S[at.RIGHT, i] = moved.right_x
@@ -299,7 +271,7 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
         h = real(step)
         stage = algebra.stage_at(chain, h, wp.static(real(nodes[1])) * h)
         if wp.static(on_plane):
-            part_joints(S, chain, h)
+            load_ends(S, chain, h)
         i = int(0)
         while i < vectors:
             displace(S, stage, i, wp.static(stage_sums[1])(S, i), wp.static(needs_power[1]))
@@ -375,16 +347,9 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
 
     @wp.func
     def fall_on_plane(K: Rows, plane: exact.PlaneMotion, chain: Chain, step: wp.float64, i: int):
-        """What gravity and the motion of the plane take from a link's velocities in a step, where its middle is."""
-        a = chain.half_length
-        half = HALF * step
-        turn = half * K[layout.OMEGA, i]
-        arm_x = a * (K[layout.COSINE, i] - turn * K[layout.SINE, i])
-        arm_y = a * (K[layout.SINE, i] + turn * K[layout.COSINE, i])
-        x = K[layout.X, i] + half * K[layout.U, i]
-        y = K[layout.Y, i] + half * K[layout.V, i]
-        load_x, load_y, load_turn = exact.plane_load(plane, x, y, arm_x, arm_y)
-        less = wp.where(i < chain.link_count, -step, wp.float64(0.0))  # see part_joints
+        """What gravity and the motion of the plane take from a link's velocities in a step."""
+        load_x, load_y, load_turn = exact.plane_load(plane, HALF * step, K, chain.half_length, i)
+        less = wp.where(i < chain.link_count, -step, wp.float64(0.0))  # see load_ends
         return wp.vec3d(less * load_x, less * load_y, less * load_turn)
 
     @wp.func

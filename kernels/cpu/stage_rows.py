@@ -22,9 +22,8 @@ VISCOUS, COULOMB = 5, 6
 INVERSE_MASS, INVERSE_INERTIA = 7, 8
 ARM_X, ARM_Y = 9, 10
 U, V, OMEGA = 11, 12, 13
-# Joints of a plane that tilts: opening at the start of the step; how their links fall apart [m/s²], [rad/s²].
-OPENING = 14
-FALL, FALL_SPIN = 27, 29
+# Links of a plane that tilts: loads of their ends, see physics.increments.EndLoad.
+END_LOAD = 27
 # A stage, see physics.increments.Moved; way [m] and change of velocity [m/s] of the links' centres under a load of a
 # script, in rows that planes use otherwise. Rows of left ends and of the spin are padded: column n repeats column 0.
 LEFT, RIGHT = 16, 18

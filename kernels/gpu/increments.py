@@ -68,14 +68,14 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
     real = real_of(features)
     vec2, vec3 = (wp.types.vector(length=length, dtype=real) for length in (2, 3))
     algebra = increments(real)
-    Stage, Joint, PlaneMotion = algebra.Stage, algebra.Joint, algebra.PlaneMotion
+    Stage, Joint, EndLoad = algebra.Stage, algebra.Joint, algebra.EndLoad
     displace, force, torque_of, start_force = algebra.displace, algebra.force, algebra.torque, algebra.start_force
+    tilts, plane_motion, plane_load = features.tilts, algebra.plane_motion, algebra.plane_load
     small_turn = turn_single if features.is_mixed else turn_double
     T4, T6, T8 = (real(1 / math.factorial(power)) for power in (4, 6, 8))
     write_pair, read_pair, write_one, read_one = number_memory(real)
     is_shared = shares_board(block_dim)
-    acceleration = features.acceleration
-    has_load = features.tilts or features.load != "weight"
+    acceleration, has_load = features.acceleration, features.load != "weight"
 
     tableau = find_method(features.method).tableau
     nodes, weights, velocity_errors = tableau.nodes, tableau.velocity_weights, tableau.velocity_errors
@@ -211,25 +211,15 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
         return vec3d(wp.float64(x[0]), wp.float64(x[1]), wp.float64(x[2]))
 
     @wp.func
-    def load(run: Run, plane: PlaneMotion, even: real, gain: vec3, way: vec3, arm_x: real, arm_y: real):
-        """Accelerations of a link by what acts on it besides joints and weight, at the time ``even`` in the step.
-
-        Its velocities have changed by ``gain``, its place by ``way`` beyond even motion. A load of a script gets all
-        in double precision.
-        """
+    def load(run: Run, even: real, gain: vec3, way: vec3):
+        """Accelerations of a link by a script's load, at a time when ``gain`` and ``way`` are beyond even motion."""
         K = run.K
         lane = run.lane
-        if wp.static(features.tilts):
-            x = real(K[X, lane]) + (even * real(K[U, lane]) + way[0])
-            y = real(K[Y, lane]) + (even * real(K[V, lane]) + way[1])
-            fall_x, fall_y, fall_turn = wp.static(algebra.plane_load)(plane, x, y, arm_x, arm_y)
-            return vec3(fall_x, fall_y, fall_turn)
         moved = wp.float64(even) * three(K, U, lane) + doubles(way)
         motion = three(K, U, lane) + doubles(gain)
         half_length = constants(K).half_length
         turned_x, turned_y = turned(half_length * K[COSINE, lane], half_length * K[SINE, lane], moved[2])
-        x_there = K[X, lane] + moved[0]
-        there = Link(x_there, K[Y, lane] + moved[1], motion[0], motion[1], motion[2], turned_x, turned_y)
+        there = Link(K[X, lane] + moved[0], K[Y, lane] + moved[1], motion[0], motion[1], motion[2], turned_x, turned_y)
         inverse_mass = K[layout.INVERSE_MASS, run.column]
         ax, ay, turn = acceleration(constants(K), lane, there, inverse_mass, K[layout.INVERSE_INERTIA, run.column])
         return vec3(real(ax), real(ay), real(turn))
@@ -240,6 +230,7 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
         lane = run.lane
         exchange = run.exchange
         h = real(step)
+        half_step = real(0.5) * h
         stage = common.stage
         stage.h = h
         # what the last stage needs it reads again: registers are scarce
@@ -250,13 +241,14 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
         before = Joint()
         friction = get(run, FRICTION, lane)
         friction_before = get(run, FRICTION, run.before)
-        plane = PlaneMotion()
-        if wp.static(features.tilts):
-            plane = wp.static(algebra.plane_motion)(felt_plane(run))
+        end_load = EndLoad()
+        if wp.static(tilts):
+            plane = plane_motion(felt_plane(run))
+            end_load = wp.static(algebra.end_load)(plane, half_step, omega, start_x, start_y)
         rates = Stages()
         rates[0] = kept_push(run)
         if wp.static(has_load):
-            rates[0] += load(run, plane, real(0.0), vec3(), vec3(), start_x, start_y)
+            rates[0] += load(run, real(0.0), vec3(), vec3())
         own_force_x = start_force(stage, own.x, own.u)
         own_force_y = start_force(stage, own.y, own.v)
         force_before_x = real(0.0)
@@ -279,6 +271,8 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
                 stage.stiffness = real(1.0)
                 stage.damping = real(0.0)
             moved = displace(stage, start_x, start_y, omega, sums[0], sums[1], sums[2], ways[0], ways[1], ways[2])
+            if wp.static(tilts):
+                moved = wp.static(algebra.ends_drawn)(stage, moved, end_load)
             write_pair(exchange, wp.static(pairs(s, LEFT)) + lane, moved.left_x, moved.left_y)
             write_pair(exchange, wp.static(pairs(s, RIGHT)) + lane, moved.right_x, moved.right_y)
             write_one(exchange, wp.static(turns(s)) + lane, moved.spin)
@@ -288,10 +282,16 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
                 write_pair(exchange, wp.static(pairs(s, RIGHT_RATE)) + lane, moved.right_u, moved.right_v)
                 ways = (h * h) * ways
                 gain = h * sums
-                if wp.static(not has_load):
-                    fall = h * common.gravity
-                    gain[1] = gain[1] - fall
-                    ways[1] = ways[1] - real(0.5) * h * fall
+                if wp.static(tilts):
+                    plane = plane_motion(felt_plane(run))
+                    fall_x, fall_y, fall_turn = plane_load(plane, half_step, K, common.half_length, lane)
+                    fall = h * vec3(fall_x, fall_y, fall_turn)
+                    gain += fall
+                    ways += half_step * fall
+                elif wp.static(not has_load):
+                    drop = h * common.gravity
+                    gain[1] = gain[1] - drop
+                    ways[1] = ways[1] - half_step * drop
                 result.gain = gain
                 turn = step * K[OMEGA, lane] + wp.float64(ways[2])
                 x = K[X, lane] + (step * K[U, lane] + wp.float64(ways[0]))
@@ -331,7 +331,7 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
                 )
                 rates[s] = pushed(run, moved.arm_x, moved.arm_y, left, right)
                 if wp.static(has_load):
-                    rates[s] += load(run, plane, stage.even, h * sums, (h * h) * ways, moved.arm_x, moved.arm_y)
+                    rates[s] += load(run, stage.even, h * sums, (h * h) * ways)
                 if wp.static(weights[s] != 0.0):
                     next_rate = read_pair(exchange, wp.static(pairs(s, LEFT_RATE)) + run.after)
                     rate_x = own.u + (next_rate[0] - moved.right_u)
@@ -368,7 +368,7 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
                     result.friction += wp.static(real(weights[s])) * result.last_friction
                     result.damping += wp.static(real(weights[s])) * result.last_damping
                 if wp.static(has_load):
-                    rates[s] += load(run, plane, h, gain, ways, moved.arm_x, moved.arm_y)
+                    rates[s] += load(run, h, gain, ways)
                 result.opening = wp.float32(joint.x * joint.x + joint.y * joint.y)
                 e = vec3()
                 for j in range(wp.static(stages)):

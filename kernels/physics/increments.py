@@ -19,6 +19,11 @@ The even motion c h q̇ and c h ω ẑ×r changes C by c h Ċ₀, so that it nee
 
 p and B are 1e-8 m and less. So in single precision, too, C is known to 1e-15 m, and the force k C + b Ċ of a joint to
 1e-7 of itself. Weight opens no joint: stages leave it out, and the new state falls by it as a whole.
+
+On a plane that tilts each link has a load of its own, by gravity and the plane's motion. The new state falls by that
+in the middle of the step; this is of second order, like the plane's own step. Such loads open joints, too: both ends of
+a link are drawn to its centre by an acceleration G that free points there would not have. So stages shift them by
+G t²/2, at the rate G t. What the openings of joints add to this is less than its rounding.
 """
 
 import functools
@@ -32,6 +37,9 @@ from warpchain.kernels.physics import elementary
 from warpchain.kernels.physics.elementary import LARGEST_TURN, T2, T3, T4, T5, T6, T7, T8
 from warpchain.kernels.physics.geometry import end_positions, end_velocities
 from warpchain.kernels.types import Chain, Rows
+
+LEAST_TURN = 1e-9
+"""A plane that turns more slowly [rad/s] loads no link: powers of smaller numbers are subnormal, and slow on CPUs."""
 
 
 @wp.func_native("""
@@ -82,6 +90,7 @@ class Increments:
     Joint: Any  # a joint at the start of a step
     Moved: Any  # a link in a stage
     PlaneMotion: Any  # what links feel of a plane that tilts
+    EndLoad: Any  # what opens joints on it
     stage_at: Any  # ``(chain, h, ch)`` → Stage
     begin_joint: Any  # ``(K, half_length, i, j)`` → Joint of the right end of link i and the left end of link j
     start_force: Any  # ``(stage, opening, rate)`` → force [N] of a joint at the start of a step
@@ -93,11 +102,10 @@ class Increments:
     # ``(1/m, 1/I, arm_x, arm_y, left force x, y, left torque, right force x, y, right torque)`` → ẍ, ÿ, θ̈
     acceleration: Any
     plane_motion: Any  # ``(chain)`` → PlaneMotion
-    # ``(plane, x, y, arm_x, arm_y)`` → ẍ, ÿ, θ̈ of a link at a place by gravity and the motion of its plane
-    plane_load: Any
-    # ``(plane, arm_x, arm_y)`` → ẍ, ÿ that the plane would add at a link's right end if it were no part of the link,
-    # less those of this end; and θ̈
+    # ``(plane, h/2, ω, arm_x, arm_y)`` of a link at the start of a step → EndLoad in the middle
     end_load: Any
+    plane_load: Any  # ``(plane, h/2, K, half_length, i)``, likewise → ẍ, ÿ, θ̈ of link i
+    ends_drawn: Any  # ``(stage, Moved, EndLoad)`` → Moved of a link with that load
     # ``(stage, error ẍ, ÿ, θ̈, value u, v, ω, rate ẍ, ÿ, θ̈, turn, 1/tolerance)`` → error ratio of a link
     error_ratio: Any
 
@@ -150,6 +158,16 @@ def increments(real: Any) -> Increments:
         fall_x: real  # acceleration of gravity within the plane [m/s²]
         fall_y: real
         inverse_square: real  # 1/a² [1/m²]
+
+    @wp.struct
+    class EndLoad:
+        x: real  # G of the left end [m/s²]; the right end has the opposite
+        y: real
+        turn: real  # θ̈ [rad/s²]
+
+    @wp.func
+    def turn_of_plane(rate: wp.float64):
+        return wp.where(wp.abs(rate) < wp.static(wp.float64(LEAST_TURN)), real(0.0), real(rate))
 
     @wp.func
     def stage_at(chain: Chain, h: real, even: real) -> Stage:
@@ -250,28 +268,44 @@ def increments(real: Any) -> Increments:
     def plane_motion(chain: Chain) -> PlaneMotion:
         plane = PlaneMotion()
         plane.speed = real(chain.plane_speed)
-        plane.turn_x = real(chain.turn_x)
-        plane.turn_y = real(chain.turn_y)
+        plane.turn_x = turn_of_plane(chain.turn_x)
+        plane.turn_y = turn_of_plane(chain.turn_y)
         plane.fall_x = real(-chain.gravity * chain.up_x)
         plane.fall_y = real(-chain.gravity * chain.up_y)
         plane.inverse_square = real(chain.inverse_square)
         return plane
 
     @wp.func
-    def plane_load(plane: PlaneMotion, x: real, y: real, arm_x: real, arm_y: real):
-        across = plane.speed + plane.turn_x * y - plane.turn_y * x
-        about_rod = arm_x * plane.turn_x + arm_y * plane.turn_y
-        across_rod = arm_x * plane.turn_y - arm_y * plane.turn_x
-        turn = -(about_rod * across_rod) * plane.inverse_square
-        return plane.fall_x - plane.turn_y * across, plane.fall_y + plane.turn_x * across, turn
-
-    @wp.func
-    def end_load(plane: PlaneMotion, arm_x: real, arm_y: real):
-        # along the rod; at the left end the opposite
+    def end_load(plane: PlaneMotion, half: real, omega: real, start_x: real, start_y: real) -> EndLoad:
+        arm_x = start_x - half * omega * start_y
+        arm_y = start_y + half * omega * start_x
         about_rod = arm_x * plane.turn_x + arm_y * plane.turn_y
         across_rod = arm_x * plane.turn_y - arm_y * plane.turn_x
         stretch = across_rod * across_rod * plane.inverse_square
-        return arm_x * stretch, arm_y * stretch, -(about_rod * across_rod) * plane.inverse_square
+        return EndLoad(arm_x * stretch, arm_y * stretch, -(about_rod * across_rod) * plane.inverse_square)
+
+    @wp.func
+    def plane_load(plane: PlaneMotion, half: real, K: Rows, a: real, i: int):
+        turn = end_load(plane, half, real(K[OMEGA, i]), a * real(K[COSINE, i]), a * real(K[SINE, i])).turn
+        x = real(K[X, i]) + half * real(K[U, i])
+        y = real(K[Y, i]) + half * real(K[V, i])
+        across = plane.speed + plane.turn_x * y - plane.turn_y * x
+        return plane.fall_x - plane.turn_y * across, plane.fall_y + plane.turn_x * across, turn
+
+    @wp.func
+    def ends_drawn(stage: Stage, link: Moved, load: EndLoad) -> Moved:
+        pull = stage.even * (real(0.5) * stage.stiffness * stage.even + stage.damping)
+        moved = link
+        moved.left_x += pull * load.x
+        moved.left_y += pull * load.y
+        moved.right_x -= pull * load.x
+        moved.right_y -= pull * load.y
+        moved.left_u += stage.even * load.x
+        moved.left_v += stage.even * load.y
+        moved.right_u -= stage.even * load.x
+        moved.right_v -= stage.even * load.y
+        moved.spin += stage.even * load.turn
+        return moved
 
     @wp.func
     def error_ratio(
@@ -313,6 +347,7 @@ def increments(real: Any) -> Increments:
         Joint,
         Moved,
         PlaneMotion,
+        EndLoad,
         stage_at,
         begin_joint,
         start_force,
@@ -321,7 +356,8 @@ def increments(real: Any) -> Increments:
         torque,
         acceleration,
         plane_motion,
-        plane_load,
         end_load,
+        plane_load,
+        ends_drawn,
         error_ratio,
     )
