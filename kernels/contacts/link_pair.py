@@ -5,7 +5,7 @@ import warp as wp
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.impulse import collision_impulse, inverse_masses
 from warpchain.kernels.layout import INVERSE_INERTIA, INVERSE_MASS, LEFT_X, RIGHT_X, STRANDS_APART, U, X
-from warpchain.kernels.physics.elementary import HALF, ZERO, quotient
+from warpchain.kernels.physics.elementary import HALF, ZERO, quotient, square_root
 from warpchain.kernels.physics.geometry import put, three, two
 from warpchain.kernels.types import Chain, Rows
 
@@ -65,7 +65,7 @@ def circles_of_links(
     touching = radius_a + radius_b
     square = dx * dx + dy * dy
     overlap = square < touching * touching and square > ZERO
-    distance = wp.sqrt(square)
+    distance = square_root(square)
     depth = wp.where(overlap, touching - distance, ZERO)
     nx = quotient(dx, distance)
     ny = quotient(dy, distance)

@@ -15,7 +15,7 @@ nothing is near them: there their gap counts as the margin of the cells.
 import warp as wp
 
 from warpchain.kernels import layout
-from warpchain.kernels.physics.elementary import ONE, ZERO, quotient
+from warpchain.kernels.physics.elementary import ONE, ZERO, quotient, square_root
 from warpchain.kernels.types import Chain, Ground
 
 SMALLEST = wp.constant(wp.float64(1e-300))
@@ -95,7 +95,7 @@ def terrain_surface(chain: Chain, face: Face, circle_x: wp.float64, circle_y: wp
     past = face.before_x * to_x + face.before_y * to_y
     over = along >= face.begin and along <= face.end and height > -r
     at_corner = along < ZERO and past > ZERO
-    distance = wp.max(wp.sqrt(to_x * to_x + to_y * to_y), SMALLEST)
+    distance = wp.max(square_root(to_x * to_x + to_y * to_y), SMALLEST)
     gap = wp.where(over, height, wp.where(at_corner, distance, FAR)) - r
     nx = wp.where(over, -face.along_y, quotient(to_x, distance))
     ny = wp.where(over, face.along_x, quotient(to_y, distance))

@@ -25,7 +25,7 @@ import warp as wp
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.impulse import Touching
 from warpchain.kernels.layout import INVERSE_01, INVERSE_11, INVERSE_12
-from warpchain.kernels.physics.elementary import HALF, ONE, ZERO, quotient
+from warpchain.kernels.physics.elementary import HALF, ONE, ZERO, quotient, square_root
 from warpchain.kernels.physics.plane import next_three, plane_times_inverse
 from warpchain.kernels.types import Chain, Row
 
@@ -58,7 +58,7 @@ def copy_inverse(P: Row, copies: wp.float64):
 @wp.func
 def steepness(chain: Chain):
     """ρ: the sine of the angle between the plane's normal and the room's Y axis; 0 for a plane that lies flat."""
-    return wp.sqrt(chain.up_x * chain.up_x + chain.up_y * chain.up_y)
+    return square_root(chain.up_x * chain.up_x + chain.up_y * chain.up_y)
 
 
 @wp.func
@@ -78,7 +78,7 @@ def greatest_across_speed(chain: Chain, x: wp.float64, y: wp.float64):
 @wp.func
 def approaches(chain: Chain, slope: wp.float64, link: TiltingLink, at: Touching, x: wp.float64, y: wp.float64):
     """a₊ and a₋ [m/s] of a link's roller at (x, y). The lever leads from the link's centre to its lowest line."""
-    inverse = ONE / wp.max(slope, SMALLEST)
+    inverse = quotient(ONE, wp.max(slope, SMALLEST))
     point_x = x - chain.circle_radius * chain.up_x * inverse
     point_y = y - chain.circle_radius * chain.up_y * inverse
     lever_x = x - at.x + (-chain.circle_radius * chain.up_x * inverse)
@@ -108,7 +108,7 @@ def meet_roller(
     """One roller against the floor, without branches."""
     inverse_mass = link.inverse_mass
     inverse_inertia = link.inverse_inertia
-    inverse = ONE / wp.max(slope, SMALLEST)
+    inverse = quotient(ONE, wp.max(slope, SMALLEST))
     to_point_x = -chain.circle_radius * chain.up_x * inverse
     to_point_y = -chain.circle_radius * chain.up_y * inverse
     x = circle_x + to_point_x
@@ -160,7 +160,7 @@ def meet_roller(
     tangent_1 = second_1 - second_n * n1
     tangent_2 = second_2 - second_n * n2
     tangent_3 = second_3 - second_n * n3
-    tangential = wp.sqrt(tangent_1 * tangent_1 + tangent_2 * tangent_2 + tangent_3 * tangent_3)
+    tangential = square_root(tangent_1 * tangent_1 + tangent_2 * tangent_2 + tangent_3 * tangent_3)
     friction = chain.floor_friction
     bounce = (ONE + chain.floor_restitution) * first
     excess = second_n - first

@@ -85,6 +85,28 @@ def quotient(a: wp.float64, b: wp.float64) -> wp.float64:
 
 @wp.func_native("""
 #if defined(__CUDA_ARCH__)
+    const double z = x < 1e-300 ? 1e-300 : x;
+    double y;
+    asm("rsqrt.approx.ftz.f64 %0, %1;" : "=d"(y) : "d"(z));
+    double root = z * y;
+    y *= 0.5;
+    const double e = fma(-y, root, 0.5);
+    root = fma(root, e, root);
+    y = fma(y, e, y);
+    return fma(fma(-root, root, z), y, root);
+#else
+    return ::wp::sqrt(x);
+#endif
+""")
+def square_root(x: wp.float64) -> wp.float64:
+    """√x of a number that is neither negative nor infinite, to one unit in the last place; on a GPU 1e-150 of 0.
+
+    There the compiler's square root branches, as its division does.
+    """
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
     float y;
     asm("div.approx.ftz.f32 %0, %1, %2;" : "=f"(y) : "f"(a), "f"(b));
     return y;

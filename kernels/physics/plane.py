@@ -241,7 +241,7 @@ def begin_step(P: Row, gravity: wp.float64, h: wp.float64):
 def end_step(P: Row, gravity: wp.float64, h: wp.float64):
     """Carries the plane to the end of the step that has begun; the sums must be those of the links there."""
     half = HALF * h
-    inverse = ONE / h
+    inverse = quotient(ONE, h)
     for k in range(3):
         # from the middle of this step to a third of the next, which is taken to be as long
         rate = inverse * (P[SUM_XX + k] - P[layout.START_XX + k])

@@ -22,6 +22,7 @@ from warpchain import simulate, sweep, walk
 from warpchain.chain.sprocket_motion import motion_rows
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
+from warpchain.kernels.physics import elementary
 from warpchain.run.workers import gpu_workers
 from warpchain.status import Status
 from warpchain.walks import scheduler
@@ -66,6 +67,16 @@ def compare(ours: dict[str, np.ndarray], theirs: dict[str, np.ndarray]) -> float
     return max(np.abs(ours[name] - theirs[name]).max() / np.abs(theirs[name]).max() for name in names)
 
 
+@wp.kernel(module="unique", enable_backward=False)
+def divide_and_root(a: wp.array(dtype=wp.float64), b: wp.array(dtype=wp.float64), found: wp.array2d(dtype=wp.float64)):
+    """Functions of two numbers that a GPU computes in another way than a CPU."""
+    i = wp.tid()
+    found[0, i] = elementary.quotient(a[i], b[i])
+    found[1, i] = elementary.reciprocal(b[i])
+    found[2, i] = elementary.square_root(wp.abs(b[i]))
+    found[3, i] = elementary.tanh(b[i])
+
+
 CASES = [("rkf78", "floor"), ("dp5", "sprocket"), ("bs32", "floor"), ("os32", "floor"), ("dp5", "floor")]
 CASES += [("os32", "slope"), ("os32", "terrain")]
 
@@ -88,6 +99,23 @@ def cpu() -> None:
     """Skips where Warp came without its CPU compiler, as on machines that have GPUs only."""
     if not wp.is_cpu_available():
         pytest.skip("this Warp cannot compile for the CPU, which is compared with")
+
+
+def test_quotients_and_roots_are_exact_to_rounding() -> None:
+    """Of numbers of any size that lengths, speeds and masses have; the root of 0 is as good as 0."""
+    rng = np.random.default_rng(1)
+    a, b = (rng.choice([-1.0, 1.0], 100_000) * 10.0 ** rng.uniform(-60, 60, 100_000) for _ in range(2))
+    where = "cuda" if wp.is_cuda_available() else "cpu"
+    inputs = (wp.array(each, dtype=wp.float64, device=where) for each in (a, b))
+    found = wp.zeros((4, len(a)), dtype=wp.float64, device=where)
+    wp.launch(divide_and_root, len(a), [*inputs, found], device=where)
+    quotient, reciprocal, root, tanh = found.numpy()
+    for ours, exact, units in ((quotient, a / b, 1), (reciprocal, 1 / b, 2), (root, np.sqrt(np.abs(b)), 1)):
+        assert (np.abs(ours - exact) <= units * np.spacing(np.abs(exact))).all()
+    np.testing.assert_allclose(tanh, np.tanh(b), rtol=0, atol=2e-15)
+    nothing = wp.zeros(1, dtype=wp.float64, device=where)
+    wp.launch(divide_and_root, 1, [nothing, nothing, found], device=where)
+    assert 0.0 <= found.numpy()[2, 0] <= 1e-140
 
 
 @pytest.mark.usefixtures("gpu", "cpu")
