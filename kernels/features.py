@@ -34,7 +34,7 @@ class Features:
     tilts: bool = False
     load: str = "weight"  # a key of :data:`physics.load.LOADS`
     moving_sprocket: bool = False  # whether the sprocket is there as well, above a floor, and moves
-    # GPU: whether chains may hang on a driven sprocket instead of meeting that body, see :mod:`gpu.loop`
+    # GPU: whether chains of a launch may hang on a driven sprocket while others meet that body, see :mod:`gpu.loop`
     has_drive: bool = False
     is_mixed: bool = False  # whether stages on springs are in single precision, see :mod:`physics.increments`
 

@@ -76,6 +76,9 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
         S[at.RATE, i] = joint.u
         S[at.RATE + 1, i] = joint.v
         S[at.SPIN, i] = joint.spin
+        if wp.static(on_plane):
+            S[at.OPENING, i] = joint.x
+            S[at.OPENING + 1, i] = joint.y
 
     @wp.func
     def begin(K: Rows, S: Numbers, chain: Chain):
@@ -160,11 +163,16 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
         vectors = whole_vectors(chain.link_count)
         i = int(0)
         while i < vectors:
-            load = algebra.end_load(plane, half, S[at.OMEGA, i], S[at.ARM_X, i], S[at.ARM_Y, i])
+            load = algebra.end_load(
+                plane, half, S[at.OMEGA, i], S[at.ARM_X, i], S[at.ARM_Y, i], S[at.OPENING, i], S[at.OPENING + 1, i]
+            )
             # links behind the last stay at rest: powers of their slow motion would be subnormal, a hundred cycles each
-            S[at.END_LOAD, i] = wp.where(i < chain.link_count, load.x, real(0.0))
-            S[at.END_LOAD + 1, i] = wp.where(i < chain.link_count, load.y, real(0.0))
-            S[at.END_LOAD + 2, i] = wp.where(i < chain.link_count, load.turn, real(0.0))
+            is_there = i < chain.link_count
+            S[at.END_LOAD, i] = wp.where(is_there, load.left_x, real(0.0))
+            S[at.END_LOAD + 1, i] = wp.where(is_there, load.left_y, real(0.0))
+            S[at.END_LOAD + 2, i] = wp.where(is_there, load.right_x, real(0.0))
+            S[at.END_LOAD + 3, i] = wp.where(is_there, load.right_y, real(0.0))
+            S[at.END_LOAD + 4, i] = wp.where(is_there, load.turn, real(0.0))
             i += 1
 
     @wp.func
@@ -214,7 +222,12 @@ def steps_in_increments(tableau: Tableau, real: Any, load: Any) -> Steps:
             stage, S[at.ARM_X, i], S[at.ARM_Y, i], omega, sums[0], sums[1], sums[2], sums[3], sums[4], sums[5]
         )
         if wp.static(on_plane):
-            load = algebra.EndLoad(S[at.END_LOAD, i], S[at.END_LOAD + 1, i], S[at.END_LOAD + 2, i])
+            load = algebra.EndLoad()
+            load.left_x = S[at.END_LOAD, i]
+            load.left_y = S[at.END_LOAD + 1, i]
+            load.right_x = S[at.END_LOAD + 2, i]
+            load.right_y = S[at.END_LOAD + 3, i]
+            load.turn = S[at.END_LOAD + 4, i]
             moved = algebra.ends_drawn(stage, moved, load)
         S[at.LEFT, i] = moved.left_x
         S[at.LEFT + 1, i] = moved.left_y

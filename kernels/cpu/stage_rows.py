@@ -22,7 +22,9 @@ VISCOUS, COULOMB = 5, 6
 INVERSE_MASS, INVERSE_INERTIA = 7, 8
 ARM_X, ARM_Y = 9, 10
 U, V, OMEGA = 11, 12, 13
-# Links of a plane that tilts: loads of their ends, see physics.increments.EndLoad.
+# On a plane that tilts: openings of joints at the start of the step; loads of the links' ends, in the order of
+# physics.increments.EndLoad.
+OPENING = 14
 END_LOAD = 27
 # A stage, see physics.increments.Moved; way [m] and change of velocity [m/s] of the links' centres under a load of a
 # script, in rows that planes use otherwise. Rows of left ends and of the spin are padded: column n repeats column 0.
@@ -30,7 +32,7 @@ LEFT, RIGHT = 16, 18
 LEFT_RATE, RIGHT_RATE = 20, 22
 STAGE_ARM_X, STAGE_ARM_Y, STAGE_SPIN = 24, 25, 26
 WAY, CHANGE = 27, 29
-ERROR = 31
+ERROR = 32
 # Joint forces and torques, shifted by one: column i + 1 is joint i, column 0 repeats column n. At least 2048 bytes lie
 # between them and rows that they are computed from or that are computed from them: closer, clang allows for a load that
 # waits for the store of an earlier column, and vectorises by half as many.

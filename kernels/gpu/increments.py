@@ -244,7 +244,7 @@ def block_steps(features: Features, block_dim: int) -> BlockSteps:
         end_load = EndLoad()
         if wp.static(tilts):
             plane = plane_motion(felt_plane(run))
-            end_load = wp.static(algebra.end_load)(plane, half_step, omega, start_x, start_y)
+            end_load = wp.static(algebra.end_load)(plane, half_step, omega, start_x, start_y, own.x, own.y)
         rates = Stages()
         rates[0] = kept_push(run)
         if wp.static(has_load):

@@ -39,7 +39,7 @@ from warpchain.kernels.types import Integers, Worlds, read_ground
 
 @wp.func
 def driven_world(world: int):
-    """What stands in a launch for the number of a world whose chain hangs on a driven sprocket, and the inverse."""
+    """The number by which a world is launched whose chain hangs on a driven sprocket; of that number, the world."""
     return -1 - world
 
 

@@ -22,8 +22,9 @@ p and B are 1e-8 m and less. So in single precision, too, C is known to 1e-15 m,
 
 On a plane that tilts each link has a load of its own, by gravity and the plane's motion. The new state falls by that
 in the middle of the step; this is of second order, like the plane's own step. Such loads open joints, too: both ends of
-a link are drawn to its centre by an acceleration G that free points there would not have. So stages shift them by
-G t²/2, at the rate G t. What the openings of joints add to this is less than its rounding.
+a link are drawn to its centre by an acceleration G that free points there would not have, and the plane's motion loads
+the two ends of an open joint differently. So stages shift a link's left end by G t²/2, at the rate G t, and its right
+end by the opposite and what the opening of its joint adds.
 """
 
 import functools
@@ -102,7 +103,7 @@ class Increments:
     # ``(1/m, 1/I, arm_x, arm_y, left force x, y, left torque, right force x, y, right torque)`` → ẍ, ÿ, θ̈
     acceleration: Any
     plane_motion: Any  # ``(chain)`` → PlaneMotion
-    # ``(plane, h/2, ω, arm_x, arm_y)`` of a link at the start of a step → EndLoad in the middle
+    # ``(plane, h/2, ω, arm_x, arm_y, opening x, y of the right joint)`` at the start of a step → EndLoad in the middle
     end_load: Any
     plane_load: Any  # ``(plane, h/2, K, half_length, i)``, likewise → ẍ, ÿ, θ̈ of link i
     ends_drawn: Any  # ``(stage, Moved, EndLoad)`` → Moved of a link with that load
@@ -161,8 +162,10 @@ def increments(real: Any) -> Increments:
 
     @wp.struct
     class EndLoad:
-        x: real  # G of the left end [m/s²]; the right end has the opposite
-        y: real
+        left_x: real  # G [m/s²]
+        left_y: real
+        right_x: real  # its opposite, less what the opening of the right joint adds
+        right_y: real
         turn: real  # θ̈ [rad/s²]
 
     @wp.func
@@ -276,17 +279,27 @@ def increments(real: Any) -> Increments:
         return plane
 
     @wp.func
-    def end_load(plane: PlaneMotion, half: real, omega: real, start_x: real, start_y: real) -> EndLoad:
+    def end_load(
+        plane: PlaneMotion, half: real, omega: real, start_x: real, start_y: real, open_x: real, open_y: real
+    ) -> EndLoad:
         arm_x = start_x - half * omega * start_y
         arm_y = start_y + half * omega * start_x
         about_rod = arm_x * plane.turn_x + arm_y * plane.turn_y
         across_rod = arm_x * plane.turn_y - arm_y * plane.turn_x
         stretch = across_rod * across_rod * plane.inverse_square
-        return EndLoad(arm_x * stretch, arm_y * stretch, -(about_rod * across_rod) * plane.inverse_square)
+        across = plane.turn_x * open_y - plane.turn_y * open_x
+        load = EndLoad()
+        load.left_x = arm_x * stretch
+        load.left_y = arm_y * stretch
+        load.right_x = plane.turn_y * across - load.left_x
+        load.right_y = -plane.turn_x * across - load.left_y
+        load.turn = -(about_rod * across_rod) * plane.inverse_square
+        return load
 
     @wp.func
     def plane_load(plane: PlaneMotion, half: real, K: Rows, a: real, i: int):
-        turn = end_load(plane, half, real(K[OMEGA, i]), a * real(K[COSINE, i]), a * real(K[SINE, i])).turn
+        none = real(0.0)
+        turn = end_load(plane, half, real(K[OMEGA, i]), a * real(K[COSINE, i]), a * real(K[SINE, i]), none, none).turn
         x = real(K[X, i]) + half * real(K[U, i])
         y = real(K[Y, i]) + half * real(K[V, i])
         across = plane.speed + plane.turn_x * y - plane.turn_y * x
@@ -296,14 +309,14 @@ def increments(real: Any) -> Increments:
     def ends_drawn(stage: Stage, link: Moved, load: EndLoad) -> Moved:
         pull = stage.even * (real(0.5) * stage.stiffness * stage.even + stage.damping)
         moved = link
-        moved.left_x += pull * load.x
-        moved.left_y += pull * load.y
-        moved.right_x -= pull * load.x
-        moved.right_y -= pull * load.y
-        moved.left_u += stage.even * load.x
-        moved.left_v += stage.even * load.y
-        moved.right_u -= stage.even * load.x
-        moved.right_v -= stage.even * load.y
+        moved.left_x += pull * load.left_x
+        moved.left_y += pull * load.left_y
+        moved.right_x += pull * load.right_x
+        moved.right_y += pull * load.right_y
+        moved.left_u += stage.even * load.left_x
+        moved.left_v += stage.even * load.left_y
+        moved.right_u += stage.even * load.right_x
+        moved.right_v += stage.even * load.right_y
         moved.spin += stage.even * load.turn
         return moved
 

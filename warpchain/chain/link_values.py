@@ -94,11 +94,10 @@ def _mean_of_pairs(pairs: Array) -> float:
 
 _INNER: Final = attrgetter("inner_mass", "inner_inertia", "viscous_friction", "coulomb_friction", "circle_radius")
 _OUTER: Final = attrgetter("outer_mass", "outer_inertia", "viscous_friction", "coulomb_friction", "circle_radius")
-_UNLIKE: Final = attrgetter(
-    *OF_LINKS, "mass_gradient", "charm_radius", "charm_mass", "charm_inertia", "joint_friction_factor"
-)
-_ALIKE: Final = (*(None for _ in OF_LINKS), 0.0, None, 0.0, 0.0, 1.0)
-"""What a scene has of these fields whose links and joints are those of the parameters."""
+_OWN: Final = (*OF_LINKS, "mass_gradient", "charm_radius", "charm_mass", "charm_inertia", "joint_friction_factor")
+"""Fields of a scene by which a link or a joint may have values of its own."""
+_UNLIKE: Final = attrgetter(*_OWN)
+_ALIKE: Final = tuple(Scene.model_fields[name].default for name in _OWN)
 
 
 def alternating(parameters: Parameters | Sequence[Parameters], links: int) -> LinkValues:

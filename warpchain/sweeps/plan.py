@@ -27,13 +27,7 @@ from warpchain.chain.keep import Keep
 from warpchain.chain.setup import Setup
 from warpchain.files import AnyPath
 from warpchain.inputs.arrays import Array
-from warpchain.inputs.distributions import (
-    DRAW_LIMIT,
-    Distribution,
-    draw,
-    first_draws,
-    random_generator,
-)
+from warpchain.inputs.distributions import DRAW_LIMIT, Distribution, draw, first_draws, random_generator
 from warpchain.inputs.fields import SECTIONS
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS
@@ -134,7 +128,7 @@ class Sweep:
         if not block.distributions:
             return walk
         if first is not None:
-            with suppress(InputError):
+            with suppress(InputError):  # of a draw that cannot be; further ones follow below
                 setup = fixed.with_drawn(first)
                 return PlannedWalk(walk.index, walk.block, walk.cell, walk.sample, setup, walk.laws, first)
         sampler = SAMPLERS[block.sampler]
