@@ -128,7 +128,7 @@ class Sweep:
         if not block.distributions:
             return walk
         if first is not None:
-            with suppress(InputError):  # of a draw that cannot be; further ones follow below
+            with suppress(InputError):  # if this draw is impossible, the next ones are tried below
                 setup = fixed.with_drawn(first)
                 return PlannedWalk(walk.index, walk.block, walk.cell, walk.sample, setup, walk.laws, first)
         sampler = SAMPLERS[block.sampler]
