@@ -24,6 +24,7 @@ SHOWN = 12  # Cells of a file that are printed, the farthest first
 KEYS = (
     *("block", "links", "frequency", "gravity", "radius", "link_length", "charm_mass", "floor_friction", "slope"),
     *("held_on", "tap", "when", "rate", "wave", "size"),
+    *("cell", "method", "tolerance", "contact_step", "soften_pile"),
 )
 """Columns that tell cells apart."""
 VALUES = (
@@ -32,6 +33,7 @@ VALUES = (
     ("dx", "standard_error"),
     ("ratio", "error"),
     ("change_percent", "error_percent"),
+    ("change_percent", "error"),
     ("change", "error"),
 )
 """Columns of a value and its standard error; the first pair that a file has is compared."""

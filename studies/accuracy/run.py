@@ -2,7 +2,7 @@
 
 It writes results/NEW-BASE.csv and prints the relative difference of the mean Δx of each cell with the standard error of
 pairs of samples; over all cells their mean and χ², scatter and bounces; and how exact either is. Of one sweep with
-points it compares each method with the last, and writes results/NAME.csv.
+points it compares each point with the last, writes results/NAME.csv, and puts the table NAME into README.md.
 """
 
 from pathlib import Path
@@ -12,9 +12,10 @@ import numpy as np
 import typer
 
 import warpchain
-from studies.common import Array, OverCells, of_cells, run_study, write_rows
+from studies.common import Array, OverCells, of_cells, publish, run_study, table, write_rows
 
 FOLDER = Path(__file__).parent
+STEPS = ("steps_accepted", "steps_rejected")
 
 
 def cells(sweep: warpchain.SweepResult, column: str) -> dict[str, Array]:
@@ -39,7 +40,7 @@ def describe(sweep: warpchain.SweepResult) -> None:
         middle, high, greatest = 1e3 * np.nanpercentile(together(sweep, column), [50, 99, 100])
         print(f"  {column}: median {middle:.2f}, 99th percentile {high:.2f}, greatest {greatest:.2f} mm")
     high, higher = np.nanpercentile(np.abs(together(sweep, "energy_error")), [95, 99])
-    steps = together(sweep, "steps_accepted") + together(sweep, "steps_rejected")
+    steps = sum(together(sweep, name) for name in STEPS)
     print(f"  energy_error: 95th percentile {high:.1e}, 99th {higher:.1e}")
     print(f"  attempted steps: {steps.sum() / 1e6:.1f} million, in the longest walk {steps.max():.0f}")
 
@@ -81,23 +82,37 @@ def compare(new: warpchain.SweepResult, base: warpchain.SweepResult) -> None:
     print(f"standard deviations {100 * scatter.mean() - 100:+.1f} %, bounces {100 * bounced.mean() - 100:+.1f} %")
 
 
-def compare_methods(sweep: warpchain.SweepResult) -> None:
-    """Write and print how Δx with each method of a sweep's points differs from that with the last."""
-    if not all("method" in block.get("points", {}) for block in sweep.sweep["blocks"]):
-        raise warpchain.InputError(f"{sweep.name}: no points with methods; pass a second folder to compare it with")
-    rows = []
-    for block, settings in zip(sweep.blocks.values(), sweep.sweep["blocks"], strict=True):
-        distances = block.columns["dx"].reshape(len(settings["points"]["method"]), -1).astype(float)
-        for method, walked in zip(settings["points"]["method"][:-1], distances, strict=False):
-            rows.append({"method": method, **change(walked, distances[-1])})
-            print("{method}: {change_percent:+.2f} ± {error:.2f} % ({pairs} pairs)".format(**rows[-1]))
+def compare_points(sweep: warpchain.SweepResult) -> None:
+    """Write how Δx at each point of a sweep differs from that at the last, to a file and to the page."""
+    settings = [block["points"] for block in sweep.sweep["blocks"] if block.get("points")]
+    if len(settings) != 1 or len(sweep.blocks) != 1:
+        raise warpchain.InputError(f"{sweep.name}: not one block with points; pass a second folder to compare it with")
+    (block,), (fields,) = sweep.blocks.values(), settings
+    points = list(zip(*fields.values(), strict=True))
+    walks = {name: block.columns[name].reshape(len(points), -1).astype(float) for name in ("dx", *STEPS)}
+    steps = sum(walks[name] for name in STEPS).mean(axis=1)
+    rows, lines = [], []
+    for point, dx, count in zip(points[:-1], walks["dx"], steps, strict=False):
+        found = change(dx, walks["dx"][-1])
+        rows.append({**dict(zip(fields, point, strict=True)), **found, "steps": round(count)})
+        by = "{change_percent:+.2f} ± {error:.2f}".format(**found).replace("-", "−")
+        lines.append([*map(_of_point, point), f"{count:,.0f}", by])
     write_rows(FOLDER / "results" / f"{sweep.name}.csv", rows, sweep)
+    head = [*(f"`{name}`" for name in fields), "attempted steps", "change of Δx / %"]
+    publish(FOLDER, {sweep.name: table(head, lines)})
+
+
+def _of_point(value: object) -> str:
+    """A value of a point, for a table."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:g}" if isinstance(value, float) else f"`{value}`"
 
 
 def main(folder: str, base: Annotated[str | None, typer.Argument()] = None) -> None:
-    """Compare two folders, or the methods of one."""
+    """Compare two folders, or the points of one."""
     if base is None:
-        return compare_methods(warpchain.load(folder))
+        return compare_points(warpchain.load(folder))
     sweeps = warpchain.load(folder), warpchain.load(base)
     compare(*sweeps)
     for sweep in sweeps:

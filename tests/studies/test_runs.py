@@ -119,11 +119,14 @@ def test_walks_of_two_sweeps_are_compared_in_pairs(
     assert shown.count("+10.00 ± 0.00 % (3 pairs)") == 4 and "mean of 4 cells +10.000 ± 0.000 %" in shown
     with pytest.raises(InputError, match="other cells"):
         accuracy.main(folders[0], folders[2])
-    with pytest.raises(InputError, match="no points with methods"):
+    with pytest.raises(InputError, match="not one block with points"):
         accuracy.main(folders[0])
-    methods = content(grid={"links": [60]}, points={"method": ["os32", "dp5"]}, same_samples_along=["point"])
-    make_sweep(tmp_path / "methods", methods, further(1.1, lambda walk: walk.setup.options.method == "os32"))
+    points = {"method": ["os32", "os32", "dp5"], "tolerance": [1e-3, 1e-4, 1e-4]}
+    methods = content(grid={"links": [60]}, points=points, same_samples_along=["point"])
+    make_sweep(tmp_path / "methods", methods, further(1.1, lambda walk: walk.setup.options.tolerance == 1e-3))
+    (tmp_path / "README.md").write_text("<!-- small -->\n<!-- end of small -->\n", encoding="utf-8")
     accuracy.main(str(tmp_path / "methods"))
-    assert "os32: +10.00 ± 0.00 % (3 pairs)" in capsys.readouterr().out
+    page = (tmp_path / "README.md").read_text(encoding="utf-8")
+    assert "| `os32` | 0.001 | 14 | +10.00 ± 0.00 |" in page and "| `os32` | 0.0001 | 14 | +0.00 ± 0.00 |" in page
     with pytest.raises(InputError, match="no blocks fixed and tilted"):
         falls.main(folders[0])
