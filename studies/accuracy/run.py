@@ -92,7 +92,7 @@ def compare_points(sweep: warpchain.SweepResult) -> None:
     walks = {name: block.columns[name].reshape(len(points), -1).astype(float) for name in ("dx", *STEPS)}
     steps = sum(walks[name] for name in STEPS).mean(axis=1)
     rows, lines = [], []
-    for point, dx, count in zip(points[:-1], walks["dx"], steps, strict=False):
+    for point, dx, count in zip(points[:-1], walks["dx"][:-1], steps[:-1], strict=True):
         found = change(dx, walks["dx"][-1])
         rows.append({**dict(zip(fields, point, strict=True)), **found, "steps": round(count)})
         by = "{change_percent:+.2f} ± {error:.2f}".format(**found).replace("-", "−")
